@@ -18,6 +18,7 @@ from diagnosis.decision.assumed import assumed_words
 from diagnosis.decision.caveats import more_caveats
 from diagnosis.decision.decide import Decision, decide
 from diagnosis.decision.intervals import intervals_of, spans_of
+from diagnosis.decision.scale import Scale, scale_of
 from diagnosis.results.clearing import Checked, clearing_rows
 from diagnosis.results.detectability import detectability_table
 from diagnosis.results.document import SCHEMA, CoverageRow, FileRow, LogRow, MachineRow, ReportDocument, WheelPlace
@@ -86,6 +87,12 @@ class Judged:
         """Signals that the machine file may have wrong."""
         return mapping_hints(self.cells)
 
+    @cached_property
+    def scale(self) -> Scale | None:
+        """What is known of the scale of the wheels' speeds."""
+        names = {f"wheel.{w}.v" for w in self.machine.wheels}
+        return scale_of(self.cells, {row["recorded_unit"] for row in self.recorded.rows if row["name"] in names})
+
     @property
     def damage(self) -> list[str]:
         """What the files lost."""
@@ -113,7 +120,7 @@ def report_of_mission(judged: Judged, identity: MachineRow) -> ReportDocument:
         "machine": identity,
         "readings": to_json(replay.readings),
         "verdict": _decision(judged, coverage, decided_s, metrics.open_states(found.assessments, moving, machine)).row(
-            [*more_caveats(mission, judged.recorded.first_ns, machine)]
+            [*more_caveats(mission, judged.recorded.first_ns, machine), *_told_scale(judged.scale)]
         ),
         "intervals": to_json(judged.intervals),
         "states": to_json(spans_of(found.assessments, timeline.step_ns)),
@@ -138,11 +145,17 @@ def report_of_mission(judged: Judged, identity: MachineRow) -> ReportDocument:
             found.wheel_model,
             found.words,
             [f.clock for f in mission.files if f.clock is not None],
+            judged.scale,
         ),
         "limits": to_json(machine.limits),
     }
     plain: ReportDocument = to_json(report)
     return plain
+
+
+def _told_scale(scale: Scale | None) -> list[str]:
+    """A scale that is contradicted, unless it stands among the reasons of the verdict already."""
+    return [scale.sentence] if scale is not None and scale.sentence and not scale.gross else []
 
 
 def _decision(
@@ -164,7 +177,7 @@ def _decision(
         checks=judged.checks,
         scope=_scope(judged),
         events=judged.found.events,
-        hints=tuple(h.text for h in judged.hints),
+        hints=(*(h.text for h in judged.hints), *([s.gross] if (s := judged.scale) is not None and s.gross else [])),
         open_state=open_state,
     )
 

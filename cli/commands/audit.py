@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+from cli.commands.audit_forgotten import run_forget
 from cli.commands.audit_repairs import RepairRequest, one_date, run_repairs
 from cli.commands.audit_run import AuditRequest, run_audit
 from cli.terminal.command import Quiet, Verbose, terminal_of
@@ -145,6 +146,15 @@ On = Annotated[
         show_default=False,
     ),
 ]
+Forget = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--forget",
+        metavar="MISSION",
+        help="Leave out a log that was not judged and is no longer there, and audit nothing; may be given again.",
+        show_default=False,
+    ),
+]
 
 
 def audit(
@@ -171,11 +181,15 @@ def audit(
     repaired: Repaired = None,
     not_repaired: NotRepaired = None,
     on: On = None,
+    forget: Forget = None,
     quiet: Quiet = False,
     verbose: Verbose = False,
 ) -> None:
     """Diagnose a tree of logs: a report per mission and a page about the fleet; or record a repair."""
     repairs = RepairRequest(output, repaired or [], not_repaired or [], one_date(on), json)
+    if forget and not (repaired or not_repaired):
+        run_forget(terminal_of(context, json=json), output, forget, paths or [], json=json)
+        return
     if repairs.is_asked(paths or []):
         run_repairs(terminal_of(context, json=json), repairs)
         return

@@ -209,10 +209,17 @@ def more_caveats(mission: Mission, first_ns: int, machine: Machine) -> list[str]
     absent = [name for name in machine.signals if name not in mission.signals.items]
     if absent:
         reason = mission.signals.missing.get(absent[0], "")
+        commands = any(name.startswith("cmd.") or name.endswith((".v_ref", ".phi_ref", ".u")) for name in absent)
         out.append(
             f"Named in the machine file but not found in the log: {', '.join(absent)}"
             + (f" ({reason})" if reason else "")
             + "."
+            + (
+                " Without its command nothing tells whether a part does what it is asked to. If it was recorded under another name "
+                "(`mfhca channels LOG --all`), correct [signals]; else record it."
+                if commands
+                else ""
+            )
         )
     cut = (mission.timeline.start_ns - first_ns) * 1e-9
     if cut > mission.timeline.dt:

@@ -10,6 +10,7 @@ import numpy as np
 
 from diagnosis.channels.noise import rounding_step
 from diagnosis.decision.missing import applies, cost_of_missing
+from diagnosis.decision.scale import Scale
 from diagnosis.results.assessment import Assessment
 from diagnosis.results.document import ClockRow, MissingRow, QualityRow, SignalRow
 from diagnosis.results.left_out import is_left_out
@@ -110,6 +111,7 @@ def checks(
     model: WheelModelFit | None,
     words: MachineWords,
     clocks: Sequence[SourceClock] = (),
+    scale: Scale | None = None,
 ) -> list[QualityRow]:
     """Checks of the data with their effect on the verdict."""
     return [
@@ -123,6 +125,7 @@ def checks(
         ),
         _gap_check(found.rows),
         *_guessed(signals),
+        *([_row("Scale of speeds", *scale.result)] if scale is not None else []),
         *_wheel_model(model, words),
         *(_row("Clock", clock.sentence, *_effect_of(clock)) for clock in clocks if clock.sentence),
         *_notes((*signals.notes, *timeline.notes, *notes), clocks),

@@ -11,6 +11,7 @@ from replay.faults import Side, State
 
 _WORDS = ((0.99, "Practically certain"), (0.9, "Very likely"), (0.7, "Likely"))
 _OPEN, _TIE = 0.9, 1e-3
+_UNLIKE = 0.1  # of the driving: sides that were judged for shares so far apart are told one by one
 _ANSWERS = {
     Verdict.STOP: "must not go out before repair",
     Verdict.READY: "",
@@ -44,13 +45,20 @@ def sure_of(fault: IntervalRow, report: ReportDocument) -> str:
     machine_words = words_of(report["machine"])
     how = machine_words.decided(Tier(fault["tier"]), Kind(fault["kind"]), side)
     words += [how] if how else []
-    shares = [
-        row["decided_driving_s"] / row["driving_s"]
+    shares: dict[str, float] = {
+        row["side"]: row["decided_driving_s"] / row["driving_s"]
         for row in report["coverage"]
         if row["component"] == fault["component"] and row["side"] in side.sides and row["driving_s"]
-    ]
-    if shares:
-        words.append(f"{_share(min(shares))} of its {machine_words.moving} was judged")
+    }
+    if len(shares) > 1 and max(shares.values()) - min(shares.values()) > _UNLIKE:
+        each = [
+            f"its {machine_words.part_name(fault['kind'], s)} was judged for {_share(shares[s]).replace('all', '100 %')}"
+            for s in side.sides
+            if s in shares
+        ]
+        words.append(f"{' and '.join(each)} of the {machine_words.moving}")
+    elif shares:
+        words.append(f"{_share(min(shares.values()))} of its {machine_words.moving} was judged")
     return ", ".join(words)
 
 

@@ -26,6 +26,7 @@ from replay.setup.unstated_units import usual_units, valve_currents
 from replay.signals.file_names import named_channels
 from replay.signals.mapping import by_number, map_signals
 from replay.signals.signal import Signals
+from replay.signals.unfilled import unfilled, unfilled_note
 
 _SUPPOSED = "left and right turn against each other"
 _SPEEDS = ("v", "v_true", "v_ref")
@@ -88,7 +89,10 @@ def draft_machine(logs: Sequence[RawLog], preset: Preset | None = None) -> Draft
         draft.ask("geometry", doubt)
     if preset is Preset.HAULOTTE:
         return _haulotte_draft(draft, logs)
-    given = given_signals(structure, channels, logs)
+    empty = unfilled(channels)
+    given = given_signals(structure, {n: c for n, c in channels.items() if n not in empty}, logs)
+    for array in dict.fromkeys(empty.values()):
+        draft.say("signals", f"Not used: {unfilled_note(array)}.")
     sources = table_sources(logs, draft)
     raw = replace(structure.machine(1.0), signals=given, sources=sources)
     found = map_signals(logs, raw)

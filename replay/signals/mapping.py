@@ -26,6 +26,7 @@ from replay.signals.rules import candidates, wanted_type
 from replay.signals.scale_doubt import scale_doubt
 from replay.signals.signal import Signal, Signals
 from replay.signals.to_si import Converted, choose_motor_or_wheel, convert, usable_unit
+from replay.signals.unfilled import unfilled, unfilled_note
 from replay.signals.unit_doubts import Doubt, doubt, questions
 
 #: Why a signal is missing for which nothing was found.
@@ -116,7 +117,9 @@ def map_signals(logs: Sequence[RawLog], machine: Machine) -> Signals:
         _take_given(draft, name, source, logs)
     by_signal: dict[str, list[tuple[Candidate, RawLog]]] = {}
     for log, channels in zip(logs, named_channels(logs), strict=True):
-        for found in candidates(channels, machine):
+        empty = unfilled(channels)
+        draft.notes += [unfilled_note(array) for array in dict.fromkeys(empty.values())]
+        for found in candidates({n: c for n, c in channels.items() if n not in empty}, machine):
             candidate = replace(found, origin=in_its_file(found.origin, log))
             by_signal.setdefault(candidate.signal, []).append((candidate, log))
     for name in machine.canonical_signals():

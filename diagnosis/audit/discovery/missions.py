@@ -4,7 +4,8 @@
 
 1. a folder with a ``mission.toml`` is one mission: the files that it names, else the recording that the folder is, else all
    logs and recordings in it, and no folder below it is looked through;
-2. a folder with a ``metadata.yaml`` is one recording (rosbag2), and one mission;
+2. a folder with a ``metadata.yaml`` is one recording (rosbag2), and one mission; so is one that lost it
+   (`diagnosis.audit.discovery.bag_folders`);
 3. numbered parts (``drive_0.mcap``, ``drive_1.mcap``, …) are one recording where each goes on where the one before ended;
 4. tables (CSV, Parquet, …) are part of the mission of the recording with the same stem, where there is one such recording;
 5. any other log is a mission by itself.
@@ -33,6 +34,7 @@ from collections import Counter, defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from diagnosis.audit.discovery.bag_folders import is_unlisted_bag, lost_metadata, unlisted_note
 from diagnosis.audit.discovery.folder_contents import FolderContents, Unnamed
 from diagnosis.audit.discovery.listing import Entry, Place
 from diagnosis.audit.discovery.mission_file import MISSION_FILE, MissionFile, read_mission_file, stated_machine
@@ -118,17 +120,24 @@ def missions_in(
         own = [child for child in folders if not child.link]
         found.missions.append(_stated(place, folder, names[MISSION_FILE], files, own, output, found))
         found.is_mission = True
-    elif _METADATA in names:
+    elif _METADATA in names or is_unlisted_bag(place, folder, files, folders):
+        found.notes += [] if _METADATA in names else [unlisted_note(folder)]
         found.missions.append(Unnamed(place.parent(folder.real), folder.name, (place.whole(folder),)))
         found.is_mission = True
     else:
         recordings = []
+        beside = any(not child.link and is_recording(place, child) for child in folders)
         for child in folders:
             if child.name.startswith(".") or _holds_results(folder, names, child, output):
                 continue
             if child.link:
                 found.links.append(child)
-            elif is_recording(place, child) and not _has(place, child, MISSION_FILE):
+            elif _has(place, child, MISSION_FILE):
+                found.below.append(child)
+            elif is_recording(place, child):
+                recordings += _whole(place, child, found)
+            elif lost_metadata(place, child, beside=beside):
+                found.notes.append(unlisted_note(child))
                 recordings += _whole(place, child, found)
             else:
                 found.below.append(child)
@@ -243,7 +252,7 @@ def is_recording(place: Place, folder: Entry) -> bool:
 
 def is_mission(place: Place, folder: Entry) -> bool:
     """Whether a folder is one mission: rules 1 and 2."""
-    return is_recording(place, folder) or _has(place, folder, MISSION_FILE)
+    return is_recording(place, folder) or _has(place, folder, MISSION_FILE) or lost_metadata(place, folder)
 
 
 def _has(place: Place, folder: Entry, name: str) -> bool:

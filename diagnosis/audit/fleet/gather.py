@@ -123,7 +123,7 @@ def _unjudged(m: Machine, first_seen: Callable[[str], int | None]) -> int:
     """Missions that were not judged and may be later than the last judged one."""
     last, began = m.last_judged, _began(m, first_seen)
     after = len(m.dated) - (m.dated.index(last) + 1 if last else 0)
-    others = [r.name for r in m.undated if r.result.verdict is Verdict.NOT_ASSESSED] + [f.name for f in m.failed]
+    others = [r.name for r in m.undated if r.result.verdict is Verdict.NOT_ASSESSED] + [f.name for f in m.failed_once]
     return after + sum(_may_be_later(name, began, first_seen) for name in others)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections import defaultdict
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
@@ -92,11 +93,17 @@ def _why(
         if any(not f["since"] for f in faults):
             return last, f"with {count(len(faults), 'fault')} to watch: {named}"
         return last, "no fault in its last mission" + (f"; seen before: {named}" if faults else "")
-    for place in (*m["failed"], *reversed(m["undated"])):
+    for place in (*sorted(m["failed"], key=lambda k: missions[k]["gone"]), *reversed(m["undated"])):
         if m["unjudged"] and missions[place]["verdict"] in (None, Verdict.NOT_ASSESSED):
             more = f" ({count(m['unjudged'], 'mission')} not judged)" if m["unjudged"] > 1 else ""
-            return place, f"{_said(missions[place])}{more}"
+            lost = _lost(missions[place]) if place in m["failed"] and missions[place]["gone"] else ""
+            return place, f"{_said(missions[place])}{lost}{more}"
     return last, _said(missions[last]) if last is not None and m["verdict"] == Verdict.NOT_ASSESSED else m["standing"]
+
+
+def _lost(mission: MissionRow) -> str:
+    """What to do about a log that was not judged and is no longer there."""
+    return f"; it is no longer there: put it back, or leave it out with mfhca audit --forget {shlex.quote(mission['name'])}"
 
 
 def _said(mission: MissionRow) -> str:

@@ -147,6 +147,14 @@ class Machine:
         """All judged missions."""
         return self.dated + self.undated
 
+    @cached_property
+    def failed_once(self) -> tuple[Mission, ...]:
+        """Missions without a report, each content once (copies, and a file that was moved): of one that is there and one that is gone the first."""
+        out: dict[object, Mission] = {}
+        for m in sorted(self.failed, key=lambda m: m.gone):
+            out.setdefault(m.name if m.result is None else m.result.id, m)
+        return tuple(out.values())
+
     @property
     def last_judged(self) -> Run | None:
         """The last dated mission that assessed anything."""
@@ -207,11 +215,20 @@ class Machine:
             out.append(f"its last {_count(len(trailing), 'mission')} could not be assessed")
         if self.undated:
             out.append(f"{_count(len(self.undated), 'mission')} of unknown order")
-        unread = sum(m.result is not None for m in self.failed)
+        failed = self.failed_once
+        unread = [m for m in failed if m.result is not None]
         if unread:
-            out.append(f"{_count(unread, 'log')} not read")
-        if len(self.failed) > unread:
-            out.append(f"{_count(len(self.failed) - unread, 'log')} not audited yet")
+            gone = sum(m.gone for m in unread)
+            lost = (
+                ""
+                if not gone
+                else " and no longer there"
+                if gone == len(unread)
+                else f", {gone} of them no longer there"
+            )
+            out.append(f"{_count(len(unread), 'log')} not read{lost}")
+        if len(failed) > len(unread):
+            out.append(f"{_count(len(failed) - len(unread), 'log')} not audited yet")
         return ", ".join(out)
 
     @property

@@ -209,6 +209,17 @@ class Store:
         with self.database.transaction() as connection:
             records.write_document(connection, document, self.run)
 
+    def forget(self, names: Sequence[str]) -> None:
+        """Leave missions out; their results stay, and a mission that is found again is entered again.
+
+        Raises
+        ------
+        OutputError
+            Where it cannot be written.
+        """
+        with self.database.transaction() as connection:
+            connection.executemany("DELETE FROM mission WHERE name = ? AND gone IS NOT NULL", [(n,) for n in names])
+
     def reason_for(self, result: int, reason: str, files: Sequence[str]) -> str:
         """Reason of a result for one of the missions that share it: it names that mission's files, not its copies'."""
         if (result, reason) not in self._reasons:

@@ -49,6 +49,10 @@ def test_phrase_of_a_fault() -> None:
     assert sure_of(fault(0.995), report) == (
         "Practically certain (99.5 %), measured against the valve position, 91 % of its driving was judged"
     )
+    unlike = samples.report_with(coverage=[row("actuator", 10.0), row("sensor", 98.0)])
+    assert sure_of(fault(0.995, side="sensor_or_actuator"), unlike).endswith(
+        "its speed sensor was judged for 98 % and its drive valve was judged for 10 % of the driving"
+    )
     # certainly faulty, the row less so
     words = sure_of(fault(0.49, hypotheses=[{"side": "actuator", "mode": "stuck", "p": 0.49}]), nothing)
     assert words.startswith("Practically certain faulty (over 99.9 %), most likely stuck (49 %)")
@@ -63,7 +67,9 @@ def test_phrase_of_a_fault() -> None:
 
 def test_both_sides_count_where_they_are_not_told_apart() -> None:
     report = samples.report_with(coverage=[row("actuator", 40.0), row("sensor", 100.0)])
-    assert "40 % of its driving" in sure_of(fault(0.99, side="sensor_or_actuator", tier="tracking"), report)
+    assert "for 100 % and its drive valve was judged for 40 % of the driving" in sure_of(
+        fault(0.99, side="sensor_or_actuator", tier="tracking"), report
+    )
 
 
 def test_phrase_of_a_verdict() -> None:

@@ -345,3 +345,33 @@ def test_a_part_that_is_missing_is_told(tmp_path: Path) -> None:
     assert found.problems == ()
     (note,) = found.notes
     assert note.startswith(f"{tmp_path}/g_0.bag: numbered like parts of one recording, of which g_2.bag is not there")
+
+
+def test_a_bag_folder_that_lost_its_metadata_is_one_recording_of_the_machine_around_it(tmp_path: Path) -> None:
+    put(tmp_path, "hx1/run6/metadata.yaml", "hx1/run6/run6_0.db3", "hx1/run7/run7_0.db3", "hx1/run7/run7_1.db3")
+    put(tmp_path, "hx1/morning/rosbag2_2026_03_01-08_00_00_0.mcap")  # renamed, but beside recordings
+    put(tmp_path, "hx2/run1/run1_0.mcap", "hx2/run1.csv", "hx3/run1_0.db3", "hx4/hx4_0.db3", "hx4/other.csv")
+    put(tmp_path, "hx5/hx5_0.db3", "hx5/day/x.mcap", "hx6/hx6_0.db3", "hx6/mission.toml")
+    (tmp_path / "hx6/mission.toml").write_text('machine_id = "HX6"\n', encoding="utf-8")
+    found = discover([str(tmp_path)])
+    assert shown(found, tmp_path) == {
+        "hx1__morning": ["hx1/morning"],
+        "hx1__run6": ["hx1/run6"],
+        "hx1__run7": ["hx1/run7"],
+        "hx2__run1": ["hx2/run1", "hx2/run1.csv"],
+        "hx3__run1_0": ["hx3/run1_0.db3"],
+        "hx4__hx4_0": ["hx4/hx4_0.db3"],  # beside another log: a machine's folder
+        "hx4__other": ["hx4/other.csv"],
+        "hx5__day__x": ["hx5/day/x.mcap"],
+        "hx5__hx5_0": ["hx5/hx5_0.db3"],
+        "hx6": ["hx6/hx6_0.db3"],
+    }
+    by_folder = {m.name: m.machine_id or fallback_id(m) for m in found.missions}
+    assert {m for n, m in by_folder.items() if n.startswith("hx1")} == {"hx1"}
+    assert (by_folder["hx2__run1"], by_folder["hx3__run1_0"], by_folder["hx6"]) == ("hx2", "hx3", "HX6")
+    noted = sorted(os.path.relpath(n.partition(": ")[0], tmp_path) for n in found.notes)
+    assert noted == ["hx1/morning", "hx1/run7", "hx2/run1"]
+    for word in ("hx1/run7", "hx1/run7/run7_0.db3"):
+        [mission] = discover([str(tmp_path / word)]).missions
+        assert [os.path.relpath(f, tmp_path) for f in mission.files] == ["hx1/run7"]
+        assert fallback_id(mission) == "hx1"

@@ -67,3 +67,10 @@ def test_a_reason_names_its_log_without_the_folders(tmp_path: Path) -> None:
     broken = Sample("x/y/z", "x", state="unreadable", reason="/data/x/y/z.mcap ends after 12 bytes; copy it again")
     (one,) = listed(tmp_path, Sample("x/y/a", "x"), broken).values()
     assert (one.leave, one.reason) == (Leave.NOT_KNOWN, "z.mcap ends after 12 bytes")
+
+
+def test_a_reason_says_that_a_log_is_no_longer_there_and_how_to_leave_it_out(tmp_path: Path) -> None:
+    torn = Sample("x/z z", "x", state="unreadable", reason="/data/x/z.mcap ends after 12 bytes", gone=True)
+    (one,) = listed(tmp_path, Sample("x/a", "x"), torn).values()
+    assert one.leave is Leave.NOT_KNOWN
+    assert one.reason.endswith("it is no longer there: put it back, or leave it out with mfhca audit --forget 'x/z z'")

@@ -1,0 +1,211 @@
+"""Whether the common scale of all wheel speeds, such as the wheel diameter of the machine file, fits what measures the body.
+
+A common factor shows in no comparison of wheels with each other, and in none with a command that is scaled alike. It shows where
+odometry, a satellite receiver or a yaw rate measures the body itself.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from diagnosis.clearing.cells import Array, Cells
+from diagnosis.response.body import body_speeds
+from replay.machine.geometry import Geometry
+from replay.machine.units import known_unit
+
+_MOVES = 0.3  # of the usual speed: less of it says nothing
+_USUAL = 0.95  # quantile
+_STRAIGHT = 0.05  # of the usual speed: what wheels that go straight on may differ by
+_TURNS = 0.1  # rad; and of the usual yaw rate `_MOVES`
+_LEAST_S = 10.0  # of such motion
+_EVEN = 0.1  # ln; how much the factor may vary, as a standard deviation of its middle half
+_SLIPS = 0.1  # ln; tyres slip and wear by as much
+_HARDLY = 0.2  # of the wheels' way: jacked up, or no sensor of this machine
+_STILL, _STILL_S = 0.01, 1.0  # of the usual speed; at rest for this long, a gyro shows its bias
+_ROTATIONAL = ("rad/s", "rpm", "deg/s", "rev/s")
+GROSS = 0.3  # ln; beyond any slip
+
+
+class Scaled(NamedTuple):
+    """How fast the body is by one sensor.
+
+    Attributes
+    ----------
+    by : str
+        The sensor, in words.
+    factor : float
+        Its speed over that by the wheels [1].
+    lengths : str
+        Lengths of the machine file that stand in the comparison beside the wheels' scale; may be empty.
+    """
+
+    by: str
+    factor: float
+    lengths: str
+
+
+class Scale(NamedTuple):
+    """What is known of the scale of the wheels' speeds.
+
+    Attributes
+    ----------
+    diameter : float or None
+        Wheel diameter [m] by which rotations were converted; None where the log has speeds of the rim.
+    found : tuple[Scaled, ...]
+        What sensors of the body say; empty where none does.
+    """
+
+    diameter: float | None
+    found: tuple[Scaled, ...]
+
+    @property
+    def wrong(self) -> tuple[Scaled, ...]:
+        """Those that contradict it."""
+        return tuple(s for s in self.found if abs(np.log(s.factor)) > _SLIPS)
+
+    @property
+    def gross(self) -> str:
+        """A sentence where the contradiction is beyond any slip; else empty."""
+        return self.sentence if any(abs(np.log(s.factor)) > GROSS for s in self.wrong) else ""
+
+    @property
+    def sentence(self) -> str:
+        """The contradiction in one sentence; empty where there is none."""
+        if not self.wrong:
+            return ""
+        one = max(self.wrong, key=lambda s: (not s.lengths, abs(np.log(s.factor))))
+        what = "the unit or gain of the wheel speeds"
+        if self.diameter is not None:
+            what = f"the wheel diameter ({self.diameter:g} m; {self.diameter * one.factor:.3g} m would fit)"
+        others = f", or {one.lengths}" if one.lengths else ""
+        return (
+            f"By {one.by} the machine is {one.factor:.2f} times as fast as by its wheels throughout: check {what}{others} in the "
+            "machine file; if that is right, the wheels slip, or that sensor's scale is wrong. All wheels share the factor: "
+            "it is no part's fault."
+        )
+
+    @property
+    def result(self) -> tuple[str, str, bool]:
+        """Result, effect and whether all is well, for the table of the data's quality."""
+        given = (
+            "as the log has it"
+            if self.diameter is None
+            else f"by the wheel diameter of the machine file ({self.diameter:g} m)"
+        )
+        if self.wrong:
+            return self.sentence, "speeds, distances and limits are wrong by that factor", False
+        if self.found:
+            said = ", ".join(f"{s.by} ({s.factor:.2f})" for s in self.found)
+            return f"{given}; agrees with {said}", "none", True
+        return (
+            f"{given}; not checked: nothing in the log measures the body's own speed long enough",
+            "a common error of all wheels' speeds would not show",
+            True,
+        )
+
+
+def scale_of(cells: Cells, units: Collection[str]) -> Scale | None:
+    """What sensors of the body say of the scale of the wheels' speeds; None for a machine whose parts are no wheels.
+
+    Parameters
+    ----------
+    cells : Cells
+        The mission.
+    units : Collection[str]
+        Units in which the wheels' speeds were recorded.
+    """
+    machine = cells.machine
+    if machine.speed_unit != "m/s":
+        return None
+    turned = any(known_unit(u) in _ROTATIONAL for u in units)
+    diameter = machine.geometry.wheel_diameter if machine.geometry is not None and turned else None
+    speeds = cells.wheels("v")
+    return Scale(
+        diameter, () if not np.isfinite(speeds).any() else (*_straight(cells, speeds), *_turning(cells, speeds))
+    )
+
+
+def _straight(cells: Cells, speeds: Array) -> Iterator[Scaled]:
+    """By speeds of the body while all wheels go alike: then each of them is the body's."""
+    v, usual = _median(speeds)
+    alike = (np.abs(speeds - v[:, None]) < _STRAIGHT * usual).sum(axis=1)
+    straight = (
+        (alike > np.isfinite(speeds).sum(axis=1) / 2)
+        & (alike >= min(2, speeds.shape[1]))
+        & (np.abs(v) > _MOVES * usual)
+    )
+    for body in body_speeds(cells.timeline, cells.width):
+        factor = _factor(np.abs(body.speed), np.abs(v), straight, cells.dt)
+        if factor is not None:
+            yield Scaled(body.name, factor, "")
+
+
+def _turning(cells: Cells, speeds: Array) -> Iterator[Scaled]:
+    """By a yaw rate while the machine turns without skidding: two sides on one line, or a steered axle."""
+    geometry, yaw = cells.machine.geometry, cells.means("imu.yaw_rate")
+    if geometry is None or not np.isfinite(yaw).any():
+        return
+    v, usual = _median(speeds)
+    rest = (np.abs(v) < _STILL * usual) & np.isfinite(yaw)
+    yaw = yaw - (float(np.median(yaw[rest])) if np.count_nonzero(rest) * cells.dt >= _STILL_S else 0.0)
+    found = _by_sides(cells, geometry, speeds) or _by_angles(cells, geometry, v)
+    if found is None:
+        return
+    expected, lengths = found
+    known = np.abs(expected[np.isfinite(expected)])
+    if not known.size:
+        return
+    turning = (np.abs(expected) > _MOVES * float(np.quantile(known, _USUAL))) & (expected * yaw > 0.0)
+    factor = _factor(np.abs(yaw), np.abs(expected), turning, cells.dt)
+    if factor is not None:
+        yield Scaled("the yaw rate", factor, lengths)
+
+
+def _by_sides(cells: Cells, geometry: Geometry, speeds: Array) -> tuple[Array, str] | None:
+    """Yaw rate by left and right wheels on one line [rad/s], shape (cells,); machines with more axles skid."""
+    places = [geometry.wheels[w] for w in cells.machine.wheels if w in geometry.wheels]
+    if len(places) != speeds.shape[1] or any(p.axle != "fixed" for p in places) or len({p.x for p in places}) != 1:
+        return None
+    y = np.array([p.y for p in places])
+    if not (y > 0).any() or not (y < 0).any():
+        return None
+    left, right = speeds[:, y > 0].mean(axis=1), speeds[:, y < 0].mean(axis=1)
+    return (right - left) / float(y[y > 0].mean() - y[y < 0].mean()), "the track"
+
+
+def _by_angles(cells: Cells, geometry: Geometry, v: Array) -> tuple[Array, str] | None:
+    """Yaw rate by speed and steering angles [rad/s], shape (cells,), where these are large; None without two axles."""
+    names = list(dict.fromkeys(p.axle for p in geometry.wheels.values()))
+    if len(names) != 2 or any(n != "fixed" and n not in cells.machine.axles for n in names) or names == ["fixed"]:
+        return None
+    x = [float(np.mean([p.x for p in geometry.wheels.values() if p.axle == n])) for n in names]
+    angles = [np.zeros(cells.size) if n == "fixed" else cells.means(f"steer.{n}.phi") for n in names]
+    turn = np.tan(angles[0]) - np.tan(angles[1])
+    if abs(x[0] - x[1]) < _TURNS:
+        return None
+    return np.where(np.abs(turn) > _TURNS, v * turn / (x[0] - x[1]), np.nan), "the wheelbase"
+
+
+def _median(speeds: Array) -> tuple[Array, float]:
+    """Median of the wheels, shape (cells,), NaN where none is known; and how fast it usually is."""
+    known = np.isfinite(speeds).any(axis=1)
+    v = np.full(len(speeds), np.nan)
+    v[known] = np.nanmedian(speeds[known], axis=1)
+    moving = np.abs(v[known])
+    return v, float(np.quantile(moving[moving > 0.0], _USUAL)) if (moving > 0.0).any() else np.inf
+
+
+def _factor(body: Array, wheels: Array, use: NDArray[np.bool_], dt: float) -> float | None:
+    """Median of body over wheels; None for too little motion, where it varies, and of what hardly moves."""
+    use = use & np.isfinite(body) & np.isfinite(wheels) & (wheels > 0.0)
+    if np.count_nonzero(use) * dt < _LEAST_S:
+        return None
+    ratio = np.log(np.maximum(body[use], 1e-9) / wheels[use])
+    low, middle, high = np.quantile(ratio, [0.25, 0.5, 0.75])
+    if (high - low) / 1.349 > _EVEN or not np.log(_HARDLY) < middle < -np.log(_HARDLY):
+        return None
+    return float(np.exp(middle))
