@@ -19,7 +19,7 @@ from diagnosis.decision.caveats import more_caveats
 from diagnosis.decision.decide import Decision, decide
 from diagnosis.decision.intervals import intervals_of, spans_of
 from diagnosis.results.clearing import Checked, clearing_rows
-from diagnosis.results.detectability import detectability_table
+from diagnosis.results.detectability import Detectability, detectability_table
 from diagnosis.results.document import SCHEMA, CoverageRow, FileRow, LogRow, MachineRow, ReportDocument, WheelPlace
 from diagnosis.results.loss import loss_rows
 from diagnosis.results.machine_words import machine_words
@@ -86,6 +86,12 @@ class Judged:
         """Signals that the machine file may have wrong."""
         return mapping_hints(self.cells)
 
+    @cached_property
+    def detectable(self) -> Detectability:
+        """What the mission would have shown."""
+        own = {part: a.powers for part, a in self.found.assessments.items() if a.powers is not None}
+        return detectable(self.cells, own)
+
     @property
     def damage(self) -> list[str]:
         """What the files lost."""
@@ -120,10 +126,7 @@ def report_of_mission(judged: Judged, identity: MachineRow) -> ReportDocument:
         "phases": metrics.phases(timeline, replay, machine),
         "coverage": coverage,
         "clearing": clearing_rows(judged.checks),
-        "detectability": detectability_table(
-            detectable(judged.cells, {part: a.powers for part, a in found.assessments.items() if a.powers is not None}),
-            found.words,
-        ),
+        "detectability": detectability_table(judged.detectable, found.words),
         "loss": loss_rows({key: a.loss for key, a in found.assessments.items()}),
         "metrics": metrics.loop_metrics(timeline, replay, machine, moving),
         "signals": list(judged.recorded.rows),
@@ -166,6 +169,7 @@ def _decision(
         events=judged.found.events,
         hints=tuple(h.text for h in judged.hints),
         open_state=open_state,
+        shown=judged.detectable.rows,
     )
 
 

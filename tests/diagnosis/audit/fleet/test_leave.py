@@ -67,3 +67,18 @@ def test_a_reason_names_its_log_without_the_folders(tmp_path: Path) -> None:
     broken = Sample("x/y/z", "x", state="unreadable", reason="/data/x/y/z.mcap ends after 12 bytes; copy it again")
     (one,) = listed(tmp_path, Sample("x/y/a", "x"), broken).values()
     assert (one.leave, one.reason) == (Leave.NOT_KNOWN, "z.mcap ends after 12 bytes")
+
+
+def test_parts_that_were_not_assessed_stand_beside_the_leave(tmp_path: Path) -> None:
+    document = fleet_json(load_fleet(samples.write_store(tmp_path / "fleet.sqlite", samples.few())))
+    (k,) = (k for k, m in enumerate(document["machines"]) if m["label"] == "HX4-02")
+    for part in document["machines"][k]["parts"][-1:]:
+        part["assessed_last"] = False
+        words = f"{part['component']} {'steering' if part['kind'] == 'steer' else ''}".strip()
+    found = lists_of(document)[k]
+    assert found.leave is Leave.MAY
+    assert f"; not assessed: {words}" in found.reason
+    for part in document["machines"][k]["parts"]:
+        part["assessed_last"] = False
+    assert found.reason != lists_of(document)[k].reason
+    assert f" and {len(document['machines'][k]['parts']) - 4} more parts" in lists_of(document)[k].reason
