@@ -28,6 +28,7 @@ Part = tuple[str, str]
 _OPEN_S, _OPEN_SHARE = 1.0, 0.02  # driving that was not judged and is worth a word
 _REASONS = 2  # that the heading names; all of them stand below it
 _EMPTY_S = 1.0  # without any wheel speed
+_NEVER = "at no size"
 _TOLD_S = 10.0  # length of the losses that are told
 
 
@@ -101,6 +102,8 @@ def by_model(assessments: Mapping[Part, Assessment], shown: Sequence[Detectable]
         ]
         said += [f"of a {name} {_from_size([r.size for r in rows])}"] if rows else []
     sizes = f"A loss of ten seconds shows in 95 of 100 places, {join_words(said)}. " if said else ""
+    if said and all(x.endswith(_NEVER) for x in said):
+        sizes = "No loss of ten seconds, whatever its size, shows in 95 of 100 places. "
     return (
         words.fill(
             "Sensors and {valve}s without a second measurement were judged by a {wheel} model identified from this mission. "
@@ -114,9 +117,9 @@ def _from_size(sizes: Sequence[float | None]) -> str:
     """From which size on a loss shows of parts of one kind."""
     known = sorted(x for x in sizes if x)
     if not known:
-        return "at no size"
+        return _NEVER
     span = dict.fromkeys(f"{100 * x:.0f}" for x in (known[0], known[-1]))
-    none = f", on {len(sizes) - len(known)} of {len(sizes)} at no size" if len(known) < len(sizes) else ""
+    none = f", on {len(sizes) - len(known)} of {len(sizes)} {_NEVER}" if len(known) < len(sizes) else ""
     return f"from {' to '.join(span)} %{' (by part)' if len(span) > 1 else ''}{none}"
 
 

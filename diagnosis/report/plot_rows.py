@@ -198,13 +198,24 @@ def _side_rows(
             band=(base + "sat_low", base + "sat_high"),
             band_scale=sat_scale,
         ),
+        *_mode_row(fault, side, base, of, columns),
+    ]
+
+
+def _mode_row(fault: IntervalRow, side: Side, base: str, of: str, columns: Columns) -> list[Row]:
+    """Mode probabilities of one side; only once, and of both, where the evidence does not tell the sides apart."""
+    both = any(h["side"] == Side.SENSOR_OR_ACTUATOR for h in fault["hypotheses"])
+    if both and side is Side.ACTUATOR:
+        return []
+    whole = ", of the fault as a whole" if _as_a_whole(fault, base, columns) else ""
+    return [
         Row(
             f"modes{of}",
-            f"Mode probability{', of the fault as a whole' if _as_a_whole(fault, base, columns) else ''}{of}",
+            f"Mode probability{whole}{' (of either part)' if both else of}",
             "1",
             tuple(Trace(f"{base}p_{m}", state_label(m, side).lower(), f"mode-{m}") for m in DECIDED),
             limits=(-0.03, 1.03),
-        ),
+        )
     ]
 
 

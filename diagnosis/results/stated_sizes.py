@@ -70,7 +70,7 @@ def mode_columns(
     """Columns ``evidence.<component>.<side>.p_<mode>`` of parts that were weighed by whole stretches, as the decision has them.
 
     During a fault each row has the probability that the fault's hypotheses give it on that side, and health what they leave;
-    outside of faults there is none. Rows that are nowhere probable are left out. Arguments as for `size_columns`.
+    outside of faults there is none. What may be either side's counts on both. Rows that are nowhere probable are left out. Arguments as for `size_columns`.
 
     Returns
     -------
