@@ -24,6 +24,7 @@ from replay.machine.quantities import OPENING
 
 _FINEST = 500  # stretches of a mission that are told apart
 _LIKELY = 0.5  # more probable than not
+_TINTED_S = 0.5  # at the edges of faults it is briefly so
 
 
 def fault_rows(
@@ -148,7 +149,8 @@ def small_stretches(base: str, columns: Columns) -> tuple[tuple[float, float], .
     names = (base + "probability", base + "epsilon")
     if not {*names, "t"} <= columns.keys():
         return ()
-    return _stretches(columns["t"], (columns[names[0]] > _LIKELY) & (columns[names[1]] == 0.0))
+    found = _stretches(columns["t"], (columns[names[0]] > _LIKELY) & (columns[names[1]] == 0.0))
+    return tuple((start, stop) for start, stop in found if stop - start >= _TINTED_S)
 
 
 def _stretches(times: NDArray[np.floating], flags: NDArray[np.bool_]) -> tuple[tuple[float, float], ...]:
@@ -207,7 +209,7 @@ def _mode_row(fault: IntervalRow, side: Side, base: str, of: str, columns: Colum
     both = any(h["side"] == Side.SENSOR_OR_ACTUATOR for h in fault["hypotheses"])
     if both and side is Side.ACTUATOR:
         return []
-    whole = ", of the fault as a whole" if _as_a_whole(fault, base, columns) else ""
+    whole = ", of the fault as a whole" if _as_a_whole(base, columns) else ""
     return [
         Row(
             f"modes{of}",
@@ -219,13 +221,10 @@ def _mode_row(fault: IntervalRow, side: Side, base: str, of: str, columns: Colum
     ]
 
 
-def _as_a_whole(fault: IntervalRow, base: str, columns: Columns) -> bool:
-    """Whether the rows were weighed by the whole fault: their probabilities do not change during it."""
-    if not {base + "p_healthy", "t"} <= columns.keys():
-        return False
-    start, stop = np.searchsorted(columns["t"], (fault["start_s"], fault["stop_s"])).tolist()
-    inside = columns[base + "p_healthy"][start:stop]
-    return bool(inside.size > 1 and np.ptp(inside) == 0.0)
+def _as_a_whole(base: str, columns: Columns) -> bool:
+    """Whether the rows were weighed by whole faults: outside of them their probabilities are not known."""
+    column = columns.get(base + "p_healthy")
+    return column is not None and not bool(np.isfinite(column).all())
 
 
 def has_psi(c: str, columns: Columns) -> bool:
