@@ -23,13 +23,14 @@ from diagnosis.results.closeups import closeups_of
 from diagnosis.results.document import MachineRow, ReportDocument
 from diagnosis.results.machine_words import machine_words
 from diagnosis.results.result import MissionResult
-from diagnosis.results.stated_sizes import known_probability, size_columns
+from diagnosis.results.stated_sizes import known_probability, mode_columns, size_columns
 from diagnosis.results.vocabulary import Tier
 from replay.arrays.column_store import ColumnStore
 from replay.arrays.envelope import bucket_of
 from replay.control.loop import replay_loop
 from replay.control.loop_columns import replay_columns
 from replay.errors import ConfigError, NotJudged
+from replay.faults import State
 from replay.machine.config import Machine
 from replay.mission import Mission, load_mission
 from replay.progress import Progress, Stage, Subscriber, silent
@@ -223,6 +224,11 @@ def _require_something(assessments: Mapping[tuple[str, str], Assessment], missio
     )
 
 
+def _without_modes(parts: frozenset[tuple[str, str]], columns: Mapping[str, Array]) -> frozenset[tuple[str, str]]:
+    """Parts whose evidence gives no probability of each row over time."""
+    return frozenset(p for p in parts if f"evidence.{p[0]}.{p[1]}.p_{State.HEALTHY}" not in columns)
+
+
 def _columns(judged: Judged, report: ReportDocument) -> dict[str, Array]:
     """Signals, replayed loop, evidence and path under their names."""
     timeline = judged.mission.timeline
@@ -231,6 +237,7 @@ def _columns(judged: Judged, report: ReportDocument) -> dict[str, Array]:
         columns.update({f"evidence.{component}.{side}.{leaf}": x for leaf, x in assessment.columns.items()})
     parts = frozenset(part for part, a in judged.found.assessments.items() if a.columns)
     columns.update(size_columns(report, columns["t"], timeline.dt, parts))
+    columns.update(mode_columns(report, columns["t"], timeline.dt, _without_modes(parts, columns)))
     columns.update(known_probability(report, columns["t"], timeline.dt, columns))
     columns.update(metrics.path_of(timeline))
     return columns

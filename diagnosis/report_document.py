@@ -20,7 +20,7 @@ from diagnosis.decision.decide import Decision, decide
 from diagnosis.decision.intervals import intervals_of, spans_of
 from diagnosis.decision.scale import Scale, scale_of
 from diagnosis.results.clearing import Checked, clearing_rows
-from diagnosis.results.detectability import detectability_table
+from diagnosis.results.detectability import Detectability, detectability_table
 from diagnosis.results.document import SCHEMA, CoverageRow, FileRow, LogRow, MachineRow, ReportDocument, WheelPlace
 from diagnosis.results.loss import loss_rows
 from diagnosis.results.machine_words import machine_words
@@ -93,6 +93,12 @@ class Judged:
         names = {f"wheel.{w}.v" for w in self.machine.wheels}
         return scale_of(self.cells, {row["recorded_unit"] for row in self.recorded.rows if row["name"] in names})
 
+    @cached_property
+    def detectable(self) -> Detectability:
+        """What the mission would have shown."""
+        own = {part: a.powers for part, a in self.found.assessments.items() if a.powers is not None}
+        return detectable(self.cells, own)
+
     @property
     def damage(self) -> list[str]:
         """What the files lost."""
@@ -127,10 +133,7 @@ def report_of_mission(judged: Judged, identity: MachineRow) -> ReportDocument:
         "phases": metrics.phases(timeline, replay, machine),
         "coverage": coverage,
         "clearing": clearing_rows(judged.checks),
-        "detectability": detectability_table(
-            detectable(judged.cells, {part: a.powers for part, a in found.assessments.items() if a.powers is not None}),
-            found.words,
-        ),
+        "detectability": detectability_table(judged.detectable, found.words),
         "loss": loss_rows({key: a.loss for key, a in found.assessments.items()}),
         "metrics": metrics.loop_metrics(timeline, replay, machine, moving),
         "signals": list(judged.recorded.rows),
@@ -179,6 +182,7 @@ def _decision(
         events=judged.found.events,
         hints=(*(h.text for h in judged.hints), *([s.gross] if (s := judged.scale) is not None and s.gross else [])),
         open_state=open_state,
+        shown=judged.detectable.rows,
     )
 
 

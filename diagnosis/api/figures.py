@@ -14,6 +14,7 @@ from diagnosis.api.series import Curve, Series, Span
 from diagnosis.report.plot_data import worst
 from diagnosis.report.rows import Row
 from diagnosis.results.document import IntervalRow
+from replay.faults import State
 
 if TYPE_CHECKING:
     import plotly.graph_objects as go
@@ -112,11 +113,12 @@ def _draw(figure: go.Figure, plot: Plot, row: Row, number: int) -> int:
         add(found.t, found.y, trace.label, trace.role, trace.right, **more)
     if row.level is not None:
         figure.add_hline(row.level, row=number, col=1, line={"color": STUCK, "width": 1.2, "dash": "dash"})
-    for start, stop in row.unknown:
-        if start < plot.span[1] and stop > plot.span[0]:
-            figure.add_vrect(
-                start, stop, row=number, col=1, line_width=0, fillcolor=COLOURS["muted"], opacity=0.2, layer="below"
-            )
+    for colour, stretches in ((COLOURS["muted"], row.unknown), (colour_of(State.HEALTHY), row.small)):
+        for start, stop in stretches:
+            if start < plot.span[1] and stop > plot.span[0]:
+                figure.add_vrect(
+                    start, stop, row=number, col=1, line_width=0, fillcolor=colour, opacity=0.2, layer="below"
+                )
     if row.limits:
         figure.update_yaxes(range=list(row.limits), row=number, col=1, secondary_y=False)
     if row.clip:

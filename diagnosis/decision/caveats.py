@@ -11,7 +11,7 @@ from diagnosis.decision.short import main_reason, main_state, short_parts, unjud
 from diagnosis.decision.wording import count_words, join_words, unanswered
 from diagnosis.results.assessment import Assessment
 from diagnosis.results.clearing import Checked
-from diagnosis.results.detectability import Deviation
+from diagnosis.results.detectability import Detectable, Deviation
 from diagnosis.results.left_out import is_left_out
 from diagnosis.results.machine_event import MachineEvent
 from diagnosis.results.machine_words import HYDRAULIC, MachineWords
@@ -28,6 +28,8 @@ Part = tuple[str, str]
 _OPEN_S, _OPEN_SHARE = 1.0, 0.02  # driving that was not judged and is worth a word
 _REASONS = 2  # that the heading names; all of them stand below it
 _EMPTY_S = 1.0  # without any wheel speed
+_NEVER = "at no size"
+_TOLD_S = 10.0  # length of the losses that are told
 
 
 @dataclass(frozen=True)
@@ -85,6 +87,40 @@ def smallest_loads(assessments: Mapping[Part, Assessment], words: MachineWords) 
             f"A load on the {name}, or a loss, that lasts the whole mission {said}; healthy missions differ by less than that."
         )
     return tuple(out)
+
+
+def by_model(assessments: Mapping[Part, Assessment], shown: Sequence[Detectable], words: MachineWords) -> str:
+    """What limits parts that a wheel model of this mission judged, with the losses of ten seconds that it would have shown of them."""
+    judged = {part for part, a in assessments.items() if a.tier is Tier.MODEL}
+    said = []
+    for side, name in ((Side.SENSOR, "sensor"), (Side.ACTUATOR, words.drive)):
+        about = (Kind.WHEEL, side, Deviation.INEFFICIENT, _TOLD_S)
+        rows = [
+            r
+            for r in shown
+            if (r.component, r.side.value) in judged and (r.kind, r.side, r.deviation, r.for_s) == about
+        ]
+        said += [f"of a {name} {_from_size([r.size for r in rows])}"] if rows else []
+    sizes = f"A loss of ten seconds shows in 95 of 100 places, {join_words(said)}. " if said else ""
+    if said and all(x.endswith(_NEVER) for x in said):
+        sizes = "No loss of ten seconds, whatever its size, shows in 95 of 100 places. "
+    return (
+        words.fill(
+            "Sensors and {valve}s without a second measurement were judged by a {wheel} model identified from this mission. "
+        )
+        + f"{sizes}A loss that lasts the whole mission on every {words.part} does not show. A second measurement would show more; "
+        "a machine file with [plant] shows the last."
+    )
+
+
+def _from_size(sizes: Sequence[float | None]) -> str:
+    """From which size on a loss shows of parts of one kind."""
+    known = sorted(x for x in sizes if x)
+    if not known:
+        return _NEVER
+    span = dict.fromkeys(f"{100 * x:.0f}" for x in (known[0], known[-1]))
+    none = f", on {len(sizes) - len(known)} of {len(sizes)} {_NEVER}" if len(known) < len(sizes) else ""
+    return f"from {' to '.join(span)} %{' (by part)' if len(span) > 1 else ''}{none}"
 
 
 def doubt_of(watch: Sequence[FaultInterval], against: Reservations) -> str:

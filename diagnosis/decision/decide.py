@@ -7,20 +7,29 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from diagnosis.decision.caveats import Reservations, caveats_of, doubt_of, limits_of, open_words, smallest_loads
+from diagnosis.decision.caveats import (
+    Reservations,
+    by_model,
+    caveats_of,
+    doubt_of,
+    limits_of,
+    open_words,
+    smallest_loads,
+)
 from diagnosis.decision.short import ToClear
 from diagnosis.decision.to_clear import to_clear
 from diagnosis.decision.wording import actions_of, count_faults, join_words, seconds_words, sentence_of
 from diagnosis.results.assessed import needed_s
 from diagnosis.results.assessment import STATES, Assessment
 from diagnosis.results.clearing import Check, Checked
+from diagnosis.results.detectability import Detectable
 from diagnosis.results.document import ActionRow, VerdictRow
 from diagnosis.results.left_out import only_left_out
 from diagnosis.results.machine_event import MachineEvent
 from diagnosis.results.machine_words import MachineWords
 from diagnosis.results.result import FaultInterval
 from diagnosis.results.vocabulary import Kind, Severity, Tier, Verdict
-from diagnosis.results.wheel_model import RESOLUTION, WheelModelFit
+from diagnosis.results.wheel_model import WheelModelFit
 from replay.faults import Side, State
 from replay.machine.config import Limits
 
@@ -100,6 +109,7 @@ def decide(
     events: Sequence[MachineEvent] = (),
     hints: Sequence[str] = (),
     open_state: Mapping[Part, State] | None = None,
+    shown: Sequence[Detectable] = (),
 ) -> Decision:
     """Give the verdict.
 
@@ -139,6 +149,8 @@ def decide(
         Signals that fit another sign, unit or place better over the whole mission.
     open_state : Mapping or None
         The commonest state of each part that is no judgement, while driving.
+    shown : Sequence[Detectable]
+        What the mission would have shown.
     """
     driven = driving_s or {}
     against = _reservations(assessments, decided_s, driven, axles, limits, damage, model)
@@ -160,14 +172,7 @@ def decide(
     said = found.title == _SENSORS_ALONE  # which parts are not judged, and why
     caveats = caveats_of(against, assessments, decided_s, driven, axles, limits, short_named=said)
     if _modelled(assessments) and model is not None and model.identified:
-        caveats += (
-            words.fill(
-                "Sensors and {valve}s without a second measurement were judged by a {wheel} model identified from this mission. "
-            )
-            + f"It mostly does not name a sensor's loss below about {100 * RESOLUTION[Side.SENSOR]:.0f} % or a {words.drive}'s below "
-            f"about {100 * RESOLUTION[Side.ACTUATOR]:.0f} %, nor a loss that lasts the whole mission on every {words.part}. A second "
-            "measurement would show them; a machine file with [plant] shows the last.",
-        )
+        caveats += (by_model(assessments, shown, words),)
     caveats += smallest_loads(assessments, words)
     caveats += limits_of(limits)
     if any(_offset_hidden(checks, axle) for axle in axles):

@@ -171,6 +171,8 @@ def isolate(run: Run, found: IdentifiedPair) -> Isolated | None:
         burst = seconds**2 / (seconds**2 + _BURST_S**2)
         p[HEALTHY] += p[run.row] * (1.0 - burst)
         p[run.row] *= burst
+        ahead = [r for r in codes_of(model.side) if r != HEALTHY and p[r] >= p[run.row]]
+        p[ahead] = p[ahead].mean()  # that it is brief tells nothing of which row it is
     if run.row in TOTAL_ROWS and seen.zero:
         # stuck at zero, a gain of zero and no signal are one row of the table
         run = replace(run, row=NO_SIGNAL)

@@ -10,7 +10,7 @@ from diagnosis.direct.isolation import Isolated
 from diagnosis.direct.shape import shape_sentence
 from diagnosis.estimation.fault_models import TOTAL_ROWS
 from diagnosis.results.result import Epsilon
-from diagnosis.results.sizes import amount, times_as_probable
+from diagnosis.results.sizes import amount, kept_to, times_as_probable
 from replay.faults import FaultMode
 
 
@@ -67,7 +67,7 @@ def _values(isolated: Isolated, found: IdentifiedPair, epsilon: Epsilon | None, 
         )
         inner = y[1:-1] if y.size > 4 else y  # the first and the last sample may be beside it
         return [
-            f"{pair.y_name} stayed within {amount(float(np.ptp(inner)), pair.unit, 2)} of {amount(float(np.mean(y)), pair.unit)} "
+            f"{pair.y_name} {kept_to(float(np.min(inner)), float(np.max(inner)), pair.unit)} "
             f"for {seconds:.3f} s while {pair.x_name} {other}."
         ]
     if epsilon is None:

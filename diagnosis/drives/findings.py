@@ -27,7 +27,7 @@ from diagnosis.estimation.segments import Run, merge_equal
 from diagnosis.results.assessment import Finding
 from diagnosis.results.fault_rows import ROWS, codes
 from diagnosis.results.result import Hypothesis
-from diagnosis.results.sizes import times_as_probable
+from diagnosis.results.sizes import kept_to, times_as_probable
 from diagnosis.results.vocabulary import Tier
 from replay.faults import FaultMode, Side
 from replay.machine.config import Limits
@@ -226,7 +226,7 @@ def _sentences(isolated: Isolated, pair: SpeedPair, delta: float) -> tuple[str, 
     out = []
     if row in TOTAL_ROWS and y.size:
         out.append(
-            f"{pair.name} stayed within {float(np.ptp(y)):.2g} {{speed_unit}} of {float(np.mean(y)):.4g} {{speed_unit}} for {seconds:.2f} s, while the "
+            f"{pair.name} {kept_to(float(np.min(y)), float(np.max(y)), 'm/s')} for {seconds:.2f} s, while the "
             f"drive was commanded; healthy samples differ by {pair.noise:.2g} {{speed_unit}}."
         )
     elif row in TOTAL_ROWS:

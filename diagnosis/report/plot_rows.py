@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from diagnosis.report.compared_channels import Pair, by_valve, motion_of
 from diagnosis.report.rows import Columns, Group, Row, Trace
@@ -22,6 +23,8 @@ from replay.faults import DECIDED, Side
 from replay.machine.quantities import OPENING
 
 _FINEST = 500  # stretches of a mission that are told apart
+_LIKELY = 0.5  # more probable than not
+_TINTED_S = 0.5  # at the edges of faults it is briefly so
 
 
 def fault_rows(
@@ -132,15 +135,28 @@ def probability_row(
         level=limit,
         limits=limits,
         unknown=unknown_stretches(base + "probability", columns),
+        small=small_stretches(base, columns),
     )
 
 
 def unknown_stretches(column: str, columns: Columns) -> tuple[tuple[float, float], ...]:
     """First and last time [s] of the stretches in which a column has no value; those that nearly touch are one."""
-    if column not in columns or "t" not in columns:
+    return _stretches(columns["t"], ~np.isfinite(columns[column])) if {column, "t"} <= columns.keys() else ()
+
+
+def small_stretches(base: str, columns: Columns) -> tuple[tuple[float, float], ...]:
+    """Stretches [s] in which a part deviates more probably than not, by so little that it was called healthy."""
+    names = (base + "probability", base + "epsilon")
+    if not {*names, "t"} <= columns.keys():
         return ()
-    t, gap = np.asarray(columns["t"], np.float64), ~np.isfinite(columns[column])
-    cut = np.flatnonzero(np.diff(np.concatenate(([False], gap, [False])).astype(np.int8)))
+    found = _stretches(columns["t"], (columns[names[0]] > _LIKELY) & (columns[names[1]] == 0.0))
+    return tuple((start, stop) for start, stop in found if stop - start >= _TINTED_S)
+
+
+def _stretches(times: NDArray[np.floating], flags: NDArray[np.bool_]) -> tuple[tuple[float, float], ...]:
+    """First and last time [s] of the stretches in which flags of shape (n,) are set; those that nearly touch are one."""
+    t = np.asarray(times, np.float64)
+    cut = np.flatnonzero(np.diff(np.concatenate(([False], flags, [False])).astype(np.int8)))
     step = float(t[-1] - t[0]) / max(1, t.size - 1)
     apart, out = max(step, float(t[-1] - t[0]) / _FINEST), list[tuple[float, float]]()
     for a, b in zip(cut[::2], cut[1::2], strict=True):
@@ -184,14 +200,31 @@ def _side_rows(
             band=(base + "sat_low", base + "sat_high"),
             band_scale=sat_scale,
         ),
+        *_mode_row(fault, side, base, of, columns),
+    ]
+
+
+def _mode_row(fault: IntervalRow, side: Side, base: str, of: str, columns: Columns) -> list[Row]:
+    """Mode probabilities of one side; only once, and of both, where the evidence does not tell the sides apart."""
+    both = any(h["side"] == Side.SENSOR_OR_ACTUATOR for h in fault["hypotheses"])
+    if both and side is Side.ACTUATOR:
+        return []
+    whole = ", of the fault as a whole" if _as_a_whole(base, columns) else ""
+    return [
         Row(
             f"modes{of}",
-            f"Mode probability{of}",
+            f"Mode probability{whole}{' (of either part)' if both else of}",
             "1",
             tuple(Trace(f"{base}p_{m}", state_label(m, side).lower(), f"mode-{m}") for m in DECIDED),
             limits=(-0.03, 1.03),
-        ),
+        )
     ]
+
+
+def _as_a_whole(base: str, columns: Columns) -> bool:
+    """Whether the rows were weighed by whole faults: outside of them their probabilities are not known."""
+    column = columns.get(base + "p_healthy")
+    return column is not None and not bool(np.isfinite(column).all())
 
 
 def has_psi(c: str, columns: Columns) -> bool:

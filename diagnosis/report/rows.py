@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.results.document import ReportDocument
-from diagnosis.results.stated_sizes import size_columns
-from replay.faults import Side
+from diagnosis.results.stated_sizes import mode_columns, size_columns
+from replay.faults import Side, State
 
 Columns = Mapping[str, NDArray[np.floating]]
 
@@ -74,6 +74,8 @@ class Row:
         Component that the row is of, where a figure has several.
     unknown : tuple[tuple[float, float], ...]
         Stretches in which what the row shows cannot be known: first and last time [s].
+    small : tuple[tuple[float, float], ...]
+        Stretches in which the part deviates by less than counts as a fault and was called healthy [s].
     """
 
     key: str
@@ -89,6 +91,7 @@ class Row:
     right: tuple[str, str] | None = None
     component: str = ""
     unknown: tuple[tuple[float, float], ...] = ()
+    small: tuple[tuple[float, float], ...] = ()
 
     def shown(self, columns: Columns) -> list[Row]:
         """The row with the curves that exist, or nothing; a band or threshold without its column is left out.
@@ -121,7 +124,7 @@ class Group:
 def derived(
     columns: Columns, report: ReportDocument, times: tuple[NDArray[np.floating], float] | None = None
 ) -> dict[str, NDArray[np.floating]]:
-    """Columns with ε̂ and saturation terms of the parts with faults, as the document states them.
+    """Columns with ε̂, saturation terms and probabilities of rows of the parts with faults, as the document states them.
 
     Every column of shape (n,).
 
@@ -140,7 +143,10 @@ def derived(
         t, step = times
     parts = {(f["component"], side.value) for f in report["intervals"] for side in Side(f["side"]).sides}
     known = frozenset(p for p in parts if any(k.startswith(f"evidence.{p[0]}.{p[1]}.") for k in columns))
-    return {**columns, **size_columns(report, t, step, known)} if t.size else dict(columns)
+    if not t.size:
+        return dict(columns)
+    whole = frozenset(p for p in known if f"evidence.{p[0]}.{p[1]}.p_{State.HEALTHY}" not in columns)
+    return {**columns, **size_columns(report, t, step, known), **mode_columns(report, t, step, whole)}
 
 
 def row_json(row: Row, index: Mapping[str, int]) -> dict[str, object]:
@@ -167,6 +173,8 @@ def row_json(row: Row, index: Mapping[str, int]) -> dict[str, object]:
         data["clip"] = list(row.clip)
     if row.unknown:
         data["unknown"] = [list(stretch) for stretch in row.unknown]
+    if row.small:
+        data["small"] = [list(stretch) for stretch in row.small]
     if row.component:
         data["component"] = row.component
     if row.right:

@@ -156,7 +156,12 @@ def clearing_sentences(verdict: VerdictRow) -> list[tuple[str, str]]:
     """What keeps the machine from being cleared and what would clear it, but for what the verdict's own sentences say."""
     text = verdict["text"]
     rows = [row for row in verdict.get("to_clear", []) if row["reason"] not in text]
-    return [(row["reason"], "" if row["act"] in text else row["act"]) for row in rows]
+    return [(_begun(row["reason"]), "" if row["act"] in text else row["act"]) for row in rows]
+
+
+def _begun(text: str) -> str:
+    """A sentence with its first letter large, but for a channel's name."""
+    return text if "." in text.partition(" ")[0] else text[:1].upper() + text[1:]
 
 
 def merged_caveats(caveats: Sequence[str]) -> list[str]:

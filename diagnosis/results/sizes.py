@@ -29,6 +29,24 @@ def amount(value: float, unit: str, digits: int = 3) -> str:
     return f"{plain(value, digits)} {'{speed_unit}' if unit == 'm/s' else unit}".rstrip()
 
 
+def kept_to(least: float, most: float, unit: str) -> str:
+    """That a channel hardly moved, to follow its name: ``stayed between 0.312 and 0.315 m/s``, ``stayed at 4.2°``.
+
+    Least and largest value in `unit`, see `amount`.
+    """
+    words = [amount(0.0 if abs(x) < 1e-3 * (most - least) else x, unit, _digits(least, most)) for x in (least, most)]
+    if words[0] == words[1]:
+        return f"stayed at {words[0]}"
+    first = words[0].removesuffix("°").partition("{")[0].partition(" ")[0]
+    return f"stayed between {first} and {words[1]}"
+
+
+def _digits(least: float, most: float) -> int:
+    """Digits that tell two values apart, three to six."""
+    apart, size = most - least, max(abs(least), abs(most))
+    return 3 if apart <= 0 or size <= 0 else min(6, max(3, 1 + math.ceil(math.log10(size / apart))))
+
+
 def not_reported(below: int, name: str) -> str:
     """Sentence on deviations of a channel that are too small to count."""
     many = f"{below} deviations of {name} are" if below != 1 else f"1 deviation of {name} is"

@@ -64,6 +64,37 @@ def size_columns(
     return out
 
 
+def mode_columns(
+    report: ReportDocument, t: NDArray[np.floating], step: float, parts: frozenset[tuple[str, str]]
+) -> dict[str, Array]:
+    """Columns ``evidence.<component>.<side>.p_<mode>`` of parts that were weighed by whole stretches, as the decision has them.
+
+    During a fault each row has the probability that the fault's hypotheses give it on that side, and health what they leave;
+    outside of faults there is none. What may be either side's counts on both. Rows that are nowhere probable are left out. Arguments as for `size_columns`.
+
+    Returns
+    -------
+    dict[str, Array], each of shape (n,)
+        Probabilities [1].
+    """
+    out: dict[str, Array] = {}
+    for component, side in sorted(parts):
+        columns = {mode: np.full(t.size, np.nan, np.float32) for mode in DECIDED}
+        mine = [f for f in report["intervals"] if f["component"] == component and side in Side(f["side"]).sides]
+        for fault in sorted((f for f in mine if f["hypotheses"]), key=lambda f: f["probability"]):
+            chances = dict.fromkeys(DECIDED, 0.0)
+            for h in fault["hypotheses"]:
+                if h["mode"] != State.HEALTHY and side in Side(h["side"]).sides:
+                    chances[State(h["mode"])] += h["p"]
+            chances[State.HEALTHY] = max(0.0, 1.0 - sum(chances.values()))
+            rows = _rows(t, step, fault["start_s"], fault["stop_s"])
+            for mode, p in chances.items():
+                columns[mode][rows] = p
+        base = f"evidence.{component}.{side}.p_"
+        out |= {base + mode: x for mode, x in columns.items() if np.any(x > 0.0)}
+    return out
+
+
 def known_probability(
     report: ReportDocument, t: NDArray[np.floating], step: float, columns: Mapping[str, NDArray[Any]]
 ) -> dict[str, NDArray[Any]]:

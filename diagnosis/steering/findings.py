@@ -253,7 +253,7 @@ def _sentences(choice: _Choice, gain: float, ranked: Sequence[tuple[Fault, float
     if choice.dead_sensor:
         level, spread, count = level_of(run.start, run.stop, run.axle)
         lines.append(
-            f"{channel} stayed within {amount(spread, 'rad', 2)} of {amount(level, 'rad')} over {count} samples."
+            f"{channel} stayed at {amount(level, 'rad')}, give or take {amount(0.5 * spread, 'rad', 2)}, over {count} samples."
             if count
             else f"{channel} delivered nothing while other channels of its source did."
         )

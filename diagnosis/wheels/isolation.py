@@ -12,7 +12,7 @@ from diagnosis.results.assessment import Finding
 from diagnosis.results.fault_rows import mode_words
 from diagnosis.results.machine_words import part_token
 from diagnosis.results.result import Hypothesis
-from diagnosis.results.sizes import times_as_probable
+from diagnosis.results.sizes import kept_to, times_as_probable
 from diagnosis.results.vocabulary import Kind, Tier
 from diagnosis.wheels.estimates import estimate
 from diagnosis.wheels.models import (
@@ -240,9 +240,7 @@ def _sentences(
     if m == S_NONE and not known.size:
         lines.append(f"{names[0]} delivered nothing in this time.")
     elif m in TOTAL_SENSOR and known.size:
-        lines.append(
-            f"{names[0]} stayed within {float(np.ptp(known)):.2g} {{speed_unit}} of {float(np.mean(known)):.4g} {{speed_unit}}."
-        )
+        lines.append(f"{names[0]} {kept_to(float(np.min(known)), float(np.max(known)), 'm/s')}.")
     for other, probability in ranked:
         if other is not None and other != row:
             if probability >= _LEAST_PART:

@@ -23,7 +23,7 @@ def decided() -> tuple[dict[str, Any], samples.Columns]:
         fault["detected_s"] = None if delay is None else fault["start_s"] + delay
     own, second = "wheel.FR.v", "wheel.FR.v_true"
     report["intervals"][0]["evidence"] = [
-        f"{own} stayed within 0.001 m/s of 0.21 m/s while {second} moved over 0.3 m/s.",
+        f"{own} stayed between 0.2095 and 0.2105 m/s while {second} moved over 0.3 m/s.",
         "The measured speed dropped by 0.15 m/s at once; a loaded drive falls with its lag.",
     ]
     report["log"]["open_loop"] = True

@@ -10,14 +10,17 @@ from dataclasses import dataclass
 from diagnosis.audit.fleet.fault_types import FleetFaultRow
 from diagnosis.audit.fleet.fleet_types import FleetDocument, MachineRow, MissionRow
 from diagnosis.audit.fleet.may_leave import Leave, leave_of
+from diagnosis.audit.fleet.page.figures import unassessed
 from diagnosis.audit.fleet.page.rows import fault_words
 from diagnosis.audit.fleet.words import count, open_words
+from diagnosis.decision.wording import join_words
 from diagnosis.results.machine_words import words_of
 from diagnosis.results.vocabulary import Severity, Verdict
 
 #: Statuses of faults that do not stand.
 GONE = ("past", "repaired")
 _FAULTS = 2
+_PARTS = 4
 _DAMAGE = "the log is damaged: "
 
 
@@ -63,6 +66,7 @@ def lists_of(document: FleetDocument) -> tuple[Left, ...]:
     for k, m in enumerate(document["machines"]):
         leave = leave_of(m["verdict"], m["cleared"], m["unjudged"])
         place, reason = _why(leave, m, standing[k], document["missions"], rising[k])
+        reason += _blind(m)
         name = "" if place is None else document["missions"][place]["name"]
         out.append(Left(leave, k, m["label"], reason, place, name))
     return tuple(out)
@@ -104,6 +108,14 @@ def _why(
 def _lost(mission: MissionRow) -> str:
     """What to do about a log that was not judged and is no longer there."""
     return f"; it is no longer there: put it back, or leave it out with mfhca audit --forget {shlex.quote(mission['name'])}"
+
+
+def _blind(m: MachineRow) -> str:
+    """Parts that the machine's last mission did not assess, which stand beside the leave that it gives; empty where there is none."""
+    parts = unassessed(m)
+    rest = f" and {count(len(parts) - _PARTS, 'more part')}" if len(parts) > _PARTS else ""
+    named = ", ".join(parts[:_PARTS]) if rest else join_words(parts)
+    return f"; not assessed: {named}{rest}" if parts else ""
 
 
 def _said(mission: MissionRow) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -10,9 +11,10 @@ import pytest
 from diagnosis.decision.decide import Decision, decide
 from diagnosis.decision.intervals import intervals_of
 from diagnosis.results.assessment import CODE, Assessment, Finding, unassessed
+from diagnosis.results.detectability import Detectable, Deviation
 from diagnosis.results.machine_event import not_following
 from diagnosis.results.machine_words import HYDRAULIC
-from diagnosis.results.vocabulary import Tier
+from diagnosis.results.vocabulary import Kind, Tier
 from diagnosis.results.wheel_model import WheelModelFit
 from replay.faults import FaultMode, Side, State
 from replay.machine.config import Limits
@@ -25,10 +27,11 @@ def verdict(
     damage: tuple[str, ...] = (),
     limits: Limits = LIMITS,
     model: WheelModelFit | None = None,
+    shown: Sequence[Detectable] = (),
 ) -> Decision:
     seconds = decided if isinstance(decided, dict) else dict.fromkeys(assessments, decided)
     intervals = intervals_of(assessments, replace(MACHINE, limits=limits), HYDRAULIC, 0, STEP)
-    return decide(intervals, assessments, seconds, AXLES, limits, damage, HYDRAULIC, model=model)
+    return decide(intervals, assessments, seconds, AXLES, limits, damage, HYDRAULIC, model=model, shown=shown)
 
 
 def test_healthy_machine_is_ready() -> None:
@@ -186,7 +189,14 @@ def test_a_model_of_this_mission_says_what_it_does_not_show() -> None:
     parts = {key: replace(a, tier=Tier.MODEL) for key, a in machine().items()}
     model = WheelModelFit((None,) * 4, 0.02, 30, reliable=True, note="")
     (words,) = verdict(parts, model=model).caveats
-    assert "a sensor's loss below about 25 % or a valve's below about 50 %" in words
+    assert "95 of 100" not in words
+    rows = [
+        Detectable(Kind.WHEEL, w, side, Deviation.INEFFICIENT, 10.0, size, "1", None, 9, side)
+        for side, sizes in ((Side.SENSOR, (0.12, 0.31, 0.2, 0.2)), (Side.ACTUATOR, (0.4, None, None, 0.4)))
+        for w, size in zip(MACHINE.wheels, sizes, strict=True)
+    ]
+    (told,) = verdict(parts, model=model, shown=rows).caveats
+    assert "of a sensor from 12 to 31 % (by part) and of a valve from 40 %, on 1 of 2 at no size" in told
     assert verdict(parts, model=replace(model, identified=False)).caveats == ()
     assert verdict(machine(), model=model).caveats == ()
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from diagnosis.direct.assess import assess_pair
+from diagnosis.direct.identification import IdentifiedPair
 from diagnosis.direct.inputs import Pair
 from diagnosis.results.assessment import Finding
 from replay.faults import FaultMode, Side
@@ -104,3 +105,15 @@ def test_a_burst_of_noise_is_less_probable_than_a_lasting_one() -> None:
         y[part] += np.random.default_rng(4).normal(0.0, 0.05, np.count_nonzero(part))
         probability.append(max((f.probability for f in found(Side.ACTUATOR, y, opening)), default=0.0))
     assert probability[0] < 0.8 < 0.95 < probability[1]
+
+
+def test_that_a_burst_is_brief_makes_no_other_row_more_probable(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(IdentifiedPair, "coarse", property(lambda _: True))
+    opening = command()
+    y = opening + noise(0.003)
+    part = (T > 30.2) & (T < 30.9)
+    y[part] += np.random.default_rng(4).normal(0.0, 0.02, np.count_nonzero(part))
+    told = [f for f in found(Side.ACTUATOR, y, opening) if f.start * DT > 30.0]
+    assert told
+    for f in told:
+        assert f.probability >= max(h.p for h in f.hypotheses if h.mode != "healthy") - 1e-9

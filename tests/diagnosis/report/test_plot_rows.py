@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 
 from diagnosis.report.compared_channels import pair_of
-from diagnosis.report.plot_rows import course_rows, fault_rows, loop_groups
+from diagnosis.report.plot_rows import course_rows, fault_rows, loop_groups, small_stretches
 from diagnosis.report.rows import derived
 from diagnosis.results.machine_words import HYDRAULIC
 from tests import report_samples as samples
@@ -62,3 +62,14 @@ def test_both_figures_draw_the_same_residual() -> None:
     assert pair is not None
     linked = {r.key: r for r in fault_rows(fault, ["front", "rear"], derived(columns, report), HYDRAULIC)}
     assert course_rows(fault, pair, columns, None)[1] == linked["residual"]
+
+
+def test_time_that_deviates_by_less_than_a_fault_is_told_apart_in_the_probability() -> None:
+    t = np.arange(10.0)
+    columns = {
+        "t": t,
+        "evidence.FR.sensor.probability": np.array([0.1, 0.9, 0.9, 0.9, 0.9, 0.1, 0.9, np.nan, 0.1, 0.1]),
+        "evidence.FR.sensor.epsilon": np.array([0.0, 0.0, 0.0, 0.4, 0.4, 0.0, 0.0, np.nan, 0.0, 0.0]),
+    }
+    assert small_stretches("evidence.FR.sensor.", columns) == ((1.0, 3.0), (6.0, 7.0))
+    assert small_stretches("evidence.FL.sensor.", columns) == ()

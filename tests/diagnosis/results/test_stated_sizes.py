@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from diagnosis.results.stated_sizes import known_probability, size_columns
+from diagnosis.results.stated_sizes import known_probability, mode_columns, size_columns
 from replay.machine.quantities import OPENING
 from tests import report_samples as samples
 
@@ -63,3 +63,21 @@ def test_no_probability_is_shown_of_what_was_not_decided() -> None:
     assert list(shown) == [name]
     assert shown[name].dtype == np.float32
     assert np.isfinite(shown[name]).nonzero()[0].tolist() == [*range(100), *range(400, 600)]
+
+
+def test_rows_that_were_weighed_over_a_whole_fault_have_its_probabilities_during_it_alone() -> None:
+    hypotheses = [
+        {"side": "sensor", "mode": "stuck", "p": 0.7},
+        {"side": "sensor", "mode": "noisy", "p": 0.1},
+        {"side": "actuator", "mode": "stuck", "p": 0.15},
+        {"side": "sensor", "mode": "healthy", "p": 0.05},
+    ]
+    fault = samples.fault(mode="stuck", start_s=20.0, stop_s=30.0, probability=0.7, hypotheses=hypotheses)
+    report = samples.report_with() | {"intervals": [fault], "states": [state("healthy", 0.0, 20.0)]}
+    found = mode_columns(report, T, 0.1, FR)  # type: ignore[arg-type]
+    assert set(found) == {f"evidence.FR.sensor.p_{m}" for m in ("healthy", "stuck", "noisy")}
+    for mode, p in (("healthy", 0.2), ("stuck", 0.7), ("noisy", 0.1)):
+        column = found[f"evidence.FR.sensor.p_{mode}"]
+        np.testing.assert_allclose(column[200:300], p, atol=1e-6)
+        assert np.isnan(column[:200]).all()
+        assert np.isnan(column[300:]).all()

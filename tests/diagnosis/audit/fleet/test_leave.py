@@ -74,3 +74,18 @@ def test_a_reason_says_that_a_log_is_no_longer_there_and_how_to_leave_it_out(tmp
     (one,) = listed(tmp_path, Sample("x/a", "x"), torn).values()
     assert one.leave is Leave.NOT_KNOWN
     assert one.reason.endswith("it is no longer there: put it back, or leave it out with mfhca audit --forget 'x/z z'")
+
+
+def test_parts_that_were_not_assessed_stand_beside_the_leave(tmp_path: Path) -> None:
+    document = fleet_json(load_fleet(samples.write_store(tmp_path / "fleet.sqlite", samples.few())))
+    (k,) = (k for k, m in enumerate(document["machines"]) if m["label"] == "HX4-02")
+    for part in document["machines"][k]["parts"][-1:]:
+        part["assessed_last"] = False
+        words = f"{part['component']} {'steering' if part['kind'] == 'steer' else ''}".strip()
+    found = lists_of(document)[k]
+    assert found.leave is Leave.MAY
+    assert f"; not assessed: {words}" in found.reason
+    for part in document["machines"][k]["parts"]:
+        part["assessed_last"] = False
+    assert found.reason != lists_of(document)[k].reason
+    assert f" and {len(document['machines'][k]['parts']) - 4} more parts" in lists_of(document)[k].reason

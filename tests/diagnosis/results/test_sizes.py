@@ -1,0 +1,20 @@
+"""Sizes in sentences."""
+
+from __future__ import annotations
+
+import pytest
+
+from diagnosis.results.sizes import kept_to
+
+
+@pytest.mark.parametrize(
+    ("least", "most", "unit", "words"),
+    [
+        (0.312, 0.3151, "m/s", "stayed between 0.312 and 0.3151 {speed_unit}"),
+        (0.5, 0.5, "m/s", "stayed at 0.5 {speed_unit}"),
+        (0.041, 0.044, "of full opening", "stayed between 4.1 and 4.4{percent}"),
+        (0.0, 0.0, "rad", "stayed at 0°"),
+    ],
+)
+def test_a_channel_that_hardly_moved_is_given_by_its_two_ends(least: float, most: float, unit: str, words: str) -> None:
+    assert kept_to(least, most, unit) == words
