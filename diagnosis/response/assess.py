@@ -12,7 +12,7 @@ from diagnosis.response.beside import Bodies, same_side, views
 from diagnosis.response.body import BodySpeed
 from diagnosis.response.channel import Samples, holds_of, samples_of, without_holds
 from diagnosis.response.common_cause import consequence, less_sure, spans_of, standing, without_consequences
-from diagnosis.response.drive import unanswered
+from diagnosis.response.drive import by_peers, unanswered
 from diagnosis.response.effort import idle_drives, own_pull, shares_of
 from diagnosis.response.findings import Wheel
 from diagnosis.response.identification import Response, identify_response, without_command
@@ -28,6 +28,7 @@ from diagnosis.response.models import (
     MEAN_HEALTHY_S,
     STATES,
     Beside,
+    Blocks,
     blocks_of,
     scores,
 )
@@ -35,6 +36,7 @@ from diagnosis.response.power import powers_of
 from diagnosis.response.rivals import by_each_other, held_back_together, jumped, others_fault, shared
 from diagnosis.response.sides import sides_of
 from diagnosis.response.spells import spells_of, where_asked
+from diagnosis.response.turning import turning_of, turns_with
 from diagnosis.results.assessment import CODE, Assessment, Finding
 from replay.faults import State
 from replay.machine.config import Limits
@@ -90,7 +92,7 @@ def assess_response(
     drives = list(data.values())
     left_out = standing(data, limits.driving_speed, dt)
     idle = spans_of(np.logical_or.reduce(list(left_out.values())))
-    found = _wheels(data, left_out, (cell, width), limits, dt)
+    found = _wheels(data, left_out, (cell, width), limits, dt, turns=yaw is not None)
     if not found:
         return Judgement({}, standstills(idle, dt) or unexplained(drives, limits, dt))
     rest = {w: samples_of(d.y, d.fresh) for w, d in data.items() if w not in found}
@@ -105,7 +107,7 @@ def assess_response(
         w: j._replace(wheel=j.wheel._replace(pull=own_pull(j, efforts.get(w), pulls.get(w)))) for w, j in found.items()
     }
     names = {w: j.data.name for w, j in found.items()}
-    beside, left_notes = views(names, {w: j.wheel.blocks for w, j in found.items()}, geometry, bodies)
+    beside, by_motion, left_notes = views(names, {w: j.wheel.blocks for w, j in found.items()}, geometry, bodies)
     judged = {w: _judge(j, beside.get(w), dt, width) for w, j in found.items()}
     kept = {
         w: [
@@ -117,8 +119,11 @@ def assess_response(
     }
     least = max(1, round(_LEAST_S / BLOCK_S))
     kept = {w: where_asked(spells, _asked(judged[w], limits), least) for w, spells in kept.items()}
+    turning = turning_of(judged, geometry, bodies.yaw if not sideways else None)
+    kept = {w: [s._replace(turns=turns_with(w, s, judged, turning)) for s in spells] for w, spells in kept.items()}
     together = held_back_together(judged)
-    weak = {w: _drives(w, judged, beside, pulls.get(w), width * dt) for w in judged}
+    like = {w: by_peers(w, judged, geometry, cell) for w in judged}
+    weak = {w: _drives(w, judged, (like[w], by_motion.get(w)), pulls.get(w), width * dt) for w in judged}
     weak = {w: without_consequences(found, w, judged, width) for w, found in weak.items()}
     late = late_wheels(judged, width * dt)
     kept = {w: [x for x in spells if not late_neighbour(x, w, late, width)] for w, spells in kept.items()}
@@ -153,9 +158,15 @@ def _doubted(sensor: Assessment, why: str) -> Assessment:
 
 
 def _wheels(
-    data: Mapping[str, FollowerData], hidden: Mapping[str, Flags], steps: tuple[int, int], limits: Limits, dt: float
+    data: Mapping[str, FollowerData],
+    hidden: Mapping[str, Flags],
+    steps: tuple[int, int],
+    limits: Limits,
+    dt: float,
+    *,
+    turns: bool,
 ) -> dict[str, Judged]:
-    """Wheels whose response could be found, with their blocks; nothing is judged yet."""
+    """Wheels whose response could be found, with their blocks; nothing is judged yet. `turns`: a yaw rate is measured beside them."""
     cell, width = steps
     out: dict[str, Judged] = {}
     channels: dict[str, tuple[Samples, Response | None]] = {}
@@ -164,7 +175,8 @@ def _wheels(
         samples = samples_of(y, d.fresh)
         y[samples.step[samples.wild]] = np.nan
         channels[w] = samples, _response(y, samples, d, cell, limits, dt)
-    several = sum(found is not None for _, found in channels.values()) >= _LEAST_OTHERS
+    answered = sum(found is not None for _, found in channels.values())
+    several = answered >= _LEAST_OTHERS or (answered > 0 and turns)
     for w, d in data.items():
         y, (samples, found) = d.y, channels[w]
         if found is None and not several and np.isfinite(d.commands).any():
@@ -214,10 +226,14 @@ def _judge(one: Judged, beside: Beside | None, dt: float, width: int) -> Judged:
 
 
 def _drives(
-    wheel: str, judged: Mapping[str, Judged], views: Mapping[str, Beside], pull: Array | None, block_s: float
+    wheel: str,
+    judged: Mapping[str, Judged],
+    known: tuple[Blocks | None, Beside | None],
+    pull: Array | None,
+    block_s: float,
 ) -> list[Finding]:
-    """What is known to be a drive's fault, each time once."""
-    found = unanswered(wheel, judged, views, block_s)
+    """What is known to be a drive's fault, each time once; `known`: its blocks with what is expected of it, and how the ground moves."""
+    found = unanswered(wheel, judged, known, block_s)
     more = idle_drives(judged[wheel], pull, block_s)
     return found + [f for f in more if not any(f.start < g.stop and g.start < f.stop for g in found)]
 

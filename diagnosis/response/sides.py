@@ -16,7 +16,7 @@ from diagnosis.response.spells import Spell
 from diagnosis.results.assessment import CODE, Assessment, Finding
 from diagnosis.results.evidence_columns import Pictured, steps_of
 from diagnosis.results.vocabulary import Tier
-from replay.faults import FaultMode, State
+from replay.faults import FaultMode, Side, State
 from replay.machine.config import Limits
 
 Array = NDArray[np.float64]
@@ -89,6 +89,8 @@ def sides_of(
     for states in (sensor, drive):
         states[idle] = CODE[State.NOT_ASSESSED]
         states[~there] = CODE[State.NO_DATA]
+    drives = [*drives, *(f for f in findings if f.side is Side.ACTUATOR)]
+    findings = [f for f in findings if f.side is not Side.ACTUATOR]
     for f in drives:
         drive[f.start : f.stop] = CODE[State(f.mode.value)]
     both = [f for f in findings if len(f.side.sides) > 1]
