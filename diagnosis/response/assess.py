@@ -12,7 +12,7 @@ from diagnosis.response.beside import Bodies, same_side, views
 from diagnosis.response.body import BodySpeed
 from diagnosis.response.channel import Samples, holds_of, samples_of, without_holds
 from diagnosis.response.common_cause import consequence, less_sure, spans_of, standing, without_consequences
-from diagnosis.response.drive import by_peers, unanswered
+from diagnosis.response.drive import as_a_peer, by_peers, unanswered
 from diagnosis.response.effort import idle_drives, own_pull, shares_of
 from diagnosis.response.findings import Wheel
 from diagnosis.response.identification import Response, identify_response, without_command
@@ -92,7 +92,7 @@ def assess_response(
     drives = list(data.values())
     left_out = standing(data, limits.driving_speed, dt)
     idle = spans_of(np.logical_or.reduce(list(left_out.values())))
-    found = _wheels(data, left_out, (cell, width), limits, dt, turns=yaw is not None)
+    found = _wheels(data, left_out, geometry, (cell, width), limits, dt)
     if not found:
         return Judgement({}, standstills(idle, dt) or unexplained(drives, limits, dt))
     rest = {w: samples_of(d.y, d.fresh) for w, d in data.items() if w not in found}
@@ -160,13 +160,12 @@ def _doubted(sensor: Assessment, why: str) -> Assessment:
 def _wheels(
     data: Mapping[str, FollowerData],
     hidden: Mapping[str, Flags],
+    geometry: Geometry | None,
     steps: tuple[int, int],
     limits: Limits,
     dt: float,
-    *,
-    turns: bool,
 ) -> dict[str, Judged]:
-    """Wheels whose response could be found, with their blocks; nothing is judged yet. `turns`: a yaw rate is measured beside them."""
+    """Wheels whose response could be found, with their blocks; nothing is judged yet."""
     cell, width = steps
     out: dict[str, Judged] = {}
     channels: dict[str, tuple[Samples, Response | None]] = {}
@@ -175,10 +174,12 @@ def _wheels(
         samples = samples_of(y, d.fresh)
         y[samples.step[samples.wild]] = np.nan
         channels[w] = samples, _response(y, samples, d, cell, limits, dt)
-    answered = sum(found is not None for _, found in channels.values())
-    several = answered >= _LEAST_OTHERS or (answered > 0 and turns)
+    answers = {w: found for w, (_, found) in channels.items() if found is not None}
+    several = len(answers) >= _LEAST_OTHERS
     for w, d in data.items():
         y, (samples, found) = d.y, channels[w]
+        if found is None and not several:  # of two wheels the other one shows what a command makes
+            found = as_a_peer(w, d.commands, answers, geometry, cell * dt)
         if found is None and not several and np.isfinite(d.commands).any():
             continue
         # a wheel that alone makes nothing of its command is judged by the others, and by its channel

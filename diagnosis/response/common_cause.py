@@ -112,7 +112,9 @@ def less_sure(spell: Spell, wheel: str, judged: Mapping[str, Judged], block_s: f
 def without_consequences(
     drives: Sequence[Finding], wheel: str, judged: Mapping[str, Judged], width: int
 ) -> list[Finding]:
-    """Faults of a drive while no other wheel is still, held or noisy: readings and effort of such a wheel confirm nothing.
+    """Faults of a drive while no other wheel is still, held or noisy, and no position contradicts its own speed.
+
+    Readings and effort of such wheels confirm nothing, nor does what agrees with a reading that is wrong.
 
     Parameters
     ----------
@@ -128,9 +130,8 @@ def without_consequences(
     others = [
         (s.start * width, s.stop * width)
         for o, j in judged.items()
-        if o != wheel
         for s in j.spells
-        if evident(s, j) or s.mode is FaultMode.NO_SIGNAL
+        if (s.own if o == wheel else evident(s, j) or s.mode is FaultMode.NO_SIGNAL)
     ]
     return [f for f in drives if not any(overlaps(span, (f.start, f.stop)) for span in others)]
 

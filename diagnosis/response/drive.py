@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.response.beside import same_side
-from diagnosis.response.identification import as_another
+from diagnosis.response.identification import Response, as_another
 from diagnosis.response.inputs import cells
 from diagnosis.response.machine import Judged, unlike_others
 from diagnosis.response.models import Beside, Blocks
@@ -25,6 +25,8 @@ from replay.machine.geometry import Geometry
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
+_ASTRAY, _ASTRAY_S, _NEAR_S = 0.2, 1.0, 10.0  # of the top speed: all drives that far off, for so long, around a finding
+_MOVES = 0.05  # of the top speed
 _BODY_COMMANDS = 2  # speed and yaw rate
 _NOISIER = 3.0  # times the usual misfit of the other drives: more is no habit of one
 _FAR, _OFF_OF_TOP = 3.0, 0.06  # usual misfits beside the command, and share of the top speed, that are no answer to it
@@ -65,19 +67,40 @@ def by_peers(wheel: str, judged: Mapping[str, Judged], geometry: Geometry | None
             usual = np.median([j.wheel.blocks.noise for j in others.values()], axis=0)
             blocks = blocks._replace(noise=np.minimum(blocks.noise, _NOISIER * usual))
         return blocks
-    if not np.isfinite(commands).any() or commands.shape[1] > _BODY_COMMANDS or blocks.start.size < 2:
+    answer = as_a_peer(wheel, commands, {w: j.response for w, j in others.items()}, geometry, cell * one.wheel.dt)
+    if answer is None or blocks.start.size < 2:
         return None
-    for other, j in others.items():
-        if j.response.weights.size != commands.shape[1]:
-            continue
-        share = np.ones(commands.shape[1])
-        if commands.shape[1] == _BODY_COMMANDS:
-            if geometry is None:
-                continue
-            share[1] = 1.0 if same_side(wheel, other, geometry) else -1.0
-        answer = as_another(j.response, commands, share, cell * one.wheel.dt)
-        at = np.minimum((blocks.start + int(blocks.start[1]) // 2) // cell, answer.low.size - 1)
-        return blocks._replace(low=answer.low[at], high=answer.high[at], noise=answer.noise[at])
+    at = np.minimum((blocks.start + int(blocks.start[1]) // 2) // cell, answer.low.size - 1)
+    return blocks._replace(low=answer.low[at], high=answer.high[at], noise=answer.noise[at])
+
+
+def as_a_peer(
+    wheel: str, commands: Array, answers: Mapping[str, Response], geometry: Geometry | None, h: float
+) -> Response | None:
+    """What a wheel would make of its commands if it answered as another one does; None where that cannot be told.
+
+    Parameters
+    ----------
+    wheel : str
+        The wheel.
+    commands : Array, shape (cells, k)
+        As for `identify_response`.
+    answers : Mapping[str, Response]
+        Of other wheels.
+    geometry : Geometry or None
+        Says which wheels are on one side.
+    h : float
+        Length of a cell [s].
+    """
+    number = commands.shape[1]
+    if not np.isfinite(commands).any() or number > _BODY_COMMANDS or (number == _BODY_COMMANDS and geometry is None):
+        return None
+    for other, response in answers.items():
+        if response.weights.size == number:
+            share = np.ones(number)
+            if number == _BODY_COMMANDS:
+                share[1] = 1.0 if same_side(wheel, other, geometry) else -1.0
+            return as_another(response, commands, share, h)
     return None
 
 
@@ -100,7 +123,7 @@ def unanswered(
         Length of a block [s].
     """
     one, (blocks, view) = judged[wheel], known
-    if view is None or blocks is None:
+    if view is None or blocks is None or not view.speed.size:
         return []
     off = np.nan_to_num(_off(blocks))
     others = [np.nan_to_num(_off(j.wheel.blocks)) for w, j in judged.items() if w != wheel]
@@ -110,10 +133,18 @@ def unanswered(
     there &= (beside < _AGREES * np.nan_to_num(view.noise)) & (beside < _CLOSER * off)
     there &= np.logical_and.reduce([x < _CLOSER * off for x in others]) if others else True
     there &= _off_asked(one, block_s) > _CLOSER * off
+    # where all wheels stand the machine stands, and one of them is no worse than the others
+    there &= np.nanmax([np.abs(np.nan_to_num(j.wheel.blocks.mean)) for j in judged.values()], axis=0) > _MOVES * top
+    # where all of them do something else their commands are ignored, or held, and each may meet its own by chance
+    all_off = np.logical_and.reduce([x > _ASTRAY * top for x in (off, *others)]) & bool(others)
+    reach = round(_NEAR_S / block_s)
+    least = _MUCH_S[one.alone]
     found = []
     for start, stop in _spans(there, round(_GAP_S / block_s)):
+        if np.count_nonzero(all_off[max(0, start - reach) : stop + reach]) * block_s >= _ASTRAY_S:
+            continue
         much = float(np.sum(off[start:stop][there[start:stop]])) * block_s / top
-        if (stop - start) * block_s >= _LEAST_S and np.mean(there[start:stop]) > 0.5 and much > _MUCH_S[0]:
+        if (stop - start) * block_s >= _LEAST_S and np.mean(there[start:stop]) > 0.5 and much > least:
             found.append(_finding(one, blocks, view, (start, stop), much, block_s))
     return found
 
@@ -143,9 +174,7 @@ def _spans(there: Flags, gap: int) -> list[tuple[int, int]]:
     return out
 
 
-def _finding(
-    one: Judged, blocks: Blocks, view: Beside, span: tuple[int, int], much: float, block_s: float
-) -> Finding:
+def _finding(one: Judged, blocks: Blocks, view: Beside, span: tuple[int, int], much: float, block_s: float) -> Finding:
     """One finding in blocks `span`; `much`: what is missing over its time, by the top speed [s]."""
     start, stop = span
     part = slice(start, stop)
@@ -166,14 +195,16 @@ def _finding(
         FaultMode.STUCK: Epsilon(1.0, 1.0, 1.0),
     }.get(mode)
     p = _ALONE_P if one.alone else _P[sum(much > least for least in _MUCH_S) - 1]
-    texts = (
+    texts: tuple[str, ...] = (
         f"{one.data.name} is {size:.2g} {{speed_unit}} (median) for {(stop - start) * block_s:.1f} s, where its command makes it "
         f"{float(np.median(np.abs(asked))):.2g} {{speed_unit}} otherwise.",
         f"{view.compared} and the measured motion of the body show the same speed as the sensor, so that the sensor is right and the "
         "{valve} does not do what it is told.",
     )
     if one.alone:
-        texts += ("With a single drive, one that does not answer and commands that are ignored cannot be distinguished.",)
+        texts += (
+            "With a single drive, one that does not answer and commands that are ignored cannot be distinguished.",
+        )
     rest = Hypothesis(Side.SENSOR.value, mode.value, 0.5 * (1.0 - p))
     return Finding(
         start=start * width, stop=min(stop * width, one.data.y.size), side=Side.ACTUATOR, mode=mode, probability=p,

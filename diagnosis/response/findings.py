@@ -149,7 +149,7 @@ def _silent(spell: Spell, wheel: Wheel, first: int, last: int, speed: Array | No
     if _BY_BODY < sensor < SENSOR_SHARE and _pulls_as_usual(wheel, part):
         sensor = SENSOR_SHARE
         texts.append("Its drive pulls as usual, as it does not where a {wheel} is held, or the drive has no power.")
-    if _BY_BODY < sensor and _lives(wheel, begin, end):
+    if sensor > _BY_BODY and _lives(wheel, begin, end):
         sensor = min(sensor, 0.5)
         texts.append("Its readings, small as they are, still change: a dead sensor's do not.")
     if 1.0 - _EITHER <= sensor <= _EITHER:
@@ -257,9 +257,7 @@ def _scaled(spell: Spell, wheel: Wheel, span: tuple[int, int], speed: Array | No
     elif spell.kin or (speed is not None and wheel.own):
         sensor = max(sensor, _ONE_JUMP)
     elif (
-        spell.turns is False
-        and misfit < _IN_SHARE * min(gain, 1.0)
-        and np.std(x) > _VARIES * np.sqrt(np.mean(x * x))
+        spell.turns is False and misfit < _IN_SHARE * min(gain, 1.0) and np.std(x) > _VARIES * np.sqrt(np.mean(x * x))
     ):  # a share that stays the same at every speed is no slip, and no weak drive where the body does not turn with it
         sensor = max(sensor, _ONE_JUMP)
         texts.append("The measured yaw rate does not follow this reading.")
@@ -288,9 +286,7 @@ def sensor_finding(
     sensor: float = 1.0,
 ) -> Finding:
     """A finding with probability p of any fault, of which `sensor` is the sensor's share."""
-    side = (
-        Side.SENSOR if sensor > _EITHER else Side.ACTUATOR if sensor < 1.0 - _EITHER else Side.SENSOR_OR_ACTUATOR
-    )
+    side = Side.SENSOR if sensor > _EITHER else Side.ACTUATOR if sensor < 1.0 - _EITHER else Side.SENSOR_OR_ACTUATOR
     share = {Side.SENSOR: sensor, Side.ACTUATOR: 1.0 - sensor}.get(side, 1.0)
     other = Side.ACTUATOR if side is Side.SENSOR else Side.SENSOR
     stated = p * share

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +16,7 @@ from diagnosis.response.models import HEALTHY, LEAST_P, NOISY, OTHER, SILENT
 from diagnosis.response.spells import Spell
 from diagnosis.results.assessment import CODE, Assessment, Finding
 from diagnosis.results.evidence_columns import Pictured, steps_of
+from diagnosis.results.result import Hypothesis
 from diagnosis.results.vocabulary import Tier
 from replay.faults import FaultMode, Side, State
 from replay.machine.config import Limits
@@ -23,6 +25,7 @@ Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 _LEAST_S = 1.0
+_STANDS_P = 0.7  # that an only drive which stands is at fault, with its sensor, rather than the machine stopped
 _DOUBT_S = 0.5  # around a spell that is judged no fault
 _AT_ONCE_S = 5e-3
 _HIDDEN = "a controller that holds the speed hides a weak drive, and their healthy effort is not known"
@@ -74,7 +77,7 @@ def sides_of(
         long = (spell.stop - spell.start) * width * dt >= _LEAST_S
         found = finding_of(spell, *_shown_by(one, spell)) if long and spell.p >= LEAST_P else None
         if found is not None:
-            findings.append(found)
+            findings.append(_by_itself(found) if one.alone else found)
         elif one.posterior[spell.start : spell.stop].argmax(axis=1).min() > NOISY and _entered_calmly(
             one, spell, width, dt
         ):
@@ -98,6 +101,17 @@ def sides_of(
         sensor[f.start : f.stop] = CODE[State(f.mode.value)]
         drive[f.start : f.stop] = CODE[State(f.mode.value) if f in both else State.MASKED]
     return _assessment(one, sensor, tuple(findings), limits, dt), _drive(one, drive, (*drives, *both))
+
+
+def _by_itself(found: Finding) -> Finding:
+    """A finding on the only drive, less sure where it merely stands still: so does a machine that is stopped."""
+    if found.side is not Side.SENSOR_OR_ACTUATOR or found.mode is not FaultMode.NO_SIGNAL:
+        return found
+    first = found.hypotheses[0]
+    p = _STANDS_P * found.probability
+    rest = Hypothesis("none", State.HEALTHY.value, 1.0 - p)
+    text = "With a single drive, an emergency stop or a machine that is disabled looks the same."
+    return replace(found, probability=p, hypotheses=(replace(first, p=p), rest), evidence=(*found.evidence, text))
 
 
 def _met(spell: Spell, findings: Sequence[Finding], width: int) -> bool:

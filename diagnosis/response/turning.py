@@ -104,9 +104,9 @@ def _fitted(apart: Array, yaw: Array, sound: NDArray[np.bool_]) -> tuple[float, 
     if np.count_nonzero(sound) < _LEAST_BLOCKS:
         return None
     columns, kept = np.column_stack([apart, np.ones(apart.size)]), sound.copy()
-    weights = np.zeros(2)
+    weights: Array = np.zeros(2)
     for _ in range(5):
-        weights = np.linalg.lstsq(columns[kept], yaw[kept], rcond=None)[0]
+        weights = np.asarray(np.linalg.lstsq(columns[kept], yaw[kept], rcond=None)[0], dtype=np.float64)
         off = np.abs(yaw - columns @ weights)
         kept = sound & (off <= np.quantile(off[sound], 0.8))
     noise = 1.48 * float(np.median(off[sound]))
