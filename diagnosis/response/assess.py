@@ -11,7 +11,14 @@ from numpy.typing import NDArray
 from diagnosis.response.beside import Bodies, same_side, views
 from diagnosis.response.body import BodySpeed
 from diagnosis.response.channel import Samples, holds_of, samples_of, without_holds
-from diagnosis.response.common_cause import consequence, less_sure, spans_of, standing, without_consequences
+from diagnosis.response.common_cause import (
+    consequence,
+    less_sure,
+    spans_of,
+    standing,
+    stands_with_all,
+    without_consequences,
+)
 from diagnosis.response.drive import as_a_peer, by_peers, unanswered
 from diagnosis.response.effort import idle_drives, own_pull, shares_of
 from diagnosis.response.findings import Wheel
@@ -118,7 +125,9 @@ def assess_response(
         for w, j in judged.items()
     }
     least = max(1, round(_LEAST_S / BLOCK_S))
-    kept = {w: where_asked(spells, _asked(judged[w], limits), least) for w, spells in kept.items()}
+    asked = {w: _asked(j, limits) for w, j in judged.items()}
+    kept = {w: where_asked(spells, asked[w], least) for w, spells in kept.items()}
+    kept = {w: [s for s in spells if not stands_with_all(s, w, judged, asked)] for w, spells in kept.items()}
     turning = turning_of(judged, geometry, bodies.yaw if not sideways else None)
     kept = {w: [s._replace(turns=turns_with(w, s, judged, turning)) for s in spells] for w, spells in kept.items()}
     together = held_back_together(judged)
@@ -137,7 +146,7 @@ def assess_response(
         parts[w] = _doubted(parts[w][0], text), parts[w][1]
     lasting = lasting_losses(judged)
     for w, (sensor, drive) in parts.items():
-        j, about = judged[w], _asked(judged[w], limits)
+        j, about = judged[w], asked[w]
         powers = powers_of(j.wheel.blocks, j.driving, about, width * dt, beside.get(w), limits.clear_at, lasting[w])
         delay, told = smallest_delay(j, width * dt)
         powers = powers._replace(rows=(*powers.rows, delay))
@@ -234,9 +243,9 @@ def _drives(
     block_s: float,
 ) -> list[Finding]:
     """What is known to be a drive's fault, each time once; `known`: its blocks with what is expected of it, and how the ground moves."""
-    found = unanswered(wheel, judged, known, block_s)
-    more = idle_drives(judged[wheel], pull, block_s)
-    return found + [f for f in more if not any(f.start < g.stop and g.start < f.stop for g in found)]
+    idle = idle_drives(judged[wheel], pull, block_s)  # it says why: without power
+    more = unanswered(wheel, judged, known, block_s)
+    return idle + [f for f in more if not any(f.start < g.stop and g.start < f.stop for g in idle)]
 
 
 def _habit(wheel: str, holds: Mapping[str, Array]) -> float:

@@ -78,6 +78,28 @@ def consequence(spell: Spell, wheel: str, judged: Mapping[str, Judged]) -> bool:
     )
 
 
+def stands_with_all(spell: Spell, wheel: str, judged: Mapping[str, Judged], asked: Mapping[str, Flags]) -> bool:
+    """Whether a speed is silent while all others stand still, too, although they are to move: then the machine stands.
+
+    Parameters
+    ----------
+    spell : Spell
+        Of `wheel`.
+    wheel : str
+        The wheel.
+    judged : Mapping[str, Judged]
+        All wheels.
+    asked : Mapping[str, Flags], each of shape (b,)
+        Blocks in which each is to move.
+    """
+    others = [w for w in judged if w != wheel]
+    if spell.mode is not FaultMode.NO_SIGNAL or spell.own or not others:
+        return False
+    part = slice(spell.start, spell.stop)
+    still = [(j.wheel.blocks.zero == j.wheel.blocks.readings)[part] & asked[w][part] for w, j in judged.items()]
+    return bool(np.mean(np.logical_and.reduce(still)) > _OVERLAP)
+
+
 def less_sure(spell: Spell, wheel: str, judged: Mapping[str, Judged], block_s: float) -> Spell:
     """A spell that nothing in its own channel shows, less sure where it is beside another wheel's longer one, or begins soon after it.
 
