@@ -25,7 +25,9 @@ Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 _LEAST_S = 1.0
-_STANDS_P = 0.7  # that an only drive which stands is at fault, with its sensor, rather than the machine stopped
+_STANDS_P = (
+    0.7  # that an only drive, or its sensor, is at fault rather than the machine stopped, or its commands ignored
+)
 _DOUBT_S = 0.5  # around a spell that is judged no fault
 _AT_ONCE_S = 5e-3
 _HIDDEN = "a controller that holds the speed hides a weak drive, and their healthy effort is not known"
@@ -104,13 +106,13 @@ def sides_of(
 
 
 def _by_itself(found: Finding) -> Finding:
-    """A finding on the only drive, less sure where it merely stands still: so does a machine that is stopped."""
-    if found.side is not Side.SENSOR_OR_ACTUATOR or found.mode is not FaultMode.NO_SIGNAL:
+    """A finding on the only drive, less sure where its command alone contradicts it: a machine may be stopped, or driven otherwise."""
+    if found.side is not Side.SENSOR_OR_ACTUATOR:
         return found
     first = found.hypotheses[0]
     p = _STANDS_P * found.probability
     rest = Hypothesis("none", State.HEALTHY.value, 1.0 - p)
-    text = "With a single drive, an emergency stop or a machine that is disabled looks the same."
+    text = "With a single drive, an emergency stop, a machine that is disabled, or commands that are ignored look the same."
     return replace(found, probability=p, hypotheses=(replace(first, p=p), rest), evidence=(*found.evidence, text))
 
 
