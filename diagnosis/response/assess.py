@@ -11,8 +11,15 @@ from numpy.typing import NDArray
 from diagnosis.response.beside import Bodies, same_side, views
 from diagnosis.response.body import BodySpeed
 from diagnosis.response.channel import Samples, holds_of, samples_of, without_holds
-from diagnosis.response.common_cause import consequence, less_sure, spans_of, standing, without_consequences
-from diagnosis.response.drive import unanswered
+from diagnosis.response.common_cause import (
+    consequence,
+    less_sure,
+    spans_of,
+    standing,
+    stands_with_all,
+    without_consequences,
+)
+from diagnosis.response.drive import as_a_peer, by_peers, unanswered
 from diagnosis.response.effort import idle_drives, own_pull, shares_of
 from diagnosis.response.findings import Wheel
 from diagnosis.response.identification import Response, identify_response, without_command
@@ -28,6 +35,7 @@ from diagnosis.response.models import (
     MEAN_HEALTHY_S,
     STATES,
     Beside,
+    Blocks,
     blocks_of,
     scores,
 )
@@ -35,6 +43,7 @@ from diagnosis.response.power import powers_of
 from diagnosis.response.rivals import by_each_other, held_back_together, jumped, others_fault, shared
 from diagnosis.response.sides import sides_of
 from diagnosis.response.spells import spells_of, where_asked
+from diagnosis.response.turning import turning_of, turns_with
 from diagnosis.results.assessment import CODE, Assessment, Finding
 from replay.faults import State
 from replay.machine.config import Limits
@@ -90,7 +99,7 @@ def assess_response(
     drives = list(data.values())
     left_out = standing(data, limits.driving_speed, dt)
     idle = spans_of(np.logical_or.reduce(list(left_out.values())))
-    found = _wheels(data, left_out, (cell, width), limits, dt)
+    found = _wheels(data, left_out, geometry, (cell, width), limits, dt)
     if not found:
         return Judgement({}, standstills(idle, dt) or unexplained(drives, limits, dt))
     rest = {w: samples_of(d.y, d.fresh) for w, d in data.items() if w not in found}
@@ -105,7 +114,7 @@ def assess_response(
         w: j._replace(wheel=j.wheel._replace(pull=own_pull(j, efforts.get(w), pulls.get(w)))) for w, j in found.items()
     }
     names = {w: j.data.name for w, j in found.items()}
-    beside, left_notes = views(names, {w: j.wheel.blocks for w, j in found.items()}, geometry, bodies)
+    beside, by_motion, left_notes = views(names, {w: j.wheel.blocks for w, j in found.items()}, geometry, bodies)
     judged = {w: _judge(j, beside.get(w), dt, width) for w, j in found.items()}
     kept = {
         w: [
@@ -116,9 +125,14 @@ def assess_response(
         for w, j in judged.items()
     }
     least = max(1, round(_LEAST_S / BLOCK_S))
-    kept = {w: where_asked(spells, _asked(judged[w], limits), least) for w, spells in kept.items()}
+    asked = {w: _asked(j, limits) for w, j in judged.items()}
+    kept = {w: where_asked(spells, asked[w], least) for w, spells in kept.items()}
+    kept = {w: [s for s in spells if not stands_with_all(s, w, judged, asked)] for w, spells in kept.items()}
+    turning = turning_of(judged, geometry, bodies.yaw if not sideways else None)
+    kept = {w: [s._replace(turns=turns_with(w, s, judged, turning)) for s in spells] for w, spells in kept.items()}
     together = held_back_together(judged)
-    weak = {w: _drives(w, judged, beside, pulls.get(w), width * dt) for w in judged}
+    like = {w: by_peers(w, judged, geometry, cell) for w in judged}
+    weak = {w: _drives(w, judged, (like[w], by_motion.get(w)), pulls.get(w), width * dt) for w in judged}
     weak = {w: without_consequences(found, w, judged, width) for w, found in weak.items()}
     late = late_wheels(judged, width * dt)
     kept = {w: [x for x in spells if not late_neighbour(x, w, late, width)] for w, spells in kept.items()}
@@ -132,7 +146,7 @@ def assess_response(
         parts[w] = _doubted(parts[w][0], text), parts[w][1]
     lasting = lasting_losses(judged)
     for w, (sensor, drive) in parts.items():
-        j, about = judged[w], _asked(judged[w], limits)
+        j, about = judged[w], asked[w]
         powers = powers_of(j.wheel.blocks, j.driving, about, width * dt, beside.get(w), limits.clear_at, lasting[w])
         delay, told = smallest_delay(j, width * dt)
         powers = powers._replace(rows=(*powers.rows, delay))
@@ -153,7 +167,12 @@ def _doubted(sensor: Assessment, why: str) -> Assessment:
 
 
 def _wheels(
-    data: Mapping[str, FollowerData], hidden: Mapping[str, Flags], steps: tuple[int, int], limits: Limits, dt: float
+    data: Mapping[str, FollowerData],
+    hidden: Mapping[str, Flags],
+    geometry: Geometry | None,
+    steps: tuple[int, int],
+    limits: Limits,
+    dt: float,
 ) -> dict[str, Judged]:
     """Wheels whose response could be found, with their blocks; nothing is judged yet."""
     cell, width = steps
@@ -164,9 +183,12 @@ def _wheels(
         samples = samples_of(y, d.fresh)
         y[samples.step[samples.wild]] = np.nan
         channels[w] = samples, _response(y, samples, d, cell, limits, dt)
-    several = sum(found is not None for _, found in channels.values()) >= _LEAST_OTHERS
+    answers = {w: found for w, (_, found) in channels.items() if found is not None}
+    several = len(answers) >= _LEAST_OTHERS
     for w, d in data.items():
         y, (samples, found) = d.y, channels[w]
+        if found is None and not several:  # of two wheels the other one shows what a command makes
+            found = as_a_peer(w, d.commands, answers, geometry, cell * dt)
         if found is None and not several and np.isfinite(d.commands).any():
             continue
         # a wheel that alone makes nothing of its command is judged by the others, and by its channel
@@ -214,12 +236,16 @@ def _judge(one: Judged, beside: Beside | None, dt: float, width: int) -> Judged:
 
 
 def _drives(
-    wheel: str, judged: Mapping[str, Judged], views: Mapping[str, Beside], pull: Array | None, block_s: float
+    wheel: str,
+    judged: Mapping[str, Judged],
+    known: tuple[Blocks | None, Beside | None],
+    pull: Array | None,
+    block_s: float,
 ) -> list[Finding]:
-    """What is known to be a drive's fault, each time once."""
-    found = unanswered(wheel, judged, views, block_s)
-    more = idle_drives(judged[wheel], pull, block_s)
-    return found + [f for f in more if not any(f.start < g.stop and g.start < f.stop for g in found)]
+    """What is known to be a drive's fault, each time once; `known`: its blocks with what is expected of it, and how the ground moves."""
+    idle = idle_drives(judged[wheel], pull, block_s)  # it says why: without power
+    more = unanswered(wheel, judged, known, block_s)
+    return idle + [f for f in more if not any(f.start < g.stop and g.start < f.stop for g in idle)]
 
 
 def _habit(wheel: str, holds: Mapping[str, Array]) -> float:

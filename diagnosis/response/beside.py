@@ -54,8 +54,8 @@ class Bodies(NamedTuple):
 
 def views(
     wheels: Mapping[str, str], blocks: Mapping[str, Blocks], geometry: Geometry | None, bodies: Bodies
-) -> tuple[dict[str, Beside], tuple[str, ...]]:
-    """Views of each wheel that has one, and a sentence on each sensor of the body that was left out.
+) -> tuple[dict[str, Beside], dict[str, Beside], tuple[str, ...]]:
+    """Views of each wheel that has one, of each wheel by the measured motion of the body, and a sentence on each sensor that was left out.
 
     Parameters
     ----------
@@ -74,6 +74,7 @@ def views(
     kept = [b for b in bodies.speeds if b not in made]
     by_body = {w: v for w in wheels if (v := view_of(means[w], kept, means, bodies.yaw, bodies.block_s)) is not None}
     out: dict[str, Beside] = {}
+    by_motion: dict[str, Beside] = {}
     for w in wheels:
         if bodies.sideways:
             found = _by_all_others(w, wheels, blocks)
@@ -84,7 +85,32 @@ def views(
         found = _by_body(w, wheels, blocks, by_body) if found is None else found
         if found is not None:
             out[w] = found
-    return out, notes
+        moved = _by_motion(w, wheels, blocks, (geometry, bodies.yaw, by_body))
+        if moved is not None:
+            by_motion[w] = moved
+    return out, by_motion, notes
+
+
+def _by_motion(
+    w: str,
+    wheels: Mapping[str, str],
+    blocks: Mapping[str, Blocks],
+    body: tuple[Geometry | None, Array | None, Mapping[str, View]],
+) -> Beside | None:
+    """How fast the ground passes under a wheel, by the yaw rate beside the wheels of the other side, or by a sensor of the body."""
+    geometry, yaw, by_body = body
+    far = [o for o in wheels if o != w and not same_side(w, o, geometry)]
+    own = blocks[w]
+    if yaw is not None and far and (geometry is not None or len(far) == 1):
+        speed = _turned(own.mean, np.asarray(np.mean([blocks[o].mean for o in far], axis=0)), yaw)
+        if speed is not None:
+            compared = " and ".join(wheels[o] for o in far)
+            return Beside(speed, _noise(own, speed), np.ones(speed.size), np.zeros(speed.size), compared)
+    if w in by_body:
+        view = by_body[w]
+        noise = _noise(own, view.speed) * np.sqrt(view.reach)
+        return Beside(view.speed, noise, np.ones(own.mean.size), np.zeros(own.mean.size), view.name)
+    return None
 
 
 def _by_wheels(
@@ -203,7 +229,7 @@ def _turned(y: Array, x: Array, yaw: Array) -> Array | None:
         k = float(yaw[kept] @ (y - x)[kept]) / power if power > 0 else 0.0
         off = np.abs(y - x - k * yaw)
         kept = use & (off <= np.quantile(off[use], 0.7))
-    moved = float(np.median(np.abs(y[use])))
+    moved = max(float(np.median(np.abs(z[use]))) for z in (y, x))
     return x + k * yaw if np.median(np.abs(y - x - k * yaw)[use]) < _ALIKE * moved else None
 
 

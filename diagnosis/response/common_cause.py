@@ -78,6 +78,28 @@ def consequence(spell: Spell, wheel: str, judged: Mapping[str, Judged]) -> bool:
     )
 
 
+def stands_with_all(spell: Spell, wheel: str, judged: Mapping[str, Judged], asked: Mapping[str, Flags]) -> bool:
+    """Whether a speed is silent while all others stand still, too, although they are to move: then the machine stands.
+
+    Parameters
+    ----------
+    spell : Spell
+        Of `wheel`.
+    wheel : str
+        The wheel.
+    judged : Mapping[str, Judged]
+        All wheels.
+    asked : Mapping[str, Flags], each of shape (b,)
+        Blocks in which each is to move.
+    """
+    others = [w for w in judged if w != wheel]
+    if spell.mode is not FaultMode.NO_SIGNAL or spell.own or not others:
+        return False
+    part = slice(spell.start, spell.stop)
+    still = [(j.wheel.blocks.zero == j.wheel.blocks.readings)[part] & asked[w][part] for w, j in judged.items()]
+    return bool(np.mean(np.logical_and.reduce(still)) > _OVERLAP)
+
+
 def less_sure(spell: Spell, wheel: str, judged: Mapping[str, Judged], block_s: float) -> Spell:
     """A spell that nothing in its own channel shows, less sure where it is beside another wheel's longer one, or begins soon after it.
 
@@ -112,7 +134,9 @@ def less_sure(spell: Spell, wheel: str, judged: Mapping[str, Judged], block_s: f
 def without_consequences(
     drives: Sequence[Finding], wheel: str, judged: Mapping[str, Judged], width: int
 ) -> list[Finding]:
-    """Faults of a drive while no other wheel is still, held or noisy: readings and effort of such a wheel confirm nothing.
+    """Faults of a drive while no other wheel is still, held or noisy, and no position contradicts its own speed.
+
+    Readings and effort of such wheels confirm nothing, nor does what agrees with a reading that is wrong.
 
     Parameters
     ----------
@@ -128,9 +152,8 @@ def without_consequences(
     others = [
         (s.start * width, s.stop * width)
         for o, j in judged.items()
-        if o != wheel
         for s in j.spells
-        if evident(s, j) or s.mode is FaultMode.NO_SIGNAL
+        if (s.own if o == wheel else evident(s, j) or s.mode is FaultMode.NO_SIGNAL)
     ]
     return [f for f in drives if not any(overlaps(span, (f.start, f.stop)) for span in others)]
 

@@ -1,4 +1,8 @@
-"""Drives that do something else than their commands while another view of the wheel shows that its sensor is right."""
+"""Drives that do something else than their commands while the measured motion of the body shows that their sensors are right.
+
+A drive without power is dragged along, a weak one lags behind: either way its wheel turns as the ground passes under it, which the yaw
+rate beside the wheels of the other side, or a sensor of the body, shows as well.
+"""
 
 from __future__ import annotations
 
@@ -7,33 +11,42 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from diagnosis.response.beside import same_side
+from diagnosis.response.identification import Response, as_another
 from diagnosis.response.inputs import cells
-from diagnosis.response.machine import Judged
+from diagnosis.response.machine import Judged, unlike_others
 from diagnosis.response.models import Beside, Blocks
 from diagnosis.results.assessment import Finding
 from diagnosis.results.result import Epsilon, Hypothesis
 from diagnosis.results.vocabulary import Tier
 from replay.faults import FaultMode, Side, State
+from replay.machine.geometry import Geometry
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
-_FAR, _FAR_OF_TOP = 3.0, 0.25  # usual misfits beside the command, and share of the top speed, that are no answer to it
+_ASTRAY, _ASTRAY_S, _NEAR_S = 0.2, 1.0, 10.0  # of the top speed: all drives that far off, for so long, around a finding
+_MOVES = 0.05  # of the top speed
+_BODY_COMMANDS = 2  # speed and yaw rate
+_NOISIER = 3.0  # times the usual misfit of the other drives: more is no habit of one
+_FAR, _OFF_OF_TOP = 3.0, 0.06  # usual misfits beside the command, and share of the top speed, that are no answer to it
 _AGREES = 2.5  # usual misfits beside the other view
 _CLOSER = (
     0.5  # of the misfit beside the command: so much less is that beside the other view, and that of the other wheels
 )
-_GAP_S, _LEAST_S, _LONG_S = 0.75, 2.0, 4.0
-_P = 0.9, 0.95  # that the drive is at fault, from the least time on, and for long
+_GAP_S, _LEAST_S = 0.75, 2.0
+_MUCH_S = 0.4, 0.8, 1.6  # of the top speed, missing for as long
+_P = 0.8, 0.9, 0.95  # that the drive is at fault, by how much is missing
+_ALONE_P = 0.6  # that a single drive is at fault, not its commands
 _STANDS, _FULL = 0.1, 0.9  # of what the command makes it do
 _ANSWER_S = 1.0  # within which a drive answers
 _STEADY = 0.25  # spread of a speed that does not follow its command, by its size
 
 
-def unanswered(wheel: str, judged: Mapping[str, Judged], views: Mapping[str, Beside], block_s: float) -> list[Finding]:
-    """Times in which a drive did not answer its command, by a sensor that another view confirms.
+def by_peers(wheel: str, judged: Mapping[str, Judged], geometry: Geometry | None, cell: int) -> Blocks | None:
+    """Blocks of a wheel with what is expected of it: by its own answer, or by another's where it makes nothing, or much less, of its commands.
 
-    Only a view of this very wheel will do: a wheel of the same side is pulled along by the ground, and skids.
+    None where neither is known.
 
     Parameters
     ----------
@@ -41,26 +54,98 @@ def unanswered(wheel: str, judged: Mapping[str, Judged], views: Mapping[str, Bes
         The wheel.
     judged : Mapping[str, Judged]
         All wheels.
-    views : Mapping[str, Beside]
-        Other views of their speeds.
+    geometry : Geometry or None
+        Says which wheels are on one side.
+    cell : int
+        Steps of a cell.
+    """
+    one = judged[wheel]
+    blocks, commands, answered = one.wheel.blocks, one.data.commands, one.response.answered
+    others = {w: j for w, j in judged.items() if w != wheel and j.response.answered}
+    if answered and wheel not in unlike_others(judged):
+        if others:  # a fault of long makes its own misfit look usual
+            usual = np.median([j.wheel.blocks.noise for j in others.values()], axis=0)
+            blocks = blocks._replace(noise=np.minimum(blocks.noise, _NOISIER * usual))
+        return blocks
+    answer = as_a_peer(wheel, commands, {w: j.response for w, j in others.items()}, geometry, cell * one.wheel.dt)
+    if answer is None or blocks.start.size < 2:
+        return None
+    at = np.minimum((blocks.start + int(blocks.start[1]) // 2) // cell, answer.low.size - 1)
+    return blocks._replace(low=answer.low[at], high=answer.high[at], noise=answer.noise[at])
+
+
+def as_a_peer(
+    wheel: str, commands: Array, answers: Mapping[str, Response], geometry: Geometry | None, h: float
+) -> Response | None:
+    """What a wheel would make of its commands if it answered as another one does; None where that cannot be told.
+
+    Parameters
+    ----------
+    wheel : str
+        The wheel.
+    commands : Array, shape (cells, k)
+        As for `identify_response`.
+    answers : Mapping[str, Response]
+        Of other wheels.
+    geometry : Geometry or None
+        Says which wheels are on one side.
+    h : float
+        Length of a cell [s].
+    """
+    number = commands.shape[1]
+    if not np.isfinite(commands).any() or number > _BODY_COMMANDS or (number == _BODY_COMMANDS and geometry is None):
+        return None
+    for other, response in answers.items():
+        if response.weights.size == number:
+            share = np.ones(number)
+            if number == _BODY_COMMANDS:
+                share[1] = 1.0 if same_side(wheel, other, geometry) else -1.0
+            return as_another(response, commands, share, h)
+    return None
+
+
+def unanswered(
+    wheel: str, judged: Mapping[str, Judged], known: tuple[Blocks | None, Beside | None], block_s: float
+) -> list[Finding]:
+    """Times in which a drive did not answer its command, by a sensor that the motion of the body confirms.
+
+    A wheel of the same side confirms nothing: it is pulled along by the ground, and skids.
+
+    Parameters
+    ----------
+    wheel : str
+        The wheel.
+    judged : Mapping[str, Judged]
+        All wheels.
+    known : tuple[Blocks or None, Beside or None]
+        Its blocks with what is expected of it, and how the ground passes under it.
     block_s : float
         Length of a block [s].
     """
-    one, view = judged[wheel], views.get(wheel)
-    if view is None or not view.own or not one.response.answered:
+    one, (blocks, view) = judged[wheel], known
+    if view is None or blocks is None or not view.speed.size:
         return []
-    blocks = one.wheel.blocks
     off = np.nan_to_num(_off(blocks))
     others = [np.nan_to_num(_off(j.wheel.blocks)) for w, j in judged.items() if w != wheel]
     beside = np.nan_to_num(np.abs(blocks.mean - view.speed), nan=np.inf)
-    there = off > np.maximum(_FAR * blocks.noise, _FAR_OF_TOP * float(np.nanquantile(np.abs(blocks.mean), 0.95)))
+    top = float(np.nanquantile(np.abs(np.r_[blocks.low, blocks.high]), 0.95))
+    there = off > np.maximum(_FAR * blocks.noise, _OFF_OF_TOP * top)
     there &= (beside < _AGREES * np.nan_to_num(view.noise)) & (beside < _CLOSER * off)
     there &= np.logical_and.reduce([x < _CLOSER * off for x in others]) if others else True
     there &= _off_asked(one, block_s) > _CLOSER * off
+    # where all wheels stand the machine stands, and one of them is no worse than the others
+    there &= np.nanmax([np.abs(np.nan_to_num(j.wheel.blocks.mean)) for j in judged.values()], axis=0) > _MOVES * top
+    # where all of them do something else their commands are ignored, or held, and each may meet its own by chance
+    all_off = np.logical_and.reduce([x > _ASTRAY * top for x in (off, *others)]) & bool(others)
+    reach = round(_NEAR_S / block_s)
+    least = _MUCH_S[one.alone]
     found = []
     for start, stop in _spans(there, round(_GAP_S / block_s)):
-        if (stop - start) * block_s >= _LEAST_S and np.mean(there[start:stop]) > 0.5:
-            found.append(_finding(one, view, start, stop, block_s))
+        if np.count_nonzero(all_off[max(0, start - reach) : stop + reach]) * block_s >= _ASTRAY_S:
+            continue
+        much = float(np.sum(off[start:stop][there[start:stop]])) * block_s / top
+        if (stop - start) * block_s >= _LEAST_S and np.mean(there[start:stop]) > 0.5 and much > least:
+            found.append(_finding(one, blocks, view, (start, stop), much, block_s))
     return found
 
 
@@ -89,8 +174,10 @@ def _spans(there: Flags, gap: int) -> list[tuple[int, int]]:
     return out
 
 
-def _finding(one: Judged, view: Beside, start: int, stop: int, block_s: float) -> Finding:
-    blocks, part = one.wheel.blocks, slice(start, stop)
+def _finding(one: Judged, blocks: Blocks, view: Beside, span: tuple[int, int], much: float, block_s: float) -> Finding:
+    """One finding in blocks `span`; `much`: what is missing over its time, by the top speed [s]."""
+    start, stop = span
+    part = slice(start, stop)
     width = int(blocks.start[1]) if blocks.start.size > 1 else 1
     y, asked = np.nan_to_num(blocks.mean[part]), 0.5 * (blocks.low[part] + blocks.high[part])
     power = float(asked @ asked)
@@ -107,13 +194,17 @@ def _finding(one: Judged, view: Beside, start: int, stop: int, block_s: float) -
         FaultMode.NO_SIGNAL: Epsilon(1.0, 1.0, 1.0),
         FaultMode.STUCK: Epsilon(1.0, 1.0, 1.0),
     }.get(mode)
-    p = _P[(stop - start) * block_s >= _LONG_S]
-    texts = (
+    p = _ALONE_P if one.alone else _P[sum(much > least for least in _MUCH_S) - 1]
+    texts: tuple[str, ...] = (
         f"{one.data.name} is {size:.2g} {{speed_unit}} (median) for {(stop - start) * block_s:.1f} s, where its command makes it "
         f"{float(np.median(np.abs(asked))):.2g} {{speed_unit}} otherwise.",
         f"{view.compared} and the measured motion of the body show the same speed as the sensor, so that the sensor is right and the "
         "{valve} does not do what it is told.",
     )
+    if one.alone:
+        texts += (
+            "With a single drive, one that does not answer and commands that are ignored cannot be distinguished.",
+        )
     rest = Hypothesis(Side.SENSOR.value, mode.value, 0.5 * (1.0 - p))
     return Finding(
         start=start * width, stop=min(stop * width, one.data.y.size), side=Side.ACTUATOR, mode=mode, probability=p,

@@ -22,6 +22,7 @@ Flags = NDArray[np.bool_]
 SENSOR_SHARE = 0.96  # that what a channel alone shows is the sensor's
 _ONE_JUMP, _TWO_JUMPS = 0.92, 0.97
 _EITHER = 0.6  # that it is the sensor's, up to which its side is left open
+_BY_BODY = 0.08  # that it is the sensor's although the body turns as the reading says
 _LEAST_PULLS, _AS_USUAL = 8, (0.6, 1.5)  # blocks with an effort, and its size by the usual one
 _CHANGES = 0.1  # of the readings, as a dead sensor's do not
 _MOVING = 0.2  # of the usual speed
@@ -144,13 +145,14 @@ def _silent(spell: Spell, wheel: Wheel, first: int, last: int, speed: Array | No
     if seen or spell.own:
         texts.append(f"{wheel.compared} went on moving.")
         sensor = max(sensor, SENSOR_SHARE) if wheel.own or spell.own else sensor
-    if sensor < SENSOR_SHARE and _pulls_as_usual(wheel, part):
+    sensor = _by_body(spell, sensor, texts)
+    if _BY_BODY < sensor < SENSOR_SHARE and _pulls_as_usual(wheel, part):
         sensor = SENSOR_SHARE
         texts.append("Its drive pulls as usual, as it does not where a {wheel} is held, or the drive has no power.")
-    if _lives(wheel, begin, end):
+    if sensor > _BY_BODY and _lives(wheel, begin, end):
         sensor = min(sensor, 0.5)
         texts.append("Its readings, small as they are, still change: a dead sensor's do not.")
-    if sensor <= _EITHER:
+    if 1.0 - _EITHER <= sensor <= _EITHER:
         texts.append(
             "Without a sharp jump or another view of this {wheel}, one that stands still and a dead sensor cannot be distinguished; readings "
             "100 times a second, the position of its joint, or {or_view}the drive's effort would tell them apart."
@@ -165,6 +167,19 @@ def _lives(wheel: Wheel, begin: int, end: int) -> bool:
     """Whether readings in steps [begin, end) change now and then, as those of a dead sensor do not."""
     inside = (wheel.samples.step > begin) & (wheel.samples.step < end) & np.isfinite(wheel.samples.change)
     return bool(inside.any() and np.mean(~wheel.samples.same[inside]) > _CHANGES)
+
+
+def _by_body(spell: Spell, sensor: float, texts: list[str]) -> float:
+    """Probability that a spell is the sensor's [1], beside how the body turns; says so in `texts`."""
+    if not spell.turns:
+        return sensor
+    if sensor > _EITHER:  # two that contradict each other
+        return 0.5
+    texts.append(
+        "The measured yaw rate follows this reading, not what the {wheel} should do: the {wheel} really turns so, and its {valve} does not do "
+        "what it is told."
+    )
+    return _BY_BODY
 
 
 def _pulls_as_usual(wheel: Wheel, part: slice) -> bool:
@@ -241,9 +256,13 @@ def _scaled(spell: Spell, wheel: Wheel, span: tuple[int, int], speed: Array | No
         sensor = _TWO_JUMPS
     elif spell.kin or (speed is not None and wheel.own):
         sensor = max(sensor, _ONE_JUMP)
-    elif speed is not None and misfit < _IN_SHARE * min(gain, 1.0) and np.std(x) > _VARIES * np.sqrt(np.mean(x * x)):
-        sensor = max(sensor, _ONE_JUMP)  # a share that stays the same at every speed is no slip
-    if sensor <= _EITHER and not bare:
+    elif (
+        spell.turns is False and misfit < _IN_SHARE * min(gain, 1.0) and np.std(x) > _VARIES * np.sqrt(np.mean(x * x))
+    ):  # a share that stays the same at every speed is no slip, and no weak drive where the body does not turn with it
+        sensor = max(sensor, _ONE_JUMP)
+        texts.append("The measured yaw rate does not follow this reading.")
+    sensor = _by_body(spell, sensor, texts)
+    if 1.0 - _EITHER <= sensor <= _EITHER and not bare:
         texts.append(
             "It began and ended while the speed was changing, or too slowly for a jump: a {wheel} that is weak or skids and a wrong sensor "
             "cannot be distinguished."
@@ -267,11 +286,11 @@ def sensor_finding(
     sensor: float = 1.0,
 ) -> Finding:
     """A finding with probability p of any fault, of which `sensor` is the sensor's share."""
-    own = sensor > _EITHER
-    side = Side.SENSOR if own else Side.SENSOR_OR_ACTUATOR
-    stated = p * (sensor if own else 1.0)
-    drive = Hypothesis(Side.ACTUATOR.value, mode.value, p * (1.0 - sensor))
-    rest = (drive,) if own and drive.p > 0.0 else ()
+    side = Side.SENSOR if sensor > _EITHER else Side.ACTUATOR if sensor < 1.0 - _EITHER else Side.SENSOR_OR_ACTUATOR
+    share = {Side.SENSOR: sensor, Side.ACTUATOR: 1.0 - sensor}.get(side, 1.0)
+    other = Side.ACTUATOR if side is Side.SENSOR else Side.SENSOR
+    stated = p * share
+    rest = (Hypothesis(other.value, mode.value, p - stated),) if p > stated else ()
     return Finding(
         start=start,
         stop=stop,

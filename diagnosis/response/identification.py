@@ -135,6 +135,30 @@ def _within(asked: Array, weights: Array, limit: float) -> Array:
     return np.asarray(np.linalg.lstsq(asked, made, rcond=None)[0], dtype=np.float64)
 
 
+def as_another(response: Response, commands: Array, share: Array, h: float) -> Response:
+    """What a drive would make of its commands if it answered as another one does.
+
+    Parameters
+    ----------
+    response : Response
+        Of the other drive.
+    commands : Array, shape (cells, k)
+        As for `identify_response`.
+    share : Array, shape (k,)
+        1, or -1 where a command has the other drive go the other way.
+    h : float
+        Length of a cell [s].
+    """
+    weights = response.weights * share
+    target = np.clip(np.nan_to_num(commands) @ weights, -response.limit, response.limit)
+    target = np.interp(np.arange(target.size) - response.delay / h, np.arange(target.size), target)
+    lag = max(response.lag, 1e-3)
+    expected = np.asarray(follow(target, float(target[0]), -np.expm1(-h / lag), response.rate * h))
+    reach = max(1, round(_TIMING_S / h))
+    low, high = _moving(expected, reach, np.minimum), _moving(expected, reach, np.maximum)
+    return response._replace(weights=weights, low=low, high=high, expected=expected)
+
+
 def beyond(y: Array, low: Array, high: Array) -> Array:
     """How far values lie outside of a band; 0 within. Shape of y. All of shape (k,), in one unit."""
     return np.asarray(y - np.clip(y, low, high))

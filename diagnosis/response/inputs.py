@@ -14,6 +14,8 @@ Array = NDArray[np.float64]
 
 CELL_S = 0.05
 _SIDEWAYS_S = 1.0
+_SIDEWAYS = 0.2  # of the driving speed: even so little sets the wheels of a side apart
+_NOT_SIDEWAYS = 2  # wheels
 _LOST_S, _LOST_PERIODS = 1.0, 10.0  # of silence from which a channel is lost rather than late
 _LIVES = 0.5  # of the samples to be expected meanwhile that others must bring
 
@@ -69,9 +71,12 @@ def cells(x: Array, width: int) -> Array:
 
 
 def _moved_sideways(mission: MissionView) -> bool:
-    """Whether a machine with rollers on its wheels was commanded to move sideways."""
+    """Whether a machine with rollers on its wheels was commanded to move sideways, be it slowly: two wheels cannot."""
+    if len(mission.machine.wheels) <= _NOT_SIDEWAYS:
+        return False
     asked = np.abs(np.nan_to_num(mission.values("cmd.lateral")))
-    return bool(np.count_nonzero(asked > mission.machine.limits.driving_speed) * mission.timeline.dt > _SIDEWAYS_S)
+    least = _SIDEWAYS * mission.machine.limits.driving_speed
+    return bool(np.count_nonzero(asked > least) * mission.timeline.dt > _SIDEWAYS_S)
 
 
 def followers(mission: MissionView) -> dict[str, FollowerData]:

@@ -127,8 +127,7 @@ def unlike(judged: Mapping[str, Judged]) -> dict[str, str]:
     out = {
         w: f"over the whole mission it reads {share:.2f} × what the other {{wheels}} make of the same command: a scaled or wrongly "
         "mapped sensor, {or_size}a weak {valve}"
-        for w, share in _shares(judged).items()
-        if not _LASTING <= share <= 1.0 / _LASTING
+        for w, share in unlike_others(judged).items()
     }
     for w, own in _made(judged).items():
         if w not in out and not _NEAR[0] <= own <= _NEAR[1]:
@@ -137,6 +136,11 @@ def unlike(judged: Mapping[str, Judged]) -> dict[str, str]:
                 "wrongly mapped channel"
             )
     return out
+
+
+def unlike_others(judged: Mapping[str, Judged]) -> dict[str, float]:
+    """What wheels that are unlike the others make of their commands beside what those make of them [1]."""
+    return {w: share for w, share in _shares(judged).items() if not _LASTING <= share <= 1.0 / _LASTING}
 
 
 def _made(judged: Mapping[str, Judged]) -> dict[str, float]:

@@ -26,6 +26,7 @@ _SPIKIER = 4.0  # times the wild readings of the other wheels (median): fewer ar
 _TURNS = 0.05  # of the usual speed
 _ALSO_HELD = 0.05  # of the driving in which another wheel stays at one value for long: then it is a habit
 _WITHIN, _LONGER = 0.9, 2.0  # of a spell, and times its length: what lies so within another wheel's is its consequence
+_STEADIER = 1.3  # times the misfit beside one gain: the wheel whose gain is the steadier one is at fault
 _CLEARLY = 2.0  # times the misfit of another wheel beside its command: then it is clear whose fault it is
 
 
@@ -97,6 +98,11 @@ def others_fault(spell: Spell, wheel: str, judged: Mapping[str, Judged]) -> bool
             if max(mine, its) > _CLEARLY * min(mine, its):
                 if its > mine:
                     return True
+                continue
+            own_share, its_share = _off_a_share(one, spell), _off_a_share(j, spell)
+            if max(own_share, its_share) > _STEADIER * min(own_share, its_share):
+                if its_share < own_share:
+                    return True  # one gain at every speed explains the other wheel, none this one
             elif s.mode.scaled and (s.p > spell.p or spell.mode is FaultMode.OUTSIDE_TABLE):
                 return True  # a sensor loses more often than it gains
     return False
@@ -126,6 +132,18 @@ def jumped(one: Judged, spell: Spell) -> bool:
     step, width = one.wheel.samples.step[one.wheel.jumps.place], int(one.wheel.blocks.start[1])
     reach = round(_DOUBT_S / one.wheel.dt)
     return any(bool((np.abs(step - at * width) <= reach).any()) for at in (spell.start, spell.stop))
+
+
+def _off_a_share(one: Judged, spell: Spell) -> float:
+    """Misfit of a wheel's readings beside one gain of its speed by other channels, by their size [1]; 1 where nothing is known."""
+    part = slice(spell.start, spell.stop)
+    y, x = one.wheel.blocks.mean[part], np.full(1, np.nan) if one.speed is None else one.speed[part]
+    known = np.isfinite(y) & np.isfinite(x) if x.size == y.size else np.zeros(y.size, np.bool_)
+    if not np.any(x[known] != 0.0):
+        return 1.0
+    made = x[known] * float(x[known] @ y[known]) / float(x[known] @ x[known])
+    size = float(np.sqrt(np.mean(y[known] ** 2)))
+    return min(float(np.sqrt(np.mean((y[known] - made) ** 2))) / size, 1.0) if size > 0.0 else 1.0
 
 
 def _misfit_of(one: Judged, spell: Spell) -> float:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,14 +16,18 @@ from diagnosis.response.models import HEALTHY, LEAST_P, NOISY, OTHER, SILENT
 from diagnosis.response.spells import Spell
 from diagnosis.results.assessment import CODE, Assessment, Finding
 from diagnosis.results.evidence_columns import Pictured, steps_of
+from diagnosis.results.result import Hypothesis
 from diagnosis.results.vocabulary import Tier
-from replay.faults import FaultMode, State
+from replay.faults import FaultMode, Side, State
 from replay.machine.config import Limits
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 _LEAST_S = 1.0
+_STANDS_P = (
+    0.7  # that an only drive, or its sensor, is at fault rather than the machine stopped, or its commands ignored
+)
 _DOUBT_S = 0.5  # around a spell that is judged no fault
 _AT_ONCE_S = 5e-3
 _HIDDEN = "a controller that holds the speed hides a weak drive, and their healthy effort is not known"
@@ -74,7 +79,7 @@ def sides_of(
         long = (spell.stop - spell.start) * width * dt >= _LEAST_S
         found = finding_of(spell, *_shown_by(one, spell)) if long and spell.p >= LEAST_P else None
         if found is not None:
-            findings.append(found)
+            findings.append(_by_itself(found) if one.alone else found)
         elif one.posterior[spell.start : spell.stop].argmax(axis=1).min() > NOISY and _entered_calmly(
             one, spell, width, dt
         ):
@@ -89,6 +94,8 @@ def sides_of(
     for states in (sensor, drive):
         states[idle] = CODE[State.NOT_ASSESSED]
         states[~there] = CODE[State.NO_DATA]
+    drives = [*drives, *(f for f in findings if f.side is Side.ACTUATOR)]
+    findings = [f for f in findings if f.side is not Side.ACTUATOR]
     for f in drives:
         drive[f.start : f.stop] = CODE[State(f.mode.value)]
     both = [f for f in findings if len(f.side.sides) > 1]
@@ -96,6 +103,17 @@ def sides_of(
         sensor[f.start : f.stop] = CODE[State(f.mode.value)]
         drive[f.start : f.stop] = CODE[State(f.mode.value) if f in both else State.MASKED]
     return _assessment(one, sensor, tuple(findings), limits, dt), _drive(one, drive, (*drives, *both))
+
+
+def _by_itself(found: Finding) -> Finding:
+    """A finding on the only drive, less sure where its command alone contradicts it: a machine may be stopped, or driven otherwise."""
+    if found.side is not Side.SENSOR_OR_ACTUATOR:
+        return found
+    first = found.hypotheses[0]
+    p = _STANDS_P * found.probability
+    rest = Hypothesis("none", State.HEALTHY.value, 1.0 - p)
+    text = "With a single drive, an emergency stop, a machine that is disabled, or commands that are ignored look the same."
+    return replace(found, probability=p, hypotheses=(replace(first, p=p), rest), evidence=(*found.evidence, text))
 
 
 def _met(spell: Spell, findings: Sequence[Finding], width: int) -> bool:

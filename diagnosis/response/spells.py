@@ -20,7 +20,8 @@ _JOIN_S = 1.0
 class Spell(NamedTuple):
     """Blocks [start, stop) in one kind of state, with its probability, and whether the position of its joint contradicts it.
 
-    `mine` is the share of the misfit beside other wheels that is this one's own [1]; `kin`: the position contradicts another part of it.
+    `mine` is the share of the misfit beside other wheels that is this one's own [1]; `kin`: the position contradicts another part of it;
+    `turns`: whether the body turns as the reading says, None where that cannot be told.
     """
 
     start: int
@@ -30,6 +31,7 @@ class Spell(NamedTuple):
     own: bool = False
     mine: float = 1.0
     kin: bool = False
+    turns: bool | None = None
 
 
 def spells_of(posterior: Array, block_s: float) -> list[Spell]:

@@ -36,6 +36,7 @@ _BRIEF_S = 0.9  # a shorter stretch is rather what the model leaves out
 _FRAGMENT_S = 2.0  # a row that holds for less beside another one is rather its end
 _BELIEVED_S = 4.0  # for how long before and after a motion that did not come a valve's fault is believed
 _LEAST_ASKED_S = 0.35  # for how long a motion must be asked for, to see that it does not come
+_STEP = 0.01  # of the full angle: what a sensor that dies leaps by is more
 _LEAST_NAMED, _LEAST_LISTED = 0.005, 5e-4  # probabilities from which on another explanation is named in words, listed
 _NO_FAULT: Fault = (None, None)
 
@@ -74,6 +75,7 @@ class _Run(NamedTuple):
     axle: AxleFilter
     path: SteeringPath
     limits: Limits
+    command_logged: bool = True
 
     @property
     def seconds(self) -> float:
@@ -102,7 +104,7 @@ class _Choice(NamedTuple):
 
 def findings_of(side: Side, inputs: AxleInputs, axle: AxleFilter, path: SteeringPath, limits: Limits) -> SideFindings:
     """Faults of one side, with their ends at the samples that show them."""
-    judged = judge_side(side, axle, path, limits)
+    judged = judge_side(side, axle, path, limits, command_logged=bool({"u", "u_applied"} & inputs.logged))
     length = axle.blocks.length
     findings = [refined_sensor(j.finding, inputs, length) for j in judged if j.finding is not None]
     if side is Side.ACTUATOR:
@@ -110,15 +112,17 @@ def findings_of(side: Side, inputs: AxleInputs, axle: AxleFilter, path: Steering
     return SideFindings(tuple(findings), tuple((j.start, j.stop) for j in judged if j.finding is None))
 
 
-def judge_side(side: Side, axle: AxleFilter, path: SteeringPath, limits: Limits) -> list[Judged]:
-    """Judge every faulty run of one side."""
+def judge_side(
+    side: Side, axle: AxleFilter, path: SteeringPath, limits: Limits, *, command_logged: bool = True
+) -> list[Judged]:
+    """Judge every faulty run of one side; `command_logged`: what the valve is told is known, not put in the place of it."""
     rows = path.sensor if side is Side.SENSOR else path.actuator
     rows = np.where(rows == COLOURED, NOISY, rows)
     out: list[Judged] = []
     for start, stop, row in runs_of(rows):
         if row == HEALTHY:
             continue
-        one = _judge(_Run(side, start, stop, row, axle, path, limits))
+        one = _judge(_Run(side, start, stop, row, axle, path, limits, command_logged))
         last = out[-1] if out else None
         if last is not None and last.stop == start and _one_fault(last, one, axle.blocks.dt):
             longer = max(last, one, key=lambda j: j.stop - j.start)
@@ -181,7 +185,7 @@ def _judge(run: _Run) -> Judged:
             return Judged(run.start, run.stop, None)
         pad = round(_BELIEVED_S / run.axle.blocks.dt)
         start, stop = max(start, first - pad), min(stop, last + pad)
-    if not _may_be_stated(choice, epsilon, run):
+    if not _may_be_stated(choice, epsilon, run) or (choice.dead_sensor and _at_rest(run)):
         return Judged(run.start, run.stop, None)
     finding = Finding(
         start=start * length,
@@ -241,6 +245,23 @@ def _may_be_stated(choice: _Choice, epsilon: Epsilon | None, run: _Run) -> bool:
     small = choice.mode is FaultMode.INEFFICIENT and epsilon is not None and epsilon.value < limits.min_epsilon
     flicker = run.seconds < _BRIEF_S and not choice.dead_sensor
     return not (choice.probability < limits.min_probability or too_long or small or flicker or elsewhere)
+
+
+def _at_rest(run: _Run) -> bool:
+    """Whether an angle merely stays where nobody asks it to leave: an angle without noise, as servos report it, does that in health.
+
+    Where the valve's command is not logged, nothing else tells a dead sensor from an axle that is told to stay.
+    """
+    blocks = run.axle.blocks
+    if run.command_logged or asked(run.axle, run.start, run.stop)[2] >= _LEAST_ASKED_S:
+        return False
+    known = np.flatnonzero(blocks.count > 0)
+    inside = known[(known >= run.start) & (known < run.stop)]
+    if not inside.size:
+        return False
+    beside = np.r_[known[known < run.start][-1:], known[known >= run.stop][:1]]
+    level = float(np.median(blocks.mean[inside]))
+    return bool(np.all(np.abs(blocks.mean[beside] - level) < _STEP * run.axle.model.stop))
 
 
 def _sentences(choice: _Choice, gain: float, ranked: Sequence[tuple[Fault, float]], run: _Run) -> tuple[str, ...]:

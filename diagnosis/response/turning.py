@@ -1,0 +1,115 @@
+"""Whether the body turns as a wheel's reading says, or as it would turn without that wheel's deviation.
+
+A machine that turns by its wheels yaws by the difference of its sides. Where a wheel deviates from what its command or its peers say,
+the measured yaw rate follows the reading if the wheel really turns so (its drive), and does not if the reading is wrong (its sensor).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from diagnosis.response.machine import Judged
+from diagnosis.response.spells import Spell
+from replay.machine.geometry import Geometry
+
+Array = NDArray[np.float64]
+
+_LEAST_BLOCKS = 60  # of sound turning that the share of the wheels' difference is found in
+_AROUND = 4  # blocks around the spell in which its ends may be
+_FITS = 0.3  # misfit of the yaw rate, by its own size: more is a machine that turns by something else
+_ALIKE_BLOCKS = 8.0  # of the noise: its blocks are no independent ones
+_MOST_ERROR = 0.15
+_SURE = 2.5  # standard errors
+_MIDDLE = 0.5
+_LIES = -0.5, 1.6  # what a share may be at all
+
+
+class Turning(NamedTuple):
+    """How the body is turned by its wheels: the yaw rate and the side of each wheel.
+
+    Attributes
+    ----------
+    yaw : Array, shape (b,)
+        Measured yaw rate [rad/s].
+    sides : Mapping[str, float]
+        1 for wheels of the right, -1 for those of the left.
+    """
+
+    yaw: Array
+    sides: Mapping[str, float]
+
+
+def turning_of(judged: Mapping[str, Judged], geometry: Geometry | None, yaw: Array | None) -> Turning | None:
+    """The body as it is turned by its wheels; None where no yaw rate is known, or a side has no wheel."""
+    if yaw is None or geometry is None:
+        return None
+    fixed = {w: p for w in judged if (p := geometry.wheels.get(w)) is not None and p.axle == "fixed" and p.y != 0.0}
+    if len(fixed) < len(judged) or len({p.y > 0.0 for p in fixed.values()}) < 2:
+        return None
+    return Turning(yaw, {w: -1.0 if p.y > 0.0 else 1.0 for w, p in fixed.items()})
+
+
+def turns_with(wheel: str, spell: Spell, judged: Mapping[str, Judged], turning: Turning | None) -> bool | None:
+    """Whether the body turns as the reading of a wheel says in a spell; None where that cannot be told.
+
+    Parameters
+    ----------
+    wheel : str
+        The wheel.
+    spell : Spell
+        Of it.
+    judged : Mapping[str, Judged]
+        All wheels.
+    turning : Turning or None
+        How the body is turned.
+    """
+    if turning is None:
+        return None
+    one, part = judged[wheel], slice(spell.start, spell.stop)
+    b = one.wheel.blocks
+    should = 0.5 * (b.low + b.high) if one.speed is None else one.speed
+    share = turning.sides[wheel] / sum(s == turning.sides[wheel] for s in turning.sides.values())
+    apart = np.zeros(b.mean.size)
+    for w, side in turning.sides.items():
+        apart += side / sum(s == side for s in turning.sides.values()) * judged[w].wheel.blocks.mean
+    sound = np.isfinite(apart) & np.isfinite(turning.yaw) & one.driving
+    for j in judged.values():
+        for s in j.spells:
+            sound[max(0, s.start - _AROUND) : s.stop + _AROUND] = False
+    sound[max(0, spell.start - _AROUND) : spell.stop + _AROUND] = False
+    found = _fitted(apart, turning.yaw, sound)
+    if found is None:
+        return None
+    gain, offset, noise = found
+    x = gain * share * (b.mean - should)[part]
+    z = (turning.yaw - offset - gain * apart)[part] + x
+    known = np.isfinite(x) & np.isfinite(z)
+    power = float(x[known] @ x[known])
+    if power == 0.0:
+        return None
+    told = float(x[known] @ z[known]) / power
+    rest = float(np.sqrt(np.mean((z - told * x)[known] ** 2)))
+    error = max(noise, rest) * np.sqrt(_ALIKE_BLOCKS / power)
+    if error > _MOST_ERROR or not _LIES[0] < told < _LIES[1] or abs(told - _MIDDLE) < _SURE * error:
+        return None
+    return told > _MIDDLE
+
+
+def _fitted(apart: Array, yaw: Array, sound: NDArray[np.bool_]) -> tuple[float, float, float] | None:
+    """Yaw rate by the difference of the sides: gain, offset and usual misfit [rad/s]; None where the one does not make the other."""
+    if np.count_nonzero(sound) < _LEAST_BLOCKS:
+        return None
+    columns, kept = np.column_stack([apart, np.ones(apart.size)]), sound.copy()
+    weights: Array = np.zeros(2)
+    for _ in range(5):
+        weights = np.asarray(np.linalg.lstsq(columns[kept], yaw[kept], rcond=None)[0], dtype=np.float64)
+        off = np.abs(yaw - columns @ weights)
+        kept = sound & (off <= np.quantile(off[sound], 0.8))
+    noise = 1.48 * float(np.median(off[sound]))
+    if noise > _FITS * float(np.std(weights[0] * apart[sound])):
+        return None
+    return float(weights[0]), float(weights[1]), noise
