@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Literal
 
 from diagnosis.api.errors import stated
 from diagnosis.api.inputs import StrPath, path_of
+from replay.arrays.processors import processors
 from replay.errors import ConfigError, LogError
 
 if TYPE_CHECKING:
@@ -103,13 +104,6 @@ class AuditRequest:
             self.output, self.machine, self.machine_id or "", limits, self.retries, self.resume, self.max_size_mb
         )
         return replace(missions, notes=(*missions.notes, *machine_notes(missions.missions, asked))), asked
-
-
-def processors() -> int:
-    """Processors that this process may use."""
-    import os
-
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 @dataclass(frozen=True)
