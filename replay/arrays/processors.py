@@ -8,7 +8,8 @@ from concurrent.futures import ThreadPoolExecutor
 from contextvars import copy_context
 from typing import TypeVar
 
-_T, _R = TypeVar("_T"), TypeVar("_R")
+_T = TypeVar("_T")
+_R = TypeVar("_R")
 
 _LONGEST = (
     1_000_000  # rows of a mission; of a longer one, columns of several parts at once would take the memory of them all
