@@ -55,9 +55,13 @@ def each(
             out.append(function(item))
         return out
     with ThreadPoolExecutor(count) as pool:
-        jobs = []
-        for item in given:
-            begun(item)
-            # in the caller's context: what NumPy is to ignore is part of it
-            jobs.append(pool.submit(copy_context().run, function, item))
-        return [job.result() for job in jobs]
+        try:
+            jobs = []
+            for item in given:
+                begun(item)
+                # in the caller's context: what NumPy is to ignore is part of it
+                jobs.append(pool.submit(copy_context().run, function, item))
+            return [job.result() for job in jobs]
+        except BaseException:  # an interrupt waits for what has begun alone
+            pool.shutdown(wait=False, cancel_futures=True)
+            raise

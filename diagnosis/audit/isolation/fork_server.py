@@ -25,7 +25,6 @@ from diagnosis.audit.isolation import child
 from diagnosis.audit.isolation.child import Work
 from diagnosis.audit.isolation.limits import Limits, follow, held_mb
 from diagnosis.audit.store.folders import swept_folder
-from replay.arrays.processors import use_one
 
 POLL_S = 0.05
 TERMINATED = 128 + signal.SIGTERM
@@ -191,7 +190,6 @@ def main(descriptor: int, parent: int, *, warmed: bool) -> None:
     follow(signal.SIGTERM)  # while it does not listen to its socket
     if os.getppid() != parent:
         os._exit(1)
-    use_one()  # an audit works on as many missions at once as there are processors
     importlib.import_module("diagnosis.pipeline")
     importlib.import_module("diagnosis.output")
     importlib.import_module("replay.readers.registry").load_readers()

@@ -58,6 +58,26 @@ def test_a_process_among_others_uses_one_processor(monkeypatch: pytest.MonkeyPat
 
 
 @pytest.mark.usefixtures("two")
+def test_after_an_error_nothing_more_is_begun() -> None:
+    done: list[int] = []
+    gate = threading.Event()
+
+    def work(item: int) -> None:
+        if item == 0:
+            gate.wait(timeout=10)  # until the other processor's part has failed
+            raise ValueError(item)
+        if item == 1:
+            gate.set()
+            raise KeyError(item)
+        threading.Event().wait(0.05)
+        done.append(item)
+
+    with pytest.raises(ValueError, match="0"):
+        each(work, range(100), rows=10)
+    assert len(done) < 90
+
+
+@pytest.mark.usefixtures("two")
 def test_the_first_error_is_raised_and_what_numpy_ignores_holds() -> None:
     def divided(by: float) -> float:
         if by < 0:
