@@ -8,7 +8,7 @@ RUN python -m venv /opt/mfhca
 # What the tool needs, at the locked versions; this layer stays while the lock does
 COPY requirements.lock ./
 RUN /opt/mfhca/bin/pip install --require-hashes -r requirements.lock
-COPY pyproject.toml README.md LICENSE CHANGELOG.md ./
+COPY pyproject.toml hatch_build.py README.md LICENSE CHANGELOG.md ./
 COPY replay replay
 COPY diagnosis diagnosis
 COPY cli cli

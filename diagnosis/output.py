@@ -22,6 +22,7 @@ from diagnosis.results.restored import KEY, Layout, restored, sources_of
 from diagnosis.results.result import Closeups, MissionResult
 from diagnosis.results.stored import grid_of, grids_of, stored
 from diagnosis.results.validation import report_of
+from replay.arrays.processors import each
 from replay.atomic_write import atomic_path, atomic_paths, made_folder
 from replay.border import bordered
 from replay.errors import LogError, OutputError
@@ -64,11 +65,17 @@ def write_result(result: MissionResult, folder: Path, *, max_size_mb: float = 8.
     paths = tuple(folder / name for name in (HTML, JSON, PARQUET, *([] if windows is None else [WINDOWS])))
     report: ReportDocument = writable(result.report)
     with _made(folder), atomic_paths(*paths) as (html, document, table, *more):
-        _write_table(columns, table, layout)
-        for path in more:
-            _write_table({"step": windows.step, **windows.columns} if windows else {}, path, near_layout)
-        document.write_bytes(_json(report))
-        _write_text(build_page(report, columns, closeups=windows, max_size_mb=max_size_mb), html)
+
+        def tables() -> None:
+            _write_table(columns, table, layout)
+            for path in more:
+                _write_table({"step": windows.step, **windows.columns} if windows else {}, path, near_layout)
+
+        def texts() -> None:
+            document.write_bytes(_json(report))
+            _write_text(build_page(report, columns, closeups=windows, max_size_mb=max_size_mb), html)
+
+        each(lambda write: write(), (tables, texts), rows=len(columns["t"]) if "t" in columns else 0)
     if windows is None:
         (folder / WINDOWS).unlink(missing_ok=True)
     return paths

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from replay.arrays.processors import processors
 from replay.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -94,10 +95,3 @@ class AuditRequest:
             self.output, self.machine, self.machine_id or "", limits, self.retries, self.resume, self.max_size_mb
         )
         return replace(missions, notes=(*missions.notes, *machine_notes(missions.missions, asked))), asked
-
-
-def processors() -> int:
-    """Processors that this process may use."""
-    import os
-
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

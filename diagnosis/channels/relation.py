@@ -100,7 +100,7 @@ def _followed(x: Array, play: float, lag: float, dt: float) -> Array:
     return out
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _follow(x, known, half, keep, out):  # type: ignore[no-untyped-def]
     """Play of ± half, then a lag that keeps a share of the last value; held where x is not known."""
     first = 0
@@ -229,7 +229,7 @@ def _misfit(places: _Places, relation: Relation, dt: float, scale: float) -> flo
     return float(_loss(followed, places.at, places.y, whole, part if part >= 1e-9 else 0.0, relation.gain, scale))
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", nogil=True)
 def _loss(x, at, y, whole, part, gain, scale):  # type: ignore[no-untyped-def]
     """Mean ln(1 + (misfit/scale)²) over the places where x is known, by logarithms of products."""
     total, product, known = 0.0, 1.0, 0

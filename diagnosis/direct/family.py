@@ -19,6 +19,7 @@ from diagnosis.evidence import ACTUATOR, SENSOR, Array, Contribution, Flags, Mis
 from diagnosis.results.assessment import Assessment, unassessed
 from diagnosis.results.vocabulary import Tier
 from replay.arrays.numeric import without_nan
+from replay.arrays.processors import each
 from replay.faults import Side, State
 from replay.machine.config import Limits
 from replay.progress import Progress, Stage
@@ -50,8 +51,8 @@ class DirectEvidence:
                     parts[wheel, ACTUATOR] = unassessed(mission.timeline.size, State.NOT_ASSESSED, why)
         limits = mission.machine.limits
         identified = _identified(pairs, limits, mission)
-        for part, found in identified.items():
-            parts[part] = assess_identified(found, limits)
+        judged = each(lambda found: assess_identified(found, limits), identified.values(), mission.timeline.size)
+        parts |= dict(zip(identified, judged, strict=True))
         sensors = {wheel: found for (wheel, side), found in identified.items() if side == SENSOR}
         told = without_low_speed_habit(sensors, {wheel: parts[wheel, SENSOR] for wheel in sensors})
         return Contribution({**parts, **{(wheel, SENSOR): a for wheel, a in told.items()}})
@@ -59,10 +60,13 @@ class DirectEvidence:
 
 def _identified(pairs: dict[Part, Pair], limits: Limits, mission: MissionView) -> dict[Part, IdentifiedPair]:
     """Pairs with what is identified of them; noise that those of one kind do not have is none of a healthy channel."""
-    found = {}
-    for part, pair in pairs.items():
+
+    def begun(part: Part) -> None:
         mission.progress(Progress(Stage.JUDGING_WHEEL, part[0]))
-        found[part] = identify(pair, limits)
+
+    found = dict(
+        zip(pairs, each(lambda part: identify(pairs[part], limits), pairs, mission.timeline.size, begun), strict=True)
+    )
     for side in (SENSOR, ACTUATOR):
         kind = {part: one for part, one in found.items() if part[1] == side}
         usual = usual_of_kind([one.own for one in kind.values()])

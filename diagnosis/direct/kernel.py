@@ -11,7 +11,7 @@ _SIGMAS = 3.0
 _SAME = 0.6
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def consistent_blocks(samples, noise, block, out):  # type: ignore[no-untyped-def]
     """Whether each block's residual is as white noise is: mean, share of x, power, and values that change."""
     y, x, status, _, white, _, _ = samples
@@ -43,7 +43,7 @@ def consistent_blocks(samples, noise, block, out):  # type: ignore[no-untyped-de
         )
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def healthy_likelihoods(samples, bank, decay, out):  # type: ignore[no-untyped-def]
     """Log-likelihood of each sample under y = x + b + n, b an AR(1) of the tolerance's power; none where decay is 0."""
     b, c = 0.0, bank.mismatch_r if decay > 0.0 else 0.0
@@ -61,7 +61,7 @@ def healthy_likelihoods(samples, bank, decay, out):  # type: ignore[no-untyped-d
         out[k] = max(-0.5 * (e * e / s + np.log(2 * np.pi * s)), bank.floor)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def drifting_likelihoods(samples, bank, delta, walk, power, out):  # type: ignore[no-untyped-def]
     """Log-likelihood of each sample under y = δ·x + δ̄ + n with δ known and δ̄ a random walk."""
     b, c = 0.0, (0.3 * bank.span) ** 2

@@ -196,7 +196,7 @@ def likelihoods(k, samples, bank, mean, cov, out):  # type: ignore[no-untyped-de
                 out[m] = min(out[m], most)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _scan_evidence(samples, bank, state):  # type: ignore[no-untyped-def]
     """Add up the log-likelihoods of all samples in `state.score`."""
     status = samples.status

@@ -69,7 +69,7 @@ def _enter_from_best(k, best, bank, state, back):  # type: ignore[no-untyped-def
             enter(m, bank, state.mean, state.cov)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _scan_modes(samples, bank, state, out):  # type: ignore[no-untyped-def]
     """Viterbi over the models; writes back-pointers (n, models) and softmax of scores by row (n, rows)."""
     status = samples.status

@@ -29,6 +29,7 @@ from diagnosis.steering.prior import plant_before
 from diagnosis.steering.reliability import commanded, paired, weighed
 from diagnosis.steering.states import REASONS, states_of
 from diagnosis.steering.together import not_together
+from replay.arrays.processors import each
 from replay.control.loop import Replay
 from replay.faults import Side, State
 from replay.machine.config import Machine
@@ -106,12 +107,18 @@ def assess_steering(
             if a.blocks is not None and (plant := plants.get(a.name)) is not None
         ]
     )
-    told: dict[str, _Found] = {}
-    for inputs in axles:
+
+    def begun(inputs: AxleInputs) -> None:
         progress(Progress(Stage.JUDGING_STEERING, inputs.name))
+
+    def found(inputs: AxleInputs) -> _Found | None:
         plant = plants.get(inputs.name)
-        if inputs.blocks is not None and plant is not None:
-            told[inputs.name] = _found(inputs, inputs.blocks, plant, machine, otherwise=otherwise)
+        if inputs.blocks is None or plant is None:
+            return None
+        return _found(inputs, inputs.blocks, plant, machine, otherwise=otherwise)
+
+    judged_axles = zip(axles, each(found, axles, timeline.size, begun), strict=True)
+    told = {inputs.name: one for inputs, one in judged_axles if one is not None}
     once = {a.name: told[a.name] for a in axles if a.name in told and not a.redundant}
     length = max((one.axle.blocks.length for one in once.values()), default=1)
     alone = not_together({name: one.sides for name, one in once.items()}, length, timeline.dt)

@@ -86,7 +86,7 @@ def _redundant_block(k: int, seen: Redundancy) -> RedundantBlock:
     )
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", nogil=True)
 def scan(
     series: BlockSeries,
     allowed: NDArray[np.bool_],
@@ -129,7 +129,7 @@ def scan(
             score[m] -= top
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", nogil=True)
 def follow(series: BlockSeries, constants: FilterConstants, states: FilterBank, path: SteeringPath) -> None:
     """Run only the model that `path` names in each block; writes its mean, covariance and noise after each block.
 
@@ -175,7 +175,7 @@ def start(m: int, first: float, constants: FilterConstants, bank: FilterBank) ->
     enter(m, m, constants, bank)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", nogil=True)
 def path_evidence(
     series: BlockSeries,
     models: NDArray[np.uint8],

@@ -24,6 +24,7 @@ from diagnosis.audit.store.outcome import MissionState
 from diagnosis.audit.store.summary import MissionSummary, ResultFacts, summarise
 from diagnosis.results.json_text import dump_json
 from diagnosis.results.vocabulary import Verdict
+from replay.arrays.processors import use_one
 from replay.errors import ConfigError, LogError, NotJudged, OutputError
 from replay.machine.config import Machine
 from replay.readers.common.room import FULL
@@ -220,6 +221,7 @@ def run(work: Work, limits: Limits, parent: int) -> None:
         faulthandler.enable(sys.stderr)
         os.environ["TMPDIR"] = tempfile.tempdir = work.temporary
         hold(limits)
+        use_one()  # an audit has as many missions at once as there are processors
         leave(work, attempt(work))
         code = 0
     except MemoryError:

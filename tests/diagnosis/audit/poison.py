@@ -8,11 +8,13 @@ import mmap
 import os
 import signal
 import tempfile
+import threading
 import time
 from pathlib import Path
 from typing import Any
 
 from diagnosis.audit.isolation.child import REPORT, Work
+from replay.arrays.processors import each
 from replay.errors import LogError, NotJudged, OutputError
 
 
@@ -33,6 +35,11 @@ def judge(work: Work) -> dict[str, Any]:
 
 def _damaged(work: Work) -> dict[str, Any]:
     return {"state": "degraded", "reason": "12 bytes are missing", "summary": None}
+
+
+def _parts(work: Work) -> dict[str, Any]:
+    threads = set(each(lambda _: threading.get_ident(), range(8), rows=1))
+    return {"state": "degraded", "reason": f"{len(threads)} thread", "summary": None}
 
 
 def _kill(work: Work) -> None:

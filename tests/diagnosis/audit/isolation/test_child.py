@@ -74,6 +74,12 @@ def test_a_fresh_interpreter_gives_the_same_ends(told: str, state: str, reason: 
     assert reason in outcome.reason
 
 
+@pytest.mark.parametrize("fresh", [False, True])
+def test_a_mission_of_an_audit_is_worked_on_part_by_part(forks: Isolation, tmp_path: Path, fresh: bool) -> None:
+    outcome = run_isolated(work_of("parts", tmp_path), LIMITS, Spawner() if fresh else forks)
+    assert (outcome.state, outcome.reason) == ("degraded", "1 thread")
+
+
 def test_processor_time_is_limited(forks: Isolation, tmp_path: Path) -> None:
     outcome = run_isolated(work_of("spin", tmp_path), Limits(150, 5.0, 1.0), forks)
     assert (outcome.state, outcome.reason) == ("timeout", "took more than 1 s of a processor; allow more with --cpu")

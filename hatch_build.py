@@ -1,0 +1,44 @@
+"""Installing the checkout itself (`pip install -e .`) compiles the numerical kernels, so that the first diagnosis need not.
+
+numba keeps what it compiled beside the sources, for this machine's kind of processor; a wheel has none of it, since it
+goes to other machines. Where the tool's own packages are not installed yet, the first diagnosis compiles as before.
+"""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+from hatchling.builders.hooks.plugin.interface import BuildHookInterface
+
+_LIMIT_S = 600
+
+
+class KernelHook(BuildHookInterface[Any]):
+    """Diagnoses the sample log once an editable wheel is made."""
+
+    PLUGIN_NAME = "custom"
+
+    def finalize(self, version: str, build_data: dict[str, Any], artifact_path: str) -> None:
+        """Compile; what goes wrong here costs time in the first diagnosis and nothing else."""
+        samples = Path(self.root, "sample_logs")
+        log, machine = samples / "three_faults.mcap", samples / "haulotte.toml"
+        if version != "editable" or not log.exists():
+            return
+        self.app.display_info("compiling the numerical kernels, about half a minute")
+        with TemporaryDirectory() as folder:
+            command = ["-q", "diagnose", str(log), "-m", str(machine), "-o", folder, "--fail-on", "never"]
+            try:
+                subprocess.run(
+                    [sys.executable, "-m", "cli.main", *command],
+                    cwd=self.root,
+                    stdin=subprocess.DEVNULL,
+                    capture_output=True,
+                    timeout=_LIMIT_S,
+                    check=True,
+                )
+            except (OSError, subprocess.SubprocessError):
+                self.app.display_info("not compiled now; the first diagnosis does it")

@@ -1,0 +1,70 @@
+"""What an installation of the checkout does beyond copying: it compiles the kernels, and never fails for it."""
+
+from __future__ import annotations
+
+import importlib.util
+import subprocess
+import sys
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+
+
+@pytest.fixture
+def hook_module() -> ModuleType:
+    spec = importlib.util.spec_from_file_location("hatch_build", ROOT / "hatch_build.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+class _Told:
+    def __init__(self) -> None:
+        self.lines: list[str] = []
+
+    def display_info(self, line: str) -> None:
+        self.lines.append(line)
+
+
+def _finish(module: ModuleType, root: Path, version: str) -> list[str]:
+    told = _Told()
+    module.KernelHook(str(root), {}, None, None, "", "wheel", told).finalize(version, {}, "")
+    return told.lines
+
+
+def test_an_editable_installation_runs_the_first_diagnosis(
+    hook_module: ModuleType, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    runs: list[tuple[list[str], dict[str, Any]]] = []
+    monkeypatch.setattr(subprocess, "run", lambda command, **options: runs.append((command, options)))
+    told = _finish(hook_module, ROOT, "editable")
+    ((command, options),) = runs
+    assert command[:3] == [sys.executable, "-m", "cli.main"]
+    assert str(ROOT / "sample_logs" / "three_faults.mcap") in command
+    assert options["cwd"] == str(ROOT)
+    assert len(told) == 1
+
+
+def test_wheels_for_others_compile_nothing(hook_module: ModuleType, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(subprocess, "run", lambda *_, **__: pytest.fail("compiled"))
+    assert _finish(hook_module, ROOT, "standard") == []
+
+
+def test_a_source_without_sample_logs_compiles_nothing(hook_module: ModuleType, tmp_path: Path) -> None:
+    assert _finish(hook_module, tmp_path, "editable") == []
+
+
+def test_an_installation_without_the_packages_says_so_and_ends_well(
+    hook_module: ModuleType, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fails(command: list[str], **_: object) -> None:
+        raise subprocess.CalledProcessError(1, command)
+
+    monkeypatch.setattr(subprocess, "run", fails)
+    assert _finish(hook_module, ROOT, "editable")[-1] == "not compiled now; the first diagnosis does it"
