@@ -101,7 +101,8 @@ def _by_motion(
     geometry, yaw, by_body = body
     far = [o for o in wheels if o != w and not same_side(w, o, geometry)]
     own = blocks[w]
-    if yaw is not None and far and (geometry is not None or len(far) == 1):
+    turned = len(far) == 1 if geometry is None else all(p.axle == "fixed" for p in geometry.wheels.values())
+    if yaw is not None and far and turned:  # by its wheels, not by steering
         speed = _turned(own.mean, np.asarray(np.mean([blocks[o].mean for o in far], axis=0)), yaw)
         if speed is not None:
             compared = " and ".join(wheels[o] for o in far)

@@ -25,6 +25,7 @@ from replay.machine.geometry import Geometry
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
+_LEAST_OUTSIDE, _MOST, _SHOWN = 40, 0.75, 0.08  # blocks; of them; of the top speed
 _ASTRAY, _ASTRAY_S, _NEAR_S = 0.2, 1.0, 10.0  # of the top speed: all drives that far off, for so long, around a finding
 _MOVES = 0.05  # of the top speed
 _BODY_COMMANDS = 2  # speed and yaw rate
@@ -144,9 +145,20 @@ def unanswered(
         if np.count_nonzero(all_off[max(0, start - reach) : stop + reach]) * block_s >= _ASTRAY_S:
             continue
         much = float(np.sum(off[start:stop][there[start:stop]])) * block_s / top
-        if (stop - start) * block_s >= _LEAST_S and np.mean(there[start:stop]) > 0.5 and much > least:
+        long = (stop - start) * block_s >= _LEAST_S and np.mean(there[start:stop]) > 0.5 and much > least
+        if long and _proven(one, beside / top, slice(max(0, start - reach // 2), stop + reach // 2)):
             found.append(_finding(one, blocks, view, (start, stop), much, block_s))
     return found
+
+
+def _proven(one: Judged, apart: Array, around: slice) -> bool:
+    """Whether the motion of the body shows the wheel's speed at other times, too: else it was found in the fault itself.
+
+    `apart`, shape (b,), is the distance between the two by the top speed; `around` are the blocks of the fault and near it.
+    """
+    outside = one.driving & np.isfinite(apart)
+    outside[around] = False
+    return bool(np.count_nonzero(outside) >= _LEAST_OUTSIDE and np.quantile(apart[outside], _MOST) < _SHOWN)
 
 
 def _off(blocks: Blocks) -> Array:
