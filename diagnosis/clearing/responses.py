@@ -17,6 +17,9 @@ MOVING = 0.08  # m/s, for a machine of .36 m/s
 _LEAST_CELLS = 0.5  # of a window
 _LEAST_WINDOWS, _PART = 8, 0.2  # before and after a change, at least
 _ALIKE = 0.5  # of the limit: where half of the wheels deviate by more, openings tell little of speeds
+_SURELY = (
+    0.8  # likewise: on tuning machines openings explain 0.91 and more of a healthy valve's speed, torques 0.69 and less
+)
 _FOLLOWS = 0.45  # of the power of a speed: openings explain 0.56 and more on tuning machines, torques 0.31 and less
 _CHANGED = 0.88  # a change counts by its limit in windows, not over the mission
 #: A deviation counts from so many times the largest of the other wheels' on, a change likewise, and from this [ln]: tyres hide most of a valve's loss.
@@ -198,6 +201,11 @@ def _largest(windows: Array) -> Array:
 
 def speeds_follow_openings(cells: Cells) -> bool:
     """Whether any wheel's speed is a multiple of its opening, as a valve's is and a torque's is not."""
+    return _explained(cells) > _FOLLOWS
+
+
+def _explained(cells: Cells) -> float:
+    """Share of the power of a wheel's speed that its opening explains, of the wheel of which it explains most [1]."""
     speed, command, opening = (cells.wheels(leaf) for leaf in ("v", "u", "u_applied"))
     used = lowest_passed(np.where(np.isfinite(opening), opening, command), cells.dt, _LAG_S)
     explained = []
@@ -206,16 +214,19 @@ def speeds_follow_openings(cells: Cells) -> bool:
         v, u = v[moves], u[moves]
         power = float(u @ u) * float(v @ v)
         explained.append(float(u @ v) ** 2 / power if power > 0.0 else 1.0)
-    return max(explained, default=1.0) > _FOLLOWS
+    return max(explained, default=1.0)
 
 
 def openings_tell(cells: Cells, responses: Responses) -> bool:
-    """Whether an opening is a speed: speeds follow openings, and most wheels' stay near what is usual, as torques do not."""
+    """Whether an opening is a speed: it explains nearly all of it, or enough while most wheels stay near what is usual."""
+    explained = _explained(cells)
+    if explained > _SURELY:  # several faulty wheels make no torque of the openings
+        return True
     limit = usual_limits((True, True), cells.machine.limits.clear_at).below
     largest = _largest(np.abs(responses.windows))
     known = np.sort(largest[np.isfinite(largest)])
     alike = not known.size or known[(known.size - 1) // 2] <= _ALIKE * limit
-    return bool(alike and speeds_follow_openings(cells))
+    return bool(alike and explained > _FOLLOWS)
 
 
 def others_at(x: Array) -> Array:

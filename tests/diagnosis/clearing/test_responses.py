@@ -44,9 +44,13 @@ def test_where_all_deviate_alike_the_limit_stays() -> None:
     assert response_limits(responses(0.17, 0.02), [ONCE] * 2, CLEAR_AT) == [usual_limits(ONCE, CLEAR_AT)] * 2
 
 
-def test_openings_tell_no_speeds_where_most_wheels_stray() -> None:
-    speed = np.linspace(0.1, 0.3, 200)[:, np.newaxis] * np.ones(4)
-    columns = {"v": speed, "u": speed, "u_applied": speed}
+@pytest.mark.parametrize("torque", [False, True])
+def test_openings_tell_no_speeds_where_they_explain_little_and_most_wheels_stray(*, torque: bool) -> None:
+    speed = np.linspace(0.1, 0.3, 200)
+    opening = np.where(np.arange(200) % 40 < 20, 1.0, 0.2) if torque else speed
+    columns = {
+        leaf: x[:, np.newaxis] * np.ones(4) for leaf, x in (("v", speed), ("u", opening), ("u_applied", opening))
+    }
     of: Any = SimpleNamespace(
         dt=0.1,
         frame=Frame(200, 30, 5),
@@ -54,7 +58,7 @@ def test_openings_tell_no_speeds_where_most_wheels_stray() -> None:
         wheels=lambda leaf: columns[leaf],
     )
     assert openings_tell(of, responses(0.9, 0.05, 0.05, 0.05))
-    assert not openings_tell(of, responses(0.9, 0.6, 0.5, 0.05))
+    assert openings_tell(of, responses(0.9, 0.6, 0.5, 0.5)) is not torque
 
 
 def test_what_both_axles_do_at_once_is_of_neither() -> None:
