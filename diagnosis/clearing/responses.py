@@ -17,10 +17,9 @@ MOVING = 0.08  # m/s, for a machine of .36 m/s
 _LEAST_CELLS = 0.5  # of a window
 _LEAST_WINDOWS, _PART = 8, 0.2  # before and after a change, at least
 _ALIKE = 0.5  # of the limit: where half of the wheels deviate by more, openings tell little of speeds
-_SURELY = (
-    0.8  # likewise: on tuning machines openings explain 0.91 and more of a healthy valve's speed, torques 0.69 and less
-)
-_FOLLOWS = 0.45  # of the power of a speed: openings explain 0.56 and more on tuning machines, torques 0.31 and less
+#: Of the power of a speed, what its opening explains: on tuning machines 0.91 and more of a healthy valve's and 0.69 and less of a
+#: torque's, and 0.56 and more of valves with wide dead bands.
+_SURELY, _FOLLOWS = 0.8, 0.45
 _CHANGED = 0.88  # a change counts by its limit in windows, not over the mission
 #: A deviation counts from so many times the largest of the other wheels' on, a change likewise, and from this [ln]: tyres hide most of a valve's loss.
 _ALONE, _CHANGED_ALONE, _LEAST = 3.0, 2.2, 0.1
