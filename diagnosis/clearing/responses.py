@@ -171,9 +171,9 @@ def usual_limits(twice: tuple[bool, bool], clear_at: float) -> Limits:
 
 
 def response_limits(responses: Responses, twice: Sequence[tuple[bool, bool]], clear_at: float) -> list[Limits]:
-    """Limits of every wheel: those of windows and of changes are lower where the other wheels deviate by much less.
+    """Limits of every wheel [ln]: those of windows and of changes are lower where the other wheels deviate by much less.
 
-    Arguments as of `usual_limits`.
+    Not of one whose sides are both measured twice: what is left to be seen of it is its load. Arguments as of `usual_limits`.
     """
 
     def alone(values: Sequence[float | None], i: int, limit: float, times: float = _ALONE) -> float:
@@ -183,7 +183,9 @@ def response_limits(responses: Responses, twice: Sequence[tuple[bool, bool]], cl
     largest = [[float(x) for x in _largest(sign * responses.windows)] for sign in (-1.0, 1.0)]
     usual = [usual_limits(both, clear_at) for both in twice]
     return [
-        limit._replace(
+        limit
+        if all(twice[i])
+        else limit._replace(
             below=alone(largest[0], i, limit.below),
             above=alone(largest[1], i, limit.above),
             changed=alone(responses.changes, i, limit.changed, _CHANGED_ALONE),

@@ -44,7 +44,10 @@ class Turning(NamedTuple):
 
 
 def turning_of(judged: Mapping[str, Judged], geometry: Geometry | None, yaw: Array | None) -> Turning | None:
-    """The body as it is turned by its wheels; None where no yaw rate is known, or a side has no wheel."""
+    """The body as it is turned by its wheels; None where no yaw rate is known, or a side has no wheel.
+
+    `yaw` of shape (blocks,) [rad/s].
+    """
     if yaw is None or geometry is None:
         return None
     fixed = {w: p for w in judged if (p := geometry.wheels.get(w)) is not None and p.axle == "fixed" and p.y != 0.0}

@@ -38,6 +38,11 @@ def test_a_wheel_that_deviates_alone_is_held_to_a_lower_limit() -> None:
     assert second.below == usual.below  # another wheel deviates by far more
 
 
+def test_a_wheel_that_is_measured_twice_on_both_sides_keeps_its_limit() -> None:
+    of = responses(0.3, 0.02, 0.03, 0.03, changes=(0.3, 0.02, 0.01, None))
+    assert response_limits(of, [TWICE] * 4, CLEAR_AT) == [usual_limits(TWICE, CLEAR_AT)] * 4
+
+
 def test_where_all_deviate_alike_the_limit_stays() -> None:
     limits = response_limits(responses(0.17, 0.15, 0.16, 0.14, changes=(0.1, 0.1, 0.1, 0.1)), [ONCE] * 4, CLEAR_AT)
     assert limits == [usual_limits(ONCE, CLEAR_AT)] * 4
