@@ -34,7 +34,8 @@ _FLIPS = 25  # samples in a row on one side of a command that switches to and fr
 def timing_explains(found: IdentifiedPair, run: Run, mode: FaultMode) -> bool:
     """Whether a deviation may be nothing but a delay between y and its reference, or its rounding.
 
-    Shorter than a spool sensor's delay; or an overshoot that settles; or, where a log is too slow for its commands: what changes from sample to
+    Shorter than a spool sensor's delay; or an overshoot that settles; or noise of an opening that is no more than its command
+    changes by from reading to reading; or, where a log is too slow for its commands: what changes from sample to
     sample is as large, or y is x with its sign at other moments, or a constant y is as far off as a healthy one may be. For a
     speed: shorter than half a second and no more than 10 ms, or one and a half samples, of the reference's slope, or as short near rest, or a reading that rests beside a
     reference that hardly moves, no longer than its noise allows. Whatever the rate, the answer to a command of which
@@ -55,6 +56,8 @@ def timing_explains(found: IdentifiedPair, run: Run, mode: FaultMode) -> bool:
             return _rests_by_chance(found, run, deviation) or _held_by_habit(found, run)
         return mode.varying and seconds < _BRIEF_S and deviation < moves
     if seconds <= _SPOOL_DELAY_S or (mode.varying and _settles(found, run)):
+        return True
+    if mode.varying and deviation <= _changes(found, run):
         return True
     jumps = _sudden(found, pair.x, run)
     if not mode.total and deviation < 2 * jumps and jumps > _JUMPY * float(np.sqrt(np.nanmean(ref**2))):
@@ -100,6 +103,12 @@ def _readings(found: IdentifiedPair, run: Run) -> NDArray[np.intp]:
     if isinstance(at, slice):
         return np.arange(run.start, run.stop)
     return at[np.searchsorted(at, run.start) : np.searchsorted(at, run.stop)]
+
+
+def _changes(found: IdentifiedPair, run: Run) -> float:
+    """Root mean square of what the command changes by from reading to reading in a run: as far off is one read a reading late."""
+    values = found.pair.x[_readings(found, run)]
+    return float(np.sqrt(np.nanmean(np.diff(values) ** 2))) if np.isfinite(np.diff(values)).any() else 0.0
 
 
 def _sudden(found: IdentifiedPair, x: Array, run: Run) -> float:

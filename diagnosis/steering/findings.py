@@ -33,6 +33,7 @@ Span = tuple[int, int]
 _TEMPER = 0.35
 _MOST = 0.6  # of a mission: the longest fault of a valve
 _BRIEF_S = 0.9  # a shorter stretch is rather what the model leaves out
+_FEW_READINGS, _LAPSE_S = 3, 0.1  # readings that agree, seconds without any: no more may be chance, or a message lost
 _FRAGMENT_S = 2.0  # a row that holds for less beside another one is rather its end
 _BELIEVED_S = 4.0  # for how long before and after a motion that did not come a valve's fault is believed
 _LEAST_ASKED_S = 0.35  # for how long a motion must be asked for, to see that it does not come
@@ -243,8 +244,14 @@ def _may_be_stated(choice: _Choice, epsilon: Epsilon | None, run: _Run) -> bool:
     elsewhere = choice.stated not in (run.side, Side.SENSOR_OR_ACTUATOR)
     too_long = choice.side is Side.ACTUATOR and run.stop - run.start > _MOST * run.path.model.size
     small = choice.mode is FaultMode.INEFFICIENT and epsilon is not None and epsilon.value < limits.min_epsilon
-    flicker = run.seconds < _BRIEF_S and not choice.dead_sensor
+    flicker = _lapse(run) if choice.dead_sensor else run.seconds < _BRIEF_S
     return not (choice.probability < limits.min_probability or too_long or small or flicker or elsewhere)
+
+
+def _lapse(run: _Run) -> bool:
+    """Whether a sensor that seems dead may have lost no more than a message or two, or repeats a value by chance."""
+    count = level_of(run.start, run.stop, run.axle)[2]
+    return count < _FEW_READINGS if count else run.seconds < _LAPSE_S
 
 
 def _at_rest(run: _Run) -> bool:

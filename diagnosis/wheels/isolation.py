@@ -36,6 +36,7 @@ Array = NDArray[np.float64]
 _ODD_COST = 2.0  # by which an unusual load must explain more than the usual one
 _WEAK_GAIN = 0.35  # a sensor's gain below this hides what the valve does
 _LEAST_SIDE, _LEAST_ROW = 0.7, 0.5  # probabilities of a side and of its row from which on a finding is stated
+_DOUBTED = 0.88  # the most that a row may have which the wheel's Kalman model does not prefer to a healthy wheel
 _LEAST_OTHERS = 2  # of two wheels that differ, either may be the one whose speed is wrong
 _LEAST_PART = 0.02  # a hypothesis below this is left out of the text
 _LEAST_HYPOTHESIS = 5e-4
@@ -126,7 +127,7 @@ def judge(run: Run, y: Array, model: WheelFilterModel, limits: Limits, names: tu
     """
     known, seconds = y[np.isfinite(y)], (run.stop - run.start) * dt
     rests = not run.lives and (_rests(known, model, dt) or any(run.ahead(m) > 0 for m in TOTAL_SENSOR))
-    weighed = _weighed(run, known, model, rests=rests)
+    weighed = _doubted(run, _weighed(run, known, model, rests=rests))
     stated = _stated(weighed, apart=run.others >= _LEAST_OTHERS)
     if stated is None:
         return RunVerdict(None)
@@ -167,6 +168,19 @@ def _weighed(run: Run, y: Array, model: WheelFilterModel, *, rests: bool) -> _We
     ranked = sorted(pooled.items(), key=lambda item: -item[1])
     own = [(row, p) for row, p in ranked if row is not None and row[0] is run.side]
     return _Weighed(pooled, ranked, sum(p for _, p in own), own[0][0])
+
+
+def _doubted(run: Run, weighed: _Weighed) -> _Weighed:
+    """Rows by their probability where the wheel's own model does not prefer the row to a healthy wheel: two that differ are no claim.
+
+    A sensor that holds a value is seen by that value alone.
+    """
+    own = weighed.pooled[weighed.row]
+    if weighed.row == (Side.SENSOR, FaultMode.STUCK) or own <= _DOUBTED or run.ahead(_model_of(run, weighed.row)) > 0:
+        return weighed
+    pooled = weighed.pooled | {weighed.row: _DOUBTED, None: weighed.pooled.get(None, 0.0) + own - _DOUBTED}
+    ranked = sorted(pooled.items(), key=lambda item: -item[1])
+    return _Weighed(pooled, ranked, weighed.faulty - own + _DOUBTED, weighed.row)
 
 
 def _rests(y: Array, model: WheelFilterModel, dt: float) -> bool:
