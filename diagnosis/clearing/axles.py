@@ -22,7 +22,7 @@ _RATE_S = 8.0
 _STEERED = 0.01  # of full opening beyond the dead band: below it, an axle is not steered
 _LEAST_S = 0.5  # of a window, in which it is steered
 _WRONG_WAY = 5.0  # for an axle that turns against its opening
-_WIDEST = 0.06  # dead band of a healthy valve, of full opening
+_EDGE, _STEPS = 0.5, 14  # mean opening beyond a dead band, as a share of it; dead bands that are tried
 VALVE = 1.4  # dead band and hysteresis of a healthy valve: its limit, likewise
 #: Limits of the rate in windows and over the mission, as multiples of the loss that counts, by whether angle and opening are measured twice.
 RATE = {False: (2.0, 1.0), True: (3.0, 2.0)}
@@ -55,7 +55,10 @@ def axle_checks(cells: Cells, clear_at: float) -> Iterator[Checked]:
             brief, long = RATE[twice]
             off = _alone(rates.off, j) if twice else np.abs(rates.off[:, j])
             yield worst(cells, (*about, either, Check.RATE), off[place], brief * share)
-            yield lasts(cells, (*about, either, Check.LASTING_RATE), rates.apart[j], long * share)
+            if len(cells.machine.axles) > 1:
+                yield lasts(cells, (*about, either, Check.LASTING_RATE), rates.apart[j], long * share)
+            elif not twice:  # both sides of which are measured twice needs nothing to compare with
+                yield lasts(cells, (*about, either, Check.PLANT_RATE), rates.apart[j], long * share)
 
 
 def _alone(off: Array, j: int) -> Array:
@@ -131,7 +134,7 @@ class Rates(NamedTuple):
     whole : Array, shape (axles,)
         Over the mission; NaN where an axle is hardly steered.
     apart : list[float | None]
-        How far that is from the other axle's.
+        How far that is from the other axle's, or, of the only one, from what the machine file's [steering] lets expect.
     weight : Array, shape (cells, axles)
         Rate that counts in a window, 0 where none does [rad/s].
     """
@@ -143,11 +146,30 @@ class Rates(NamedTuple):
     weight: Array
 
 
+def dead_bands(rate: Array, opening: Array) -> Array:
+    """Opening of each axle that moves nothing [1], shape (axles,): of all up to `_OVERLAP` the one whose rates fit best.
+
+    A healthy valve's is like those of the other axles: what one needs more of is a fault's. Rates in rad/s and openings
+    of shape (cells, axles).
+    """
+    tried = np.linspace(0.0, _OVERLAP, _STEPS)
+    found = np.full(rate.shape[1], np.nan)
+    for j, (r, u) in enumerate(zip(rate.T, opening.T, strict=True)):
+        known = np.isfinite(r) & np.isfinite(u) & (u != 0.0)
+        ahead, beyond = r[known] * np.sign(u[known]), np.maximum(np.abs(u[known]) - tried[:, np.newaxis], 0.0)
+        power = (beyond**2).sum(axis=1)
+        if not power.all():
+            continue
+        left = np.abs(ahead - (beyond @ ahead / power)[:, np.newaxis] * beyond).sum(axis=1)
+        found[j] = tried[int(np.argmin(left))]
+    return np.nan_to_num(np.minimum(found, _ALIKE * np.nanmin(found))) if np.isfinite(found).any() else np.zeros(found.size)
+
+
 def rates_of(cells: Cells, rate: Array, opening: Array) -> Rates:
     """Steering rates per opening beyond what of it moves nothing, while no fault is stated; arrays (cells, axles)."""
-    dead = np.array([min(_longest_still(cells, j)[0], _WIDEST) for j in range(rate.shape[1])])
+    dead = dead_bands(rate, opening)
     frame = Frame(cells.size, max(1, round(_RATE_S / cells.dt)), cells.frame.hop)
-    beyond = np.maximum(np.abs(opening) - np.nan_to_num(dead), 0.0)
+    beyond = np.maximum(np.abs(opening) - dead, 0.0)
     told = np.zeros(rate.shape, dtype=np.bool_)
     for k, axle in enumerate(cells.machine.axles):
         told[:, k] = cells.told(axle) & ~cells.mostly_explained(axle)
@@ -155,12 +177,16 @@ def rates_of(cells: Cells, rate: Array, opening: Array) -> Rates:
     ahead = np.where(steered, rate * np.sign(opening), 0.0)
     opened = np.where(steered, beyond, 0.0)
     time = frame.sums(steered.astype(np.float64)) * cells.dt
+    # at the edge of a dead band, what of an opening moves something is not known
+    time = np.where(frame.sums(opened) * cells.dt >= _EDGE * dead * time, time, 0.0)
     with np.errstate(divide="ignore", invalid="ignore"):
         log = np.where(time >= _LEAST_S, np.log(np.maximum(frame.sums(ahead) / frame.sums(opened), 1e-3)), np.nan)
         whole = np.log(np.maximum(ahead.sum(axis=0) / opened.sum(axis=0), 1e-3))
     whole = np.where(steered.sum(axis=0) * cells.dt >= _FEW_S, whole, np.nan)
     off = log - np.array([float(np.nanmedian(x)) if np.isfinite(x).any() else np.nan for x in log.T])
     apart: list[float | None] = [None] * len(whole)
+    if len(apart) == 1:
+        apart[0] = _by_plant(cells, ahead[:, 0], np.where(steered, opening, 0.0)[:, 0])
     for j in np.flatnonzero(np.isfinite(whole) & (ahead.sum(axis=0) <= 0.0)):
         apart[j] = _WRONG_WAY
     for a, b in pairwise(range(len(whole))):
@@ -168,3 +194,19 @@ def rates_of(cells: Cells, rate: Array, opening: Array) -> Rates:
             between = float(abs(whole[a] - whole[b]))
             apart[a], apart[b] = max(apart[a] or 0.0, between), max(apart[b] or 0.0, between)
     return Rates(frame, off, whole, apart, ahead)
+
+
+def _by_plant(cells: Cells, ahead: Array, opening: Array) -> float | None:
+    """How far the rates of the only steered axle are off those that its plant gives at these openings, over the mission [ln].
+
+    None without a plant, or where it is hardly steered. Rates ahead [rad/s] and openings [1] of shape (cells,).
+    """
+    plant = cells.machine.steering.get(cells.machine.axles[0])
+    if plant is None or np.count_nonzero(opening) * cells.dt < _FEW_S:
+        return None
+    size, up = np.abs(opening), opening > 0.0
+    given = np.where(up, plant.slope_up, plant.slope_down) * np.maximum(size - np.where(up, plant.dead_up, plant.dead_down), 0.0)
+    for sign, most in ((up, plant.limit_up), (~up, plant.limit_down)):
+        given = np.where(sign & (given > most), most, given) if most is not None else given
+    expected = float(given[opening != 0.0].sum())
+    return abs(float(np.log(max(ahead.sum() / expected, 1e-3)))) if expected > 0.0 else None

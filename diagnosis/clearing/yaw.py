@@ -14,6 +14,7 @@ from diagnosis.results.clearing import Check, Checked
 from diagnosis.results.vocabulary import Kind
 from replay.faults import Side
 
+_FIXED = "fixed"  # axle of wheels that are not steered
 _STILL, _STILL_S = 0.01, 1.0  # m/s; at rest for this long, a gyro shows its bias
 _MOVING = 0.25  # of the top speed
 OFF, LASTING_OFF = 0.06, 0.04  # rad
@@ -23,7 +24,7 @@ ANSWERED = 0.7  # of an angle by which one axle alone is off: tyres give way sid
 
 
 def yaw_checks(cells: Cells) -> Iterator[Checked]:
-    """Checks of both steering axles together; none without a yaw rate, two steered axles, and some driving straight.
+    """Checks of both ends of a machine together; none without a yaw rate, two axles of which one is steered at least, and some driving straight.
 
     In turns tyres and the wheels' offsets make the angles an approximation.
     """
@@ -54,13 +55,18 @@ class _Off(NamedTuple):
 
 
 def _off_angles(cells: Cells) -> _Off | None:
-    """How far the machine is off where its angles point; NaN where it is too slow. None without yaw rate, or two angles."""
+    """How far the machine is off where its angles point; NaN where it is too slow. None without yaw rate, or an axle's angle."""
     geometry, axles = cells.machine.geometry, cells.machine.axles
     yaw = cells.means("imu.yaw_rate")
-    if geometry is None or len(axles) != 2 or not np.isfinite(yaw).any():
+    if geometry is None or not np.isfinite(yaw).any():
         return None
-    places = [float(np.mean([w.x for w in geometry.wheels.values() if w.axle == axle])) for axle in axles]
+    fixed = [_FIXED] if any(w.axle == _FIXED for w in geometry.wheels.values()) else []
+    if not axles or len(axles) + len(fixed) != 2:
+        return None
+    places = [float(np.mean([w.x for w in geometry.wheels.values() if w.axle == axle])) for axle in (*axles, *fixed)]
     length, angle, speeds = places[0] - places[1], cells.axles("phi"), cells.wheels("v")
+    if fixed:
+        angle = np.column_stack((angle, np.zeros(len(angle))))
     if abs(length) < _SHORTEST or not np.isfinite(angle).any(axis=0).all():
         return None
     known = np.asarray(np.isfinite(speeds).any(axis=1))

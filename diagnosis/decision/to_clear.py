@@ -182,6 +182,11 @@ def _act(check: Checked, twice: Collection[str]) -> str:
     words: MachineWords = check.words
     if check.check in _TURNED:
         return "set the axles straight, compare their angles with the marks on the machine, and drive ten seconds straight ahead"
+    if check.check is Check.PLANT_RATE and check.worst is None:
+        return (
+            "run `mfhca fit` on healthy missions, and diagnose with the file that it writes (-m), or log "
+            f"steer.{check.component}.phi_true and .u_applied (second measurements)"
+        )
     if check.check in _STEERED or check.kind == Kind.STEER:
         return "steer from stop to stop twice at standstill, and watch whether the axle follows"
     if check.check is Check.SECOND_MEASUREMENT and check.worst is not None:

@@ -27,6 +27,7 @@ class Check(StrEnum):
     STILL = "still"
     RATE = "rate"
     LASTING_RATE = "lasting_rate"
+    PLANT_RATE = "plant_rate"
     YAW = "yaw"
     LASTING_YAW = "lasting_yaw"
 
@@ -74,6 +75,10 @@ CHECK_WORDS: dict[Check, tuple[str, str]] = {
     Check.LASTING_RATE: (
         "steering rate per {unit_command} against the other axle, over the mission",
         "the steering rate of the {part} axle per {unit_command} is off the other axle's by {value} % over the mission",
+    ),
+    Check.PLANT_RATE: (
+        "steering rate per {unit_command} against that of the machine file's [steering], over the mission",
+        "the steering rate of the {part} axle per {unit_command} is off that of [steering] in the machine file by {value} % over the mission",
     ),
     Check.YAW: (
         "yaw rate against that by the steering angles, for 3 s",
