@@ -23,6 +23,7 @@ _PLACES = 6_000
 _STILL, _MOTION_S = 0.3, 0.02  # share of the chunks that moves least; time over which a reference moves
 _DELAY_S = 0.004
 _LAGS_S = (0.004, 0.008, 0.012, 0.018, 0.026, 0.036, 0.05, 0.07)
+_LONG_LAGS_S = (0.1, 0.14, 0.2, 0.28)  # of large pilot stages: tried where the longest of the others is best
 _PLAYS = (0.006, 0.012, 0.02, 0.03, 0.045, 0.065)  # of the span
 _BETTER = 0.03  # of the loss, by which a lag or play is believed
 _ROUNDS, _FINE = 5, (0.8, 0.9, 0.95, 1.05, 1.1, 1.25)
@@ -152,6 +153,9 @@ def relation_of(
         least = _misfit(places, best, dt, scale)
         plain = best
         found, misfit = _least(places, _trials(best, delays, span, dt), dt, scale)
+        if found.lag >= _LAGS_S[-1]:
+            longer = (found._replace(lag=lag, delay=delay) for lag in _LONG_LAGS_S for delay in {found.delay, 0.0})
+            found, misfit = min((found, misfit), _least(places, longer, dt, scale), key=lambda best: best[1])
         if misfit < least - _BETTER:
             best, least = found, misfit
         if best is plain:
@@ -176,7 +180,7 @@ def _trials(near: Relation, delays: tuple[int, int], span: float, dt: float) -> 
 def _near(best: Relation, delays: tuple[int, int], widest: float) -> Iterable[Relation]:
     lags, plays = [best.lag * f for f in _FINE], [best.play * f for f in _FINE]
     least = delays[0] if best.lag == 0.0 else max(delays[0], min(best.delay, -1.0))
-    yield from (best._replace(lag=lag) for lag in lags if lag > 0.0 and (widest == 0.0 or lag <= _LAGS_S[-1]))
+    yield from (best._replace(lag=lag) for lag in lags if lag > 0.0 and (widest == 0.0 or lag <= _LONG_LAGS_S[-1]))
     yield from (best._replace(play=play) for play in plays if 0.0 < play <= widest)
     yield from (
         best._replace(delay=best.delay + d) for d in (-1.0, -0.3, 0.3, 1.0) if least <= best.delay + d <= delays[1]

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from diagnosis.clearing.cells import Array, Cells, Frame
-from diagnosis.clearing.measure import as_followed, compared, lasts, worst
+from diagnosis.clearing.measure import compared, lasts, off_commands, worst
 from diagnosis.results.clearing import Check, Checked
 from diagnosis.results.vocabulary import Kind
 from replay.faults import Side
@@ -17,6 +17,7 @@ from replay.faults import Side
 FLOOR_RAD, OPENING = 0.06, 0.03  # deviations are shares of at least this angle and opening
 _STILL_S, _STILL, _ANSWERED = 1.0, 0.015, 0.06  # s, rad/s, and of full opening
 _OVERLAP, _ALIKE = 0.13, 1.4  # of full opening: healthy valves open by then; times what another axle needs
+_HYSTERESIS = 0.03  # of full opening: by as much a valve opens later than it closes
 _END, _REACHED = 0.97, 0.5  # of the largest angle: an end stop, where that is as much of the machine's
 _RATE_S = 8.0
 _STEERED = 0.01  # of full opening beyond the dead band: below it, an axle is not steered
@@ -34,7 +35,7 @@ def axle_checks(cells: Cells, clear_at: float) -> Iterator[Checked]:
     angle, second, command, opening = (cells.axles(leaf) for leaf in ("phi", "phi_true", "u", "u_applied"))
     either, share = Side.SENSOR_OR_ACTUATOR, -np.log1p(-clear_at)
     used = np.where(np.isfinite(opening), opening, command)
-    followed = as_followed(cells, opening, command, OPENING)
+    behind = off_commands(cells, opening, command, OPENING)
     rate = rate_of(angle, cells.dt)
     rates = rates_of(cells, rate, used)
     place = np.minimum(np.arange(cells.frame.starts.size), len(rates.off) - 1)
@@ -47,8 +48,7 @@ def axle_checks(cells: Cells, clear_at: float) -> Iterator[Checked]:
             off = compared(cells, angle[:, j], second[:, j], FLOOR_RAD).off
             yield worst(cells, (*about, Side.SENSOR, Check.SECOND_MEASUREMENT), off, clear_at)
         if np.isfinite(opening[:, j]).any() and np.isfinite(command[:, j]).any():
-            off = compared(cells, opening[:, j], followed[:, j], OPENING).off
-            yield worst(cells, (*about, Side.ACTUATOR, Check.SECOND_MEASUREMENT), off, VALVE * clear_at)
+            yield worst(cells, (*about, Side.ACTUATOR, Check.SECOND_MEASUREMENT), behind[:, j], VALVE * clear_at)
         if np.isfinite(command[:, j]).any():
             yield _still(cells, j, limit)
             twice = bool(np.isfinite(second[:, j]).any() and np.isfinite(opening[:, j]).any())
@@ -78,9 +78,17 @@ def rate_of(angle: Array, dt: float) -> Array:
 
 
 def answered(cells: Cells) -> float:
-    """Opening from which on an axle must move [1]: more where none does before, for valves overlap."""
+    """Opening from which on an axle must move [1]: more where none does before, for valves overlap and open later than they close.
+
+    What counts is the axle that needs least, by how long it stands still and by what the rates of all show of their overlap.
+    """
     need = [largest for j in range(len(cells.machine.axles)) if np.isfinite(largest := _longest_still(cells, j)[0])]
-    return min(max(_ANSWERED, _ALIKE * min(need)), _OVERLAP) if len(need) > 1 else _ANSWERED
+    opening = cells.axles("u_applied")
+    used = np.where(np.isfinite(opening), opening, cells.axles("u"))
+    dead = dead_bands(rate_of(cells.axles("phi"), cells.dt), used)
+    least = float(np.nanmin(np.where(np.isfinite(used).any(axis=0), dead, np.nan))) if np.isfinite(used).any() else 0.0
+    stands = _ALIKE * min(need) if len(need) > 1 else 0.0
+    return float(min(max(_ANSWERED, stands, _ALIKE * least + _HYSTERESIS), _OVERLAP))
 
 
 def _still(cells: Cells, j: int, limit: float) -> Checked:
@@ -162,7 +170,11 @@ def dead_bands(rate: Array, opening: Array) -> Array:
             continue
         left = np.abs(ahead - (beyond @ ahead / power)[:, np.newaxis] * beyond).sum(axis=1)
         found[j] = tried[int(np.argmin(left))]
-    return np.nan_to_num(np.minimum(found, _ALIKE * np.nanmin(found))) if np.isfinite(found).any() else np.zeros(found.size)
+    return (
+        np.nan_to_num(np.minimum(found, _ALIKE * np.nanmin(found)))
+        if np.isfinite(found).any()
+        else np.zeros(found.size)
+    )
 
 
 def rates_of(cells: Cells, rate: Array, opening: Array) -> Rates:
@@ -205,7 +217,9 @@ def _by_plant(cells: Cells, ahead: Array, opening: Array) -> float | None:
     if plant is None or np.count_nonzero(opening) * cells.dt < _FEW_S:
         return None
     size, up = np.abs(opening), opening > 0.0
-    given = np.where(up, plant.slope_up, plant.slope_down) * np.maximum(size - np.where(up, plant.dead_up, plant.dead_down), 0.0)
+    given = np.where(up, plant.slope_up, plant.slope_down) * np.maximum(
+        size - np.where(up, plant.dead_up, plant.dead_down), 0.0
+    )
     for sign, most in ((up, plant.limit_up), (~up, plant.limit_down)):
         given = np.where(sign & (given > most), most, given) if most is not None else given
     expected = float(given[opening != 0.0].sum())

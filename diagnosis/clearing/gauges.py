@@ -147,10 +147,12 @@ def _wheels(cells: Cells) -> Iterator[Gauges]:
             limit = limits[i]
             off = np.where(cells.explained(name), np.nan, responses.windows[:, i])
             usual, back = responses.usual[i], (~responses.ahead[:, i]).astype(np.intp)
-            rooms = _rooms(usual.ways, limit.lasting_below, limit.lasting_above)
-            ratio = Ratio(cells.frame, off, responses.weight[:, i], limit.below, limit.above, back, rooms)
+            # of a wheel that is measured twice on both sides, an excess is the ground's doing
+            above, lasting_above = (np.inf, np.inf) if twice and measured else (limit.above, limit.lasting_above)
+            rooms = _rooms(usual.ways, limit.lasting_below, lasting_above)
+            ratio = Ratio(cells.frame, off, responses.weight[:, i], limit.below, above, back, rooms)
             if usual.least is not None and usual.most is not None:
-                lasting = _lasting(limit.lasting_below + usual.least, limit.lasting_above - usual.most)
+                lasting = _lasting(limit.lasting_below + usual.least, lasting_above - usual.most)
         delay = delays[i]
         late_by = {} if delay is None else {Deviation.DELAY: wheels.LATE_S + delay + cells.dt}
         second_one = _reference(cells, name, (v, x, wheels.FLOOR * top), clear_at) if measured else None
@@ -219,10 +221,8 @@ def _rooms(usual: tuple[float | None, ...], below: float, above: float) -> tuple
 
 def _lasting(below: float, above: float) -> dict[Deviation, float]:
     """Smallest loss and excess over the mission, by what is left to their limits [ln]."""
-    return {
-        Deviation.INEFFICIENT: max(0.0, float(-np.expm1(-below))),
-        Deviation.EXCESS: max(0.0, float(np.expm1(above))),
-    }
+    loss = {Deviation.INEFFICIENT: max(0.0, float(-np.expm1(-below)))}
+    return loss | ({Deviation.EXCESS: max(0.0, float(np.expm1(above)))} if np.isfinite(above) else {})
 
 
 def _reference(cells: Cells, component: str, pair: tuple[Array, Array, float], limit: float) -> Reference:

@@ -104,18 +104,39 @@ def as_followed(cells: Cells, openings: Array, commands: Array, floor: float) ->
     floor : float
         As of `compared`.
     """
+    return _behind(commands, cells.dt, _LAGS_S[_best_lag(cells, openings, commands, floor)])
+
+
+def off_commands(cells: Cells, openings: Array, commands: Array, floor: float) -> Array:
+    """How far openings are off their commands in each window, as `Compared.off` has it, shape (windows, valves).
+
+    A valve is as slow as most of a machine's valves, or as the next slower or quicker would be; what is in one window and in
+    none beside it is what is left of a jump before it. All arguments as of `as_followed`.
+    """
+    best = _best_lag(cells, openings, commands, floor)
+    tried = [_behind(commands, cells.dt, lag) for lag in _LAGS_S[max(0, best - 1) : best + 2]]
+    off = np.column_stack(
+        [np.minimum.reduce([compared(cells, y, x[:, j], floor).off for x in tried]) for j, y in enumerate(openings.T)]
+    )
+    edge = np.full((1, off.shape[1]), np.nan)
+    beside = np.fmax(np.concatenate([edge, off[:-1]]), np.concatenate([off[1:], edge]))
+    return np.asarray(np.where(np.isfinite(off), np.fmin(off, beside), np.nan))
+
+
+def _best_lag(cells: Cells, openings: Array, commands: Array, floor: float) -> int:
+    """Place among `_LAGS_S` of the lag that explains most of a machine's valves best; the first where nothing tells."""
     pairs = [
         (y, x) for y, x in zip(openings.T, commands.T, strict=True) if np.isfinite(y).any() and np.isfinite(x).any()
     ]
     if not pairs:
-        return commands
+        return 0
 
-    def left(lag: float) -> float:
-        usual = [compared(cells, y, _behind(x, cells.dt, lag), floor).off for y, x in pairs]
+    def left(k: int) -> float:
+        usual = [compared(cells, y, _behind(x, cells.dt, _LAGS_S[k]), floor).off for y, x in pairs]
         known = [float(np.nanquantile(off, _FOLLOWED)) for off in usual if np.isfinite(off).any()]
         return float(np.median(known)) if known else float("inf")
 
-    return _behind(commands, cells.dt, min(_LAGS_S, key=left))
+    return min(range(len(_LAGS_S)), key=left)
 
 
 def _behind(x: Array, dt: float, lag: float) -> Array:

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from diagnosis.clearing.cells import Array, Cells
-from diagnosis.clearing.measure import as_followed, compared, lasts, late, worst
+from diagnosis.clearing.measure import compared, lasts, late, off_commands, worst
 from diagnosis.clearing.responses import (
     OTHERS,
     measured_twice,
@@ -36,7 +36,7 @@ def wheel_checks(cells: Cells, clear_at: float) -> Iterator[Checked]:
     reference = cells.reference
     twice = measured_twice(cells)
     used = np.where(np.isfinite(opening), opening, command)
-    followed = as_followed(cells, opening, command, OPENING)
+    behind = off_commands(cells, opening, command, OPENING)
     responses = responses_of(cells, speed, used, reference)
     tells = openings_tell(cells, responses)
     windows, lasting, changes = responses.windows, responses.usual, responses.changes
@@ -54,8 +54,7 @@ def wheel_checks(cells: Cells, clear_at: float) -> Iterator[Checked]:
             off = compared(cells, speed[:, i], second[:, i], FLOOR * top).off
             yield worst(cells, (*about, Side.SENSOR, Check.SECOND_MEASUREMENT), off, clear_at)
         if twice[i][0]:
-            off = compared(cells, opening[:, i], followed[:, i], OPENING).off
-            yield worst(cells, (*about, Side.ACTUATOR, Check.SECOND_MEASUREMENT), off, VALVE * clear_at)
+            yield worst(cells, (*about, Side.ACTUATOR, Check.SECOND_MEASUREMENT), behind[:, i], VALVE * clear_at)
         # where an opening is no speed, nothing of it is asked of a wheel that is measured twice on either side
         if _known(used[:, i]) and speed.shape[1] > OTHERS and (tells or not all(twice[i])):
             limit = limits[i]
@@ -63,8 +62,9 @@ def wheel_checks(cells: Cells, clear_at: float) -> Iterator[Checked]:
             below = lasts(cells, (*about, either, Check.LASTING_RESPONSE), lasting[i].below, limit.lasting_below)
             changed = lasts(cells, (*about, either, Check.LASTING_RESPONSE), changes[i], limit.changed)
             yield max(below, changed, key=_times)
-            yield worst(cells, (*about, either, Check.EXCESS), windows[:, i], limit.above)
-            yield lasts(cells, (*about, either, Check.LASTING_EXCESS), lasting[i].above, limit.lasting_above)
+            if not all(twice[i]):  # of a wheel that is measured twice on both sides, it is the ground's doing
+                yield worst(cells, (*about, either, Check.EXCESS), windows[:, i], limit.above)
+                yield lasts(cells, (*about, either, Check.LASTING_EXCESS), lasting[i].above, limit.lasting_above)
         if _known(reference[:, i]):
             if (
                 _known(used[:, i]) or twice[i][1]

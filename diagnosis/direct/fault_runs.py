@@ -24,6 +24,7 @@ Array = NDArray[np.float64]
 _BRIDGE_S, _APART_S = 5.0, 30.0
 _BRIEF_S = 0.1
 _NEAR = 20  # samples between runs that follow each other
+_ONE_GAIN = 0.1  # by which gains of one fault may differ
 _PLAYS = 3.0  # by which a command must move for a valve with a loss of gain to follow
 
 
@@ -129,7 +130,22 @@ def _interrupted(first: Run, middle: Run, last: Run, samples: Samples, model: Mo
     if first.row != last.row or middle.size >= min(first.size, last.size):
         return False
     brief = last.start - first.stop <= min(_BRIEF_S / model.dt, min(first.size, last.size) / 4)
-    return brief or _one_fault(first, last, samples, model)
+    return (brief and _of_one_gain(first, last, samples, model)) or _one_fault(first, last, samples, model)
+
+
+def _of_one_gain(first: Run, last: Run, samples: Samples, model: ModeModel) -> bool:
+    """Whether two runs may be of one gain; what is no loss of gain has none that differs."""
+    if first.row not in SCALED_ROWS:
+        return True
+    reach, gains = round(_BRIDGE_S / model.dt), []
+    for run in (
+        Run(max(first.start, first.stop - reach), first.stop, first.row),
+        Run(last.start, min(last.stop, last.start + reach), last.row),
+    ):
+        y, x, _ = _pairs(run, samples, model)
+        power = float(x @ x)
+        gains.append(float(x @ y) / power if power > 0.0 else 1.0)
+    return abs(gains[0] - gains[1]) <= _ONE_GAIN
 
 
 def _one_fault(first: Run, second: Run, samples: Samples, model: ModeModel) -> bool:

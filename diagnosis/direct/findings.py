@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -34,6 +35,8 @@ _LEFT_S = (
 _AS_TRUE = 0.03  # of what a sensor measures: as far off may a healthy one be
 _LOST = 0.03  # of the span: as far from its command a healthy valve rests within its dead band
 _ZERO = 0.01  # of the span: as far apart may two healthy instruments have their zero
+_ALIKE_P = 0.3  # probability of each of two rows that a constant cannot tell
+_ONE_GAIN, _SAME_P = 0.05, 0.95  # of a gain; that a share which is lost elsewhere too is one
 _GROWTH_S = 0.1  # a shorter time of growth is not worth a sentence
 
 
@@ -95,7 +98,7 @@ def find_faults(path: ModePath, found: IdentifiedPair, limits: Limits) -> Faults
                 run.row,
             )
             findings.append(_widened(finding, run, whole, dt, _detected(path, whole, dt, shortest, found.lag)))
-    return FaultsFound(findings, timing, below)
+    return FaultsFound([_as_beside(f, findings, found.pair.span) for f in findings], timing, below)
 
 
 def finding_of(run: Run, found: IdentifiedPair, limits: Limits) -> Finding | None:
@@ -116,8 +119,8 @@ def finding_of(run: Run, found: IdentifiedPair, limits: Limits) -> Finding | Non
     share = _left_share(isolated)
     if run.row in (STUCK, INEFFICIENT) and isolated.seen.still and share is not None:
         # nothing moved: a constant value and a constant share of a constant are the same
+        p[STUCK] = p[INEFFICIENT] = (p[STUCK] + p[INEFFICIENT]) / 2
         if run.row == STUCK:
-            p[STUCK] = p[INEFFICIENT] = (p[STUCK] + p[INEFFICIENT]) / 2
             epsilon = Epsilon(1.0, 1.0 - share, 1.0)  # all, if it is stuck; else what is not left
         lines += (alike_sentence(found),)
     shift = max(0, round(found.lag)) if pair.side is Side.ACTUATOR else 0
@@ -136,6 +139,38 @@ def finding_of(run: Run, found: IdentifiedPair, limits: Limits) -> Finding | Non
         sat=sat,
         evidence=lines,
         tier=Tier.DIRECT,
+    )
+
+
+def _as_beside(finding: Finding, all_of_them: Sequence[Finding], span: float) -> Finding:
+    """A share of a constant, or one of which little else is left, as what it is where the channel moved: the same loss of gain.
+
+    A part that sticks does not stick at just that share of its command, and noise does not leave it. `span` in the channel's unit.
+    """
+    p = {h.mode: h.p for h in finding.hypotheses}
+    size, likely = finding.epsilon, p.get(FaultMode.INEFFICIENT, 0.0)
+    if size is None:
+        return finding
+    lost = size.low if finding.mode is FaultMode.STUCK else size.value
+    still = (
+        finding.mode in (FaultMode.STUCK, FaultMode.INEFFICIENT)
+        and likely == p.get(FaultMode.STUCK, 0.0)
+        and likely >= _ALIKE_P
+    )
+    calm = finding.mode.varying and finding.sat is not None and finding.sat.rms * lost <= _LOST * span
+    beside = (f.epsilon for f in all_of_them if f.mode is FaultMode.INEFFICIENT and f.probability > 2 * _ALIKE_P)
+    if not (still or calm) or not any(e is not None and abs(e.value - lost) <= _ONE_GAIN for e in beside):
+        return finding
+    both = likely + p[finding.mode] if calm else 2 * likely
+    p |= {finding.mode if calm else FaultMode.STUCK: (1.0 - _SAME_P) * both, FaultMode.INEFFICIENT: _SAME_P * both}
+    return replace(
+        finding,
+        mode=FaultMode.INEFFICIENT,
+        probability=p[FaultMode.INEFFICIENT],
+        hypotheses=tuple(sorted((replace(h, p=p[h.mode]) for h in finding.hypotheses), key=lambda h: -h.p)),
+        epsilon=Epsilon(lost, lost - _ONE_GAIN, lost + _ONE_GAIN),
+        sat=None,
+        evidence=(*finding.evidence, "The same share is lost where it says more."),
     )
 
 

@@ -33,6 +33,7 @@ Array = NDArray[np.float64]
 _MAX_LAG_S = 0.05
 _GAIN_S, _GAIN_DRIVEN, _GAIN_WINDOWS = 1.0, 0.1, 6  # windows; of the span, from which on they move; the fewest of them
 _NORMAL_MEDIAN = 0.6745  # of the size of a normal variable of unit variance
+_MOST_SPREAD = 0.1  # of a gain: as much may a healthy one vary; more of it is a fault in other windows
 _WHOLE = 0.25
 _JUMP = 3.5  # times the noise
 _COARSE, _COARSE_COST = (
@@ -180,7 +181,8 @@ class GainWindows(NamedTuple):
         driven[start // self.width : -(-stop // self.width)] = False
         if np.count_nonzero(driven) < _GAIN_WINDOWS:
             return 0.0
-        return float(np.median(np.abs(self.moved[driven] / self.power[driven] - 1.0)) / _NORMAL_MEDIAN)
+        usual = float(np.median(np.abs(self.moved[driven] / self.power[driven] - 1.0)) / _NORMAL_MEDIAN)
+        return min(usual, _MOST_SPREAD)
 
 
 def gain_windows(samples: Samples, dt: float) -> GainWindows:

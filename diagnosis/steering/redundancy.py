@@ -20,6 +20,7 @@ _SHARE_RANGE = (0.85, 1.15)
 _LEAST_CHANGES = 4
 _LEAST_SHARE = 0.5
 _JITTER_S = 0.25
+_AS_GOOD = 1.5  # times the power that a lag leaves: a valve that leaves no more at once has none
 _LAG_ERROR = 0.2  # of a lag
 _JITTER = 4.0  # standard deviations
 _MEDIAN_SQUARE = 0.455  # of a standard normal variable
@@ -92,12 +93,14 @@ def with_valve_opening(
     use = fresh & np.isfinite(u) & np.isfinite(position)
     most = _most_lag(dt)
     linked = _jitter_lag(position, u, use, most)
-    if linked is None:
-        lag = relative_lag(position, u, use, 0, most)
-        command, doubt = _followed(position, u, use, lag, dt, blocks.length)
-    else:
-        lag = linked
-        command, doubt = shifted(u, lag), np.zeros(u.size)
+    lag = relative_lag(position, u, use, 0, most)
+    command, doubt = _followed(position, u, use, lag, dt, blocks.length)
+    if linked is not None:
+        at_once = shifted(u, linked)
+        if _apart(position, at_once, use) <= _AS_GOOD * _apart(position, command, use):
+            lag, command, doubt = linked, at_once, np.zeros(u.size)
+        else:
+            linked = None
     known = use & np.isfinite(command)
     deviation = np.where(known, position - command, 0.0)
     power = max(_white(deviation[known]), 1e-8)
@@ -145,6 +148,12 @@ def _followed(position: Array, u: Array, use: Flags, delay: float, dt: float, le
     lasting = max(1.0, 2 * found.lag / (length * dt))  # blocks for which an error lasts
     of_lag = np.nan_to_num(_LAG_ERROR * (command - at_once)) ** 2
     return command, lasting * ((1.0 - kept) / (1.0 + kept) * jitter + of_lag)
+
+
+def _apart(position: Array, command: Array, use: Flags) -> float:
+    """Power of what a position differs from its command by [1]."""
+    known = use & np.isfinite(command)
+    return float(np.mean((position[known] - command[known]) ** 2)) if known.any() else np.inf
 
 
 def _most_lag(dt: float) -> int:

@@ -17,13 +17,18 @@ from diagnosis.wheels.models import TOTAL_SENSOR, WheelFilterModel
 from diagnosis.wheels.onset import onset_sentence, refined, released
 from diagnosis.wheels.runs import Runs
 from diagnosis.wheels.tracks import Segment
-from replay.faults import Side
+from replay.faults import FaultMode, Side
 from replay.machine.config import Limits
 
 Array = NDArray[np.float64]
 
 _HOLD_S = 0.1
 _REACH_S = 0.4  # within which the raw signal shows an edge that the Kalman models did not place
+_PROBABLE, _OF_STEP, _SEEN_STEP = (
+    0.8,
+    0.5,
+    8.0,
+)  # a loss this probable needs no step; share of one that is one; times the noise
 _LEAST_HEALTHY = 0.95  # probability below which a side is not called healthy
 _TOGETHER = 0.5  # of a run: where no wheel turns, none of them is known to be dead
 _USUAL = 0.5  # below this it deviates by more than what healthy machines do
@@ -142,8 +147,9 @@ def findings_of(path: WheelPath, limits: Limits) -> WheelFindings:
         verdict = judge(run, y[start:stop], path.model, limits, path.names, path.dt)
         if verdict.hidden:
             out.opened[Side.ACTUATOR][start:stop] = True
-        if verdict.finding is not None and not _repeated(verdict.finding, out.findings):
-            out.findings.append(_detected(path, w.segment, verdict.finding))
+        found = verdict.finding
+        if found is not None and not _repeated(found, out.findings) and not _stepless(path, found):
+            out.findings.append(_detected(path, w.segment, found))
     blind = [f for f in out.findings if f.side is Side.SENSOR and f.mode.total]
     out.findings[:] = [f for f in out.findings if f.side is not Side.ACTUATOR or _seen(f, blind) > 0.5]
     return out
@@ -164,6 +170,27 @@ def _repeated(finding: Finding, before: Sequence[Finding]) -> bool:
         and finding.start < f.stop
         for f in before
     )
+
+
+def _stepless(path: WheelPath, finding: Finding) -> bool:
+    """Whether a sensor's loss that is no more than probable lacks the step of its reading with which a loss begins and ends.
+
+    At a speed at which a step is no more than the noise, none is missed.
+    """
+    if (finding.side, finding.mode) != (Side.SENSOR, FaultMode.INEFFICIENT) or finding.probability >= _PROBABLE:
+        return False
+    lost, reach, y = finding.epsilon.value if finding.epsilon else 0.0, 2 * path.width, path.y
+    missed = 0
+    for edge in (finding.start, finding.stop):
+        low, high = max(0, edge - reach), min(y.size, edge + reach)
+        around = y[low:high][np.isfinite(y[low:high])]
+        if edge == 0 or edge >= y.size or around.size < 2:
+            continue
+        step = lost * float(np.median(np.abs(around)))
+        if float(np.max(np.abs(np.diff(around)))) >= _OF_STEP * step:
+            return False
+        missed += step > _SEEN_STEP * path.model.noise
+    return missed > 0
 
 
 def _edges(path: WheelPath, segment: Segment) -> tuple[int, int]:
