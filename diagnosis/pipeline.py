@@ -13,6 +13,7 @@ from diagnosis.assess import ComponentResult, assess_components
 from diagnosis.channels.copied_rows import without_copied_rows
 from diagnosis.channels.recording_gaps import recording_gaps, without_gaps
 from diagnosis.clearing.backwards import without_claims
+from diagnosis.clearing.contradicted import without_contradicted
 from diagnosis.clearing.standing_out import what_stands_out, with_findings
 from diagnosis.decision import metrics, quality
 from diagnosis.decision.episodes import with_episodes
@@ -158,7 +159,8 @@ def _walk(
     found = _outside_gaps(assess_components(timeline, replay, machine, chosen, publish), timeline)
     _require_something(found.assessments, mission, machine)
     publish(Progress(Stage.DECIDING))
-    judged = _with_what_stands_out(_without_backwards(Judged(mission, recorded, machine, replay, found)))
+    judged = _without_contradicted(_without_backwards(Judged(mission, recorded, machine, replay, found)))
+    judged = _with_what_stands_out(judged)
     found = judged.found
     report = report_of_mission(judged, identity)
     timeline.store.release()
@@ -185,6 +187,14 @@ def _without_backwards(judged: Judged) -> Judged:
         return judged
     told = without_claims(found.assessments, wrong, judged.mission.timeline.dt)
     return Judged(judged.mission, judged.recorded, judged.machine, judged.replay, replace(found, assessments=told))
+
+
+def _without_contradicted(judged: Judged) -> Judged:
+    """The same without losses of a speed that nothing but a wheel's model shows."""
+    told = without_contradicted(judged.found.assessments, judged.cells)
+    if all(told[part] is a for part, a in judged.found.assessments.items()):
+        return judged
+    return replace(judged, found=replace(judged.found, assessments=told))
 
 
 def _with_what_stands_out(judged: Judged) -> Judged:

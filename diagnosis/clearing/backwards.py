@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Set
+from collections.abc import Collection, Mapping, Set
 from dataclasses import replace
 
-from diagnosis.results.assessment import CODE, Assessment
+from diagnosis.results.assessment import CODE, Assessment, Finding
 from diagnosis.results.vocabulary import Tier
 from replay.faults import State
 
@@ -25,11 +25,16 @@ def without_claims(assessments: Mapping[Part, Assessment], components: Set[str],
     dt : float
         Sample [s].
     """
-    return {part: _without(a, dt) if part[0] in components else a for part, a in assessments.items()}
+    return {
+        part: without_findings(a, [f for f in a.findings if f.tier is not Tier.DIRECT], dt)
+        if part[0] in components
+        else a
+        for part, a in assessments.items()
+    }
 
 
-def _without(a: Assessment, dt: float) -> Assessment:
-    claimed = tuple(f for f in a.findings if f.tier is not Tier.DIRECT)
+def without_findings(a: Assessment, claimed: Collection[Finding], dt: float) -> Assessment:
+    """The same without some of its findings: what they claim is not assessed. `dt` in s."""
     if not claimed:
         return a
     states, seconds = a.states.copy(), 0.0
