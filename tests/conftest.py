@@ -10,11 +10,12 @@ import pytest
 
 # As in the command: threads of the linear algebra spin while they wait, and its products are small. Before numpy is imported.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-# Hundreds of commands and children are started: bytecode is kept, or each would compile everything that it imports once more.
-os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
-sys.dont_write_bytecode = False
 
 from replay.arrays.kernel_cache import drop_own_stale_kernels
+
+# Many commands and children are started: bytecode is kept, or each would compile everything that it imports once more.
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+sys.dont_write_bytecode = False
 
 ROOT = Path(__file__).resolve().parent.parent
 
