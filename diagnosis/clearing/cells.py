@@ -21,6 +21,7 @@ WINDOW_S = 3.0  # a fault of the size that counts, for this long, must show
 HOP_S = 0.5
 _MOSTLY = 0.3  # of the windows
 _LEAST_SHARE = 0.6  # of a window's cells that must be known
+_AFTER_S = 0.5  # of a fault, in which it still shows
 
 
 @dataclass(frozen=True)
@@ -76,6 +77,16 @@ class Cells:
         out = np.zeros(self.size, dtype=np.bool_)
         for a, b in self.stated.get(component, ()):
             out[max(0, int(a / self.dt) - 1) : int(np.ceil(b / self.dt)) + 1] = True
+        return out
+
+    def apart(self, component: str) -> NDArray[np.bool_]:
+        """Cells outside the stated faults of the component and of what they leave, shape (cells,).
+
+        All cells where faults are stated for so long that hardly anything would be left to ask.
+        """
+        out = np.ones(self.size, dtype=np.bool_)
+        for a, b in () if self.mostly_explained(component) else self.stated.get(component, ()):
+            out[max(0, int(a / self.dt) - 1) : int(np.ceil((b + _AFTER_S) / self.dt)) + 1] = False
         return out
 
     def mostly_explained(self, component: str) -> bool:

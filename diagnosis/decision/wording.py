@@ -95,18 +95,20 @@ def _how_long(words: str, faults: Sequence[FaultInterval]) -> str:
 
 
 def _lost(faults: Sequence[FaultInterval]) -> str:
-    """What faults take of their part's effectiveness, where that is what they are: of one its 95 % bounds, of several their course."""
+    """What faults take of their part's effectiveness, where that is what they are, with 95 % bounds; of several with their course."""
     if not all(f.mode.scaled and f.mode is not FaultMode.OUTSIDE_TABLE for f in faults):
         return ""
     known = [f.epsilon for f in faults if f.epsilon is not None]
     if not known:
         return ""
-    if len(known) == 1:
-        value, low, high = (f"{100 * x:.0f}" for x in (known[0].value, known[0].low, known[0].high))
-        bounds = f", 95 % bounds {low} to {high} %" if low != high else ""  # which the rounding holds
-        return f" ({value} % lost{bounds})"
-    span = dict.fromkeys(f"{100 * x:.0f}" for x in (min(e.value for e in known), max(e.value for e in known)))
-    return f" ({' to '.join(span)} % lost{', from fault to fault' if len(span) > 1 else ''})"
+    sizes = [e.value for e in known]
+    span = list(dict.fromkeys(f"{100 * x:.0f}" for x in (min(sizes), max(sizes))))
+    low, high = (f"{100 * x:.0f}" for x in (min(e.low for e in known), max(e.high for e in known)))
+    course = ", from fault to fault" if len(span) > 1 else ""
+    bounds = (
+        f", 95 % bounds {low} to {high} %" if (low, high) != (span[0], span[-1]) else ""
+    )  # which the rounding holds
+    return f" ({' to '.join(span)} % lost{course}{bounds})"
 
 
 def sentence_of(faults: Sequence[FaultInterval], words: MachineWords) -> str:

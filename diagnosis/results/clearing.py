@@ -86,6 +86,9 @@ CHECK_WORDS: dict[Check, tuple[str, str]] = {
 }
 
 
+#: Share of a window that a fault must cover to explain what deviates over it: means of less are no total loss.
+MAY_EXPLAIN = 1 / 3
+_AFTER_S = 0.5  # of a fault, in which it still shows
 _BELOW = (Check.RESPONSE, Check.LASTING_RESPONSE)
 
 
@@ -153,6 +156,12 @@ class Checked:
         if self.check in _BELOW and self.worst > 1.0:
             return "over 100"
         return size_words(self.check, self.worst).removesuffix(" %")
+
+
+def share_covered(start_s: float, stop_s: float, fault: tuple[float, float]) -> float:
+    """Share of the window of a check [1] in which a fault lasts, or has just ended and still shows; all times in s."""
+    inside = min(stop_s, fault[1] + _AFTER_S) - max(start_s, fault[0])
+    return max(0.0, inside) / max(stop_s - start_s, 1e-9)
 
 
 def size_words(check: str, value: float) -> str:
