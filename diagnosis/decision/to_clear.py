@@ -63,7 +63,7 @@ def to_clear(
             parts = {c for c, _ in against.unexplained if (c in axles) is (kind is Kind.STEER)}
             if not parts:
                 continue
-            who = join_words(sorted(words.part_words(kind, c, Side.SENSOR_OR_ACTUATOR) for c in parts))
+            who = words.listed(kind, [(c, Side.SENSOR_OR_ACTUATOR) for c in sorted(parts)])
             logged = all(
                 p in assessments and assessments[p].tier is Tier.DIRECT for p in ((c, "actuator") for c in parts)
             )
