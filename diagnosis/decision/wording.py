@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from diagnosis.results.candidates import candidates, unclear_words
+from diagnosis.results.candidates import UNCLEAR, candidates, unclear_words
 from diagnosis.results.document import ActionRow
 from diagnosis.results.fault_rows import mode_words
 from diagnosis.results.machine_words import MachineWords
@@ -81,10 +81,13 @@ def fault_words(f: FaultInterval) -> str:
 
 
 def _course(faults: Sequence[FaultInterval]) -> str:
-    """What one part was, kind by kind, and for how long."""
+    """What one part was, kind by kind, and for how long; what is unclear with its candidates where they are the same ones."""
+    said = [fault_words(f) for f in faults]
+    if len({kind for kind in said if kind.startswith(UNCLEAR)}) > 1:
+        said = [UNCLEAR if kind.startswith(UNCLEAR) else kind for kind in said]
     kinds: dict[str, list[FaultInterval]] = {}
-    for f in faults:
-        kinds.setdefault(fault_words(f), []).append(f)
+    for kind, f in zip(said, faults, strict=True):
+        kinds.setdefault(kind, []).append(f)
     return join_words([_how_long(kind, same) for kind, same in kinds.items()])
 
 
@@ -122,9 +125,11 @@ def sentence_of(faults: Sequence[FaultInterval], words: MachineWords) -> str:
 
 
 def seconds_words(value: float) -> str:
-    """A duration [s] as shown: ``140 ms``, ``6.4 s``."""
+    """A duration [s] as shown: ``140 ms``, ``6.4 s``, ``3.4 min``; the pages say the same."""
     value = round(value, 6)  # which a difference of times may miss by its last digit
-    return f"{value * 1e3:.0f} ms" if value < 1 else f"{value:.1f} s"
+    if value < 120:
+        return f"{value * 1e3:.0f} ms" if value < 1 else f"{value:.1f} s"
+    return f"{value / 60:.1f} min" if value < 7200 else f"{value / 3600:.1f} h"
 
 
 def count_words(n: int, word: str) -> str:
