@@ -9,6 +9,7 @@ from diagnosis.results.document import ActionRow
 from diagnosis.results.fault_rows import mode_words
 from diagnosis.results.machine_words import MachineWords
 from diagnosis.results.result import FaultInterval
+from diagnosis.results.sizes import loss_known
 from diagnosis.results.vocabulary import Severity
 from replay.faults import FaultMode, Side
 
@@ -101,9 +102,10 @@ def _lost(faults: Sequence[FaultInterval]) -> str:
     """What faults take of their part's effectiveness, where that is what they are, with 95 % bounds; of several with their course."""
     if not all(f.mode.scaled and f.mode is not FaultMode.OUTSIDE_TABLE for f in faults):
         return ""
-    known = [f.epsilon for f in faults if f.epsilon is not None]
+    sized = [f.epsilon for f in faults if f.epsilon is not None]
+    known = [e for e in sized if loss_known(e.low, e.high)]
     if not known:
-        return ""
+        return " (how much is lost is not known)" if sized else ""
     sizes = [e.value for e in known]
     span = list(dict.fromkeys(f"{100 * x:.0f}" for x in (min(sizes), max(sizes))))
     low, high = (f"{100 * x:.0f}" for x in (min(e.low for e in known), max(e.high for e in known)))

@@ -14,7 +14,7 @@ from diagnosis.results.assessment import CODE, Assessment, Finding, unassessed
 from diagnosis.results.detectability import Detectable, Deviation
 from diagnosis.results.machine_event import not_following
 from diagnosis.results.machine_words import HYDRAULIC
-from diagnosis.results.result import Hypothesis
+from diagnosis.results.result import Epsilon, Hypothesis
 from diagnosis.results.vocabulary import Kind, Tier
 from diagnosis.results.wheel_model import WheelModelFit
 from replay.faults import FaultMode, Side, State
@@ -289,6 +289,13 @@ def test_what_is_unclear_in_several_ways_is_said_once_and_losses_have_bounds() -
     text = str(verdict(machine(FR_actuator=assessed(*parts))).actions[0]["text"])
     assert "faulty, kind unclear for 1.0 s in 2 faults" in text
     assert "inefficient (40 to 50 % lost, from fault to fault, 95 % bounds 39 to 51 %) for 2.2 min in 2 faults" in text
+
+
+def test_a_loss_of_which_nothing_is_known_has_no_size() -> None:
+    vague = replace(finding(Side.ACTUATOR, FaultMode.INEFFICIENT, 9_000, 19_000), epsilon=Epsilon(0.5, 0.0, 1.0))
+    text = str(verdict(machine(FR_actuator=assessed(vague))).actions[0]["text"])
+    assert "inefficient (how much is lost is not known) for 10.0 s" in text
+    assert "50 %" not in text
 
 
 def test_open_driving_has_the_reason_that_it_has_while_driving() -> None:
