@@ -47,6 +47,7 @@ def of_checks(report: Mapping[str, Any]) -> Iterator[str]:
         fault = faults[found.group(1)]
         for start, stop in re.findall(r" at ([\d.]+)–([\d.]+) s", row["reason"]):
             a, b = float(start), float(stop)
-            shared = min(b, fault["stop_s"] + _STILL_SHOWS_S) - max(a, fault["start_s"])
+            after = min(max(fault["stop_s"] - fault["start_s"], _STILL_SHOWS_S), b - a)
+            shared = min(b, fault["stop_s"] + after) - max(a, fault["start_s"])
             if shared < _EXPLAINS * (b - a) - 0.1:
                 yield f"{fault['id']} lasts for {max(shared, 0.0):.1f} s of what it may explain: {row['reason']!r}"

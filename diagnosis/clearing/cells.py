@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from diagnosis.results.clearing import after_s
 from replay.arrays.blocks import blocks, framed
 from replay.control.loop import Replay
 from replay.machine.config import Machine
@@ -21,7 +22,6 @@ WINDOW_S = 3.0  # a fault of the size that counts, for this long, must show
 HOP_S = 0.5
 _MOSTLY = 0.3  # of the windows
 _LEAST_SHARE = 0.6  # of a window's cells that must be known
-_AFTER_S = 0.5  # of a fault, in which it still shows
 
 
 @dataclass(frozen=True)
@@ -86,7 +86,7 @@ class Cells:
         """
         out = np.ones(self.size, dtype=np.bool_)
         for a, b in () if self.mostly_explained(component) else self.stated.get(component, ()):
-            out[max(0, int(a / self.dt) - 1) : int(np.ceil((b + _AFTER_S) / self.dt)) + 1] = False
+            out[max(0, int(a / self.dt) - 1) : int(np.ceil((b + after_s(a, b)) / self.dt)) + 1] = False
         return out
 
     def mostly_explained(self, component: str) -> bool:
