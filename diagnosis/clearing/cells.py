@@ -62,14 +62,14 @@ class Cells:
         """Windows of `WINDOW_S`."""
         return Frame(self.size, max(1, round(WINDOW_S / self.dt)), max(1, round(HOP_S / self.dt)))
 
-    def explained(self, component: str, frame: Frame | None = None) -> NDArray[np.bool_]:
-        """Windows, of `frame` if given, in which a fault of the component is stated anyhow, shape (windows,)."""
+    def explained(self, component: str, frame: Frame | None = None, *, after: bool = False) -> NDArray[np.bool_]:
+        """Windows, of `frame` if given, in which a fault of the component is stated anyhow, or `after` it still shows, shape (windows,)."""
         frame = frame or self.frame
         starts = frame.starts * self.dt
         stops = starts + frame.length * self.dt
         out = np.zeros(starts.size, dtype=np.bool_)
         for a, b in self.stated.get(component, ()):
-            out |= (stops > a) & (starts < b)
+            out |= (stops > a) & (starts < b + (after_s(a, b) if after else 0.0))
         return out
 
     def told(self, component: str) -> NDArray[np.bool_]:

@@ -177,8 +177,9 @@ def worst(
     if not np.isfinite(values).any():
         return Checked(*part, None, limit)
     named = part[1]
-    told = cells.explained(named)
-    values = np.where(told & ~np.isfinite(values) if apart and not cells.mostly_explained(named) else told, 0.0, values)
+    mostly = cells.mostly_explained(named)  # of which `Cells.apart` leaves nothing out
+    told = cells.explained(named, after=apart and mostly)
+    values = np.where(told & ~np.isfinite(values) if apart and not mostly else told, 0.0, values)
     k = int(np.nanargmax(values))
     start = float(cells.frame.starts[k] * cells.dt)
     stop = min(start + cells.frame.length * cells.dt, cells.timeline.size * cells.timeline.dt)
