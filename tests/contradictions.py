@@ -16,6 +16,7 @@ from diagnosis.results.candidates import candidates_of, label_of
 from diagnosis.results.machine_words import HYDRAULIC
 from diagnosis.results.vocabulary import Severity
 from replay.machine.quantities import OPENING
+from tests.clearing_contradictions import of_checks, of_coverage
 from tests.plot_contradictions import of_faults, of_states
 from tests.word_slips import slips
 
@@ -41,6 +42,8 @@ def contradictions(report: Mapping[str, Any], columns: Mapping[str, NDArray[Any]
         *_coverage(report),
         *_open(report),
         *_terminal(report),
+        *of_coverage(report),
+        *of_checks(report),
         *slips(report),
     ]
     for fault in report["intervals"]:

@@ -92,7 +92,21 @@ def _sum(d: Document) -> None:
     d["intervals"][0]["hypotheses"][0]["p"] = 0.2
 
 
-@pytest.mark.parametrize("spoil", [_calm, _advice, _minority, _size, _late, _softer, _healthy, _untold, _sum])
+def _unmoved(d: Document) -> None:
+    for s in d["states"]:
+        s["state"] = "not_excited"
+
+
+def _moment(d: Document) -> None:
+    fault = _first(d, "high")
+    window = f"{fault['start_s'] - 2.9:.1f}–{fault['start_s'] + 0.1:.1f} s"
+    reason = f"At the time of {fault['id']}, which may explain it: the speed of FR jumps by 20 % of itself at {window}."
+    d["verdict"]["to_clear"].append({"reason": reason, "act": "repair it"})
+
+
+@pytest.mark.parametrize(
+    "spoil", [_calm, _advice, _minority, _size, _late, _softer, _healthy, _untold, _sum, _unmoved, _moment]
+)
 def test_a_spoilt_result_is_seen(result: tuple[Document, Columns], spoil: Callable[[Document], None]) -> None:
     document, _ = result
     assert contradictions(document) == []

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from dataclasses import asdict
+from typing import TYPE_CHECKING, cast
 
 from rich.text import Text
 
 from cli.tables.layout import ByWidth, bullets, key_values, section, table, text
 from cli.tables.looks import mode_text, severity_text, verdict_style
-from diagnosis.comparison.words import CHANGES, OUTCOMES, headline, times
+from diagnosis.comparison.words import CHANGES, OUTCOMES, coverage_words, headline, times
 from diagnosis.pages.labels import utc
 from diagnosis.results.fault_rows import state_label
 from diagnosis.results.machine_words import MachineWords, words_of
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
     from diagnosis.comparison.compare import ComparedMission, Comparison, MetricChange
     from diagnosis.comparison.coverage import CoverageChange, SideCoverage
     from diagnosis.comparison.faults import FaultChange, FoundFault
+    from diagnosis.results.comparison_document import CoverageChangeRow
 
 _STYLES = {"new": "bold red", "worse": "bold red", "resolved": "#2fa98c", "better": "#2fa98c", "unchanged": "dim"}
 _SHOWN = 40
@@ -37,7 +39,7 @@ def comparison_parts(found: Comparison) -> list[RenderableType]:
         key_values([("older", _mission(found.older)), ("newer", _mission(found.newer))]),
     ]
     parts += _faults(found.faults, words)
-    parts += [section("Assessed long enough"), *_coverage(found.coverage, words)]
+    parts += [section("Judged long enough, and cleared"), *_coverage(found.coverage, words)]
     if found.metrics:
         parts += [section("While driving"), _metrics(found.metrics, words)]
     if found.notes:
@@ -83,7 +85,11 @@ def _faults(faults: Sequence[FaultChange], machine_words: MachineWords) -> list[
         parts.append(ByWidth(wide, narrow, 110))
         if len(mine) > _SHOWN:
             parts.append(text(f"… and {len(mine) - _SHOWN} more (--json, -o FILE.html)", "dim"))
-        notes = list(dict.fromkeys(f"{_part(c, machine_words)}: {c.note}" for c in shown if c.note))
+        alike: dict[str, list[str]] = {}
+        for c in shown:
+            if c.note:
+                alike.setdefault(c.note, []).append(_part(c, machine_words))
+        notes = [f"{', '.join(dict.fromkeys(named))}: {note}" for note, named in alike.items()]
         if notes:
             parts.append(bullets(notes, "dim"))
     return parts
@@ -123,14 +129,17 @@ def _coverage(changes: Sequence[CoverageChange], words: MachineWords) -> list[Re
     if differing:
         rows = [
             (
-                text(c.change, "bold red" if c.change == "lost" else "#2fa98c"),
                 words.part_words(c.kind, c.component, c.side),
+                text(
+                    coverage_words(cast("CoverageChangeRow", asdict(c))),
+                    "bold red" if c.change == "lost" else "#2fa98c",
+                ),
                 _judged(c.older),
                 _judged(c.newer),
             )
             for c in differing
         ]
-        parts.append(table(("", "part", "driving judged, older", "newer"), rows))
+        parts.append(table(("part", "", "driving judged, older", "newer"), rows))
     else:
         parts.append(text("The same parts in both missions."))
     if neither:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from pathlib import PurePath
 from typing import TypedDict
@@ -137,6 +138,8 @@ def _signal(signal: Signal, words: MachineWords) -> MappedSignal:
 
 
 _LIST_ALL = "`mfhca channels LOG --all` lists what the log holds; name its signals in [signals] of a machine file."
+_CHANNEL = re.compile(r"'[^']*'|/\S+|; similar: .*")  # of a reason: what differs from part to part
+_LIKEWISE = "; the others likewise"
 _OF_ANOTHER = (" times max_speed ", "max_steer is", "in step with cmd.v")  # compare with the paper's machine
 _STANDS_IN = (
     "no machine file was given: ranges of rotations are shown with the wheels of {} ({:.3g} m); "
@@ -222,18 +225,23 @@ def _is_doubt(note: str) -> bool:
 
 
 def _missing_groups(missing: Mapping[str, str], machine: Machine, words: MachineWords) -> list[tuple[str, str, str]]:
-    """Missing signals of equal cost and reason in one line each: names, cost, reason."""
+    """Missing signals of equal cost, and of a reason that is equal but for names of channels, in one line each: names, cost, reason."""
     groups: dict[tuple[str, str, str], dict[str, list[str]]] = {}
+    first: dict[tuple[str, str, str], str] = {}
     for name, reason in missing.items():
         if not applies(name, words):
             continue
         group, _, rest = name.partition(".")
         part, _, leaf = rest.rpartition(".")
-        leaves = groups.setdefault((group, cost_of_missing(name, words), reason), {})
+        key = group, cost_of_missing(name, words), _CHANNEL.sub("…", reason)
+        leaves = groups.setdefault(key, {})
         leaves.setdefault(leaf, []).append(part)
+        if first.setdefault(key, reason) != reason and not first[key].endswith(_LIKEWISE):
+            first[key] += _LIKEWISE
     out = []
     every = {"wheel": machine.wheels, "steer": machine.axles}
-    for (group, cost, reason), leaves in groups.items():
+    for key, leaves in groups.items():
+        group, cost, reason = key[0], key[1], first[key]
         parts = next(iter(leaves.values()))
         if any(p != parts for p in leaves.values()):
             out += [(f"{group}.{p}.{leaf}", cost, reason) for leaf, named in leaves.items() for p in named]

@@ -35,9 +35,11 @@ def axle_checks(cells: Cells, clear_at: float) -> Iterator[Checked]:
     angle, second, command, opening = (cells.axles(leaf) for leaf in ("phi", "phi_true", "u", "u_applied"))
     either, share = Side.SENSOR_OR_ACTUATOR, -np.log1p(-clear_at)
     used = np.where(np.isfinite(opening), opening, command)
-    behind = off_commands(cells, opening, command, OPENING)
     rate = rate_of(angle, cells.dt)
     rates = rates_of(cells, rate, used)
+    apart = np.column_stack([cells.apart(axle) for axle in cells.machine.axles]) if cells.machine.axles else True
+    angle, second, opening = (np.where(apart, x, np.nan) for x in (angle, second, opening))
+    behind = off_commands(cells, opening, command, OPENING)
     place = np.minimum(np.arange(cells.frame.starts.size), len(rates.off) - 1)
     limit = answered(cells)
     for j, axle in enumerate(cells.machine.axles):
@@ -46,9 +48,11 @@ def axle_checks(cells: Cells, clear_at: float) -> Iterator[Checked]:
             continue
         if np.isfinite(second[:, j]).any():
             off = compared(cells, angle[:, j], second[:, j], FLOOR_RAD).off
-            yield worst(cells, (*about, Side.SENSOR, Check.SECOND_MEASUREMENT), off, clear_at)
+            yield worst(cells, (*about, Side.SENSOR, Check.SECOND_MEASUREMENT), off, clear_at, apart=True)
         if np.isfinite(opening[:, j]).any() and np.isfinite(command[:, j]).any():
-            yield worst(cells, (*about, Side.ACTUATOR, Check.SECOND_MEASUREMENT), behind[:, j], VALVE * clear_at)
+            yield worst(
+                cells, (*about, Side.ACTUATOR, Check.SECOND_MEASUREMENT), behind[:, j], VALVE * clear_at, apart=True
+            )
         if np.isfinite(command[:, j]).any():
             yield _still(cells, j, limit)
             twice = bool(np.isfinite(second[:, j]).any() and np.isfinite(opening[:, j]).any())
@@ -92,14 +96,16 @@ def answered(cells: Cells) -> float:
 
 
 def _still(cells: Cells, j: int, limit: float) -> Checked:
-    """Largest mean command while an axle stands still for a second."""
+    """Largest mean command while an axle stands still for a second, and no fault of it is stated."""
     axle = cells.machine.axles[j]
     part = (Kind.STEER, axle, Side.SENSOR_OR_ACTUATOR, Check.STILL)
-    largest, start = _longest_still(cells, j)
-    stop = start + _STILL_S
-    if any(start < b and stop > a for a, b in cells.stated.get(axle, ())):
-        return Checked(*part, 0.0, limit)
-    return Checked(*part, largest if np.isfinite(largest) else None, limit, start, stop)
+    values, frame = commanded_still(cells, j), still_frame(cells)
+    if not np.isfinite(values).any():
+        return Checked(*part, None, limit)
+    values = np.where(cells.explained(axle, frame), 0.0, values)
+    k = int(np.nanargmax(values))
+    start = float(frame.starts[k] * cells.dt)
+    return Checked(*part, float(values[k]), limit, start, start + _STILL_S)
 
 
 def still_frame(cells: Cells) -> Frame:

@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from diagnosis.results.clearing import after_s
 from replay.arrays.blocks import blocks, framed
 from replay.control.loop import Replay
 from replay.machine.config import Machine
@@ -61,14 +62,14 @@ class Cells:
         """Windows of `WINDOW_S`."""
         return Frame(self.size, max(1, round(WINDOW_S / self.dt)), max(1, round(HOP_S / self.dt)))
 
-    def explained(self, component: str, frame: Frame | None = None) -> NDArray[np.bool_]:
-        """Windows, of `frame` if given, in which a fault of the component is stated anyhow, shape (windows,)."""
+    def explained(self, component: str, frame: Frame | None = None, *, after: bool = False) -> NDArray[np.bool_]:
+        """Windows, of `frame` if given, in which a fault of the component is stated anyhow, or `after` it still shows, shape (windows,)."""
         frame = frame or self.frame
         starts = frame.starts * self.dt
         stops = starts + frame.length * self.dt
         out = np.zeros(starts.size, dtype=np.bool_)
         for a, b in self.stated.get(component, ()):
-            out |= (stops > a) & (starts < b)
+            out |= (stops > a) & (starts < b + (after_s(a, b) if after else 0.0))
         return out
 
     def told(self, component: str) -> NDArray[np.bool_]:
@@ -76,6 +77,16 @@ class Cells:
         out = np.zeros(self.size, dtype=np.bool_)
         for a, b in self.stated.get(component, ()):
             out[max(0, int(a / self.dt) - 1) : int(np.ceil(b / self.dt)) + 1] = True
+        return out
+
+    def apart(self, component: str) -> NDArray[np.bool_]:
+        """Cells outside the stated faults of the component and of what they leave, shape (cells,).
+
+        All cells where faults are stated for so long that hardly anything would be left to ask.
+        """
+        out = np.ones(self.size, dtype=np.bool_)
+        for a, b in () if self.mostly_explained(component) else self.stated.get(component, ()):
+            out[max(0, int(a / self.dt) - 1) : int(np.ceil((b + after_s(a, b)) / self.dt)) + 1] = False
         return out
 
     def mostly_explained(self, component: str) -> bool:

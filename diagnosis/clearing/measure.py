@@ -174,14 +174,33 @@ def _alike(x: Array, y: Array, delay: int) -> float:
     return float(a @ b) / power**0.5 if power > 0.0 else 0.0
 
 
-def worst(cells: Cells, part: tuple[Kind, str, Side, Check], values: Array, limit: float) -> Checked:
+def worst(
+    cells: Cells, part: tuple[Kind, str, Side, Check], values: Array, limit: float, *, apart: bool = False
+) -> Checked:
     """The check of a part with its largest value among the windows; None where no window shows it.
 
-    `values` of shape (windows,), in the unit of `limit`.
+    What a stated fault makes of its part is nothing new: a window that one touches passes, unless its value is that of what
+    lies apart from the faults, for a brief one explains no more than it lasts.
+
+    Parameters
+    ----------
+    cells : Cells
+        The mission.
+    part : tuple[Kind, str, Side, Check]
+        The part, and what is asked of it.
+    values : Array, shape (windows,)
+        In the unit of `limit`; NaN where nothing is known.
+    limit : float
+        From here on the part is not cleared.
+    apart : bool
+        Whether the values are those of `Cells.apart`.
     """
     if not np.isfinite(values).any():
         return Checked(*part, None, limit)
-    values = np.where(cells.explained(part[1]), 0.0, values)
+    named = part[1]
+    mostly = cells.mostly_explained(named)  # of which `Cells.apart` leaves nothing out
+    told = cells.explained(named, after=apart and mostly)
+    values = np.where(told & ~np.isfinite(values) if apart and not mostly else told, 0.0, values)
     k = int(np.nanargmax(values))
     start = float(cells.frame.starts[k] * cells.dt)
     stop = min(start + cells.frame.length * cells.dt, cells.timeline.size * cells.timeline.dt)

@@ -100,8 +100,9 @@ def responses_of(cells: Cells, speed: Array, opening: Array, reference: Array) -
     lasting: list[Usual] = []
     changes: list[float | None] = []
     for i, wheel in enumerate(cells.machine.wheels):
-        told = cells.explained(wheel) if not cells.mostly_explained(wheel) else np.zeros(len(log), dtype=np.bool_)
-        own = np.where(told, np.nan, log[:, i])  # what a stated fault makes of the wheel is not what is usual
+        own = np.where(cells.explained(wheel), np.nan, log[:, i])  # a stated fault is not what is usual
+        if np.count_nonzero(np.isfinite(own)) < _LEAST_WINDOWS:  # it is nearly all that there is
+            own = log[:, i]
         usual: list[float] = []
         ways: list[float | None] = []
         for way in (ahead[:, i], ~ahead[:, i]):

@@ -34,6 +34,7 @@ _WHEELS = 3  # fewer have no others to be compared with
 _P = 0.93  # on tuning missions of nine machines 23 of 24 were faults of the part that is named
 _HALF, _LARGEST = 0.5, 0.8  # of the largest deviations, by this quantile: where a fault lasts
 _OPEN = (CODE[State.HEALTHY], CODE[State.NOT_ASSESSED])
+_COMMANDED = (*_OPEN, CODE[State.NOT_EXCITED])  # an axle that stands still under its command is excited
 
 
 @dataclass(frozen=True)
@@ -76,7 +77,9 @@ def _with(a: Assessment, finding: Finding) -> Assessment:
     """An assessment with one more fault."""
     states = a.states.copy()
     inside = states[finding.start : finding.stop]
-    inside[np.isin(inside, _OPEN)] = CODE[State(finding.mode.value)]
+    inside[np.isin(inside, _COMMANDED if finding.mode is FaultMode.NO_SIGNAL else _OPEN)] = CODE[
+        State(finding.mode.value)
+    ]
     return replace(a, states=states, findings=tuple(sorted((*a.findings, finding), key=lambda f: f.start)))
 
 

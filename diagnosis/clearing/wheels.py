@@ -36,6 +36,8 @@ def wheel_checks(cells: Cells, clear_at: float) -> Iterator[Checked]:
     reference = cells.reference
     twice = measured_twice(cells)
     used = np.where(np.isfinite(opening), opening, command)
+    apart = np.column_stack([cells.apart(wheel) for wheel in cells.machine.wheels])
+    speed, second, opening = (np.where(apart, x, np.nan) for x in (speed, second, opening))
     behind = off_commands(cells, opening, command, OPENING)
     responses = responses_of(cells, speed, used, reference)
     tells = openings_tell(cells, responses)
@@ -52,27 +54,29 @@ def wheel_checks(cells: Cells, clear_at: float) -> Iterator[Checked]:
             continue
         if twice[i][1]:
             off = compared(cells, speed[:, i], second[:, i], FLOOR * top).off
-            yield worst(cells, (*about, Side.SENSOR, Check.SECOND_MEASUREMENT), off, clear_at)
+            yield worst(cells, (*about, Side.SENSOR, Check.SECOND_MEASUREMENT), off, clear_at, apart=True)
         if twice[i][0]:
-            yield worst(cells, (*about, Side.ACTUATOR, Check.SECOND_MEASUREMENT), behind[:, i], VALVE * clear_at)
+            yield worst(
+                cells, (*about, Side.ACTUATOR, Check.SECOND_MEASUREMENT), behind[:, i], VALVE * clear_at, apart=True
+            )
         # where an opening is no speed, nothing of it is asked of a wheel that is measured twice on either side
         if _known(used[:, i]) and speed.shape[1] > OTHERS and (tells or not all(twice[i])):
             limit = limits[i]
-            yield worst(cells, (*about, either, Check.RESPONSE), -windows[:, i], limit.below)
+            yield worst(cells, (*about, either, Check.RESPONSE), -windows[:, i], limit.below, apart=True)
             below = lasts(cells, (*about, either, Check.LASTING_RESPONSE), lasting[i].below, limit.lasting_below)
             changed = lasts(cells, (*about, either, Check.LASTING_RESPONSE), changes[i], limit.changed)
             yield max(below, changed, key=_times)
             if not all(twice[i]):  # of a wheel that is measured twice on both sides, it is the ground's doing
-                yield worst(cells, (*about, either, Check.EXCESS), windows[:, i], limit.above)
+                yield worst(cells, (*about, either, Check.EXCESS), windows[:, i], limit.above, apart=True)
                 yield lasts(cells, (*about, either, Check.LASTING_EXCESS), lasting[i].above, limit.lasting_above)
         if _known(reference[:, i]):
             if (
                 _known(used[:, i]) or twice[i][1]
             ):  # a drive with a command alone is judged by how it answers it, not by its lag
-                yield worst(cells, (*about, either, Check.TRACKING), tracking[:, i], _TRACKING)
+                yield worst(cells, (*about, either, Check.TRACKING), tracking[:, i], _TRACKING, apart=True)
             if delays[i] is not None:
                 yield lasts(cells, (*about, Side.SENSOR, Check.DELAY), delays[i], LATE_S)
-        yield worst(cells, (*about, Side.SENSOR, Check.ROUGHNESS), rough[:, i], ROUGH)
+        yield worst(cells, (*about, Side.SENSOR, Check.ROUGHNESS), rough[:, i], ROUGH, apart=True)
 
 
 def _known(x: Array) -> bool:

@@ -11,7 +11,7 @@ _FEW = 3  # in a window: fewer are a recorder's
 
 
 def wild_readings(cells: Cells, speed: Array, floor: float) -> Array:
-    """Mean height of the wild readings of each wheel as a share of its speed; 0 where there are few.
+    """Mean height of the wild readings of each wheel as a share of its speed; 0 where there are few, and in stated faults.
 
     Parameters
     ----------
@@ -41,9 +41,9 @@ def wild_readings(cells: Cells, speed: Array, floor: float) -> Array:
         alone = np.where(before * after > 0.0, np.minimum(np.abs(before), np.abs(after)), 0.0)
         usual = float(np.median(np.abs(before + after))) / 0.6745 / np.sqrt(6.0)
         wild = alone > max(_NOISES * usual, _OF_TOP * cells.machine.max_speed)
-        cell = at[1:-1][wild] // cells.width
-        height[:, i] = np.bincount(cell, alone[wild], minlength=cells.size)
-        count[:, i] = np.bincount(cell, minlength=cells.size)
+        cell, apart = at[1:-1][wild] // cells.width, cells.apart(wheel)
+        height[:, i] = np.bincount(cell, alone[wild], minlength=cells.size) * apart
+        count[:, i] = np.bincount(cell, minlength=cells.size) * apart
     many = frame.sums(count)
     mean = frame.sums(height) / np.maximum(many, 1.0)
     return np.asarray(np.where(many >= _FEW, mean / np.maximum(np.nan_to_num(frame.rms(speed)), floor), 0.0))

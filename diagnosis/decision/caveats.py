@@ -247,7 +247,7 @@ def more_caveats(mission: Mission, first_ns: int, machine: Machine) -> list[str]
         reason = mission.signals.missing.get(absent[0], "")
         commands = any(name.startswith("cmd.") or name.endswith((".v_ref", ".phi_ref", ".u")) for name in absent)
         out.append(
-            f"Named in the machine file but not found in the log: {', '.join(absent)}"
+            f"Named in the machine file but not found in the log: {', '.join(_alike(absent))}"
             + (f" ({reason})" if reason else "")
             + "."
             + (
@@ -261,6 +261,19 @@ def more_caveats(mission: Mission, first_ns: int, machine: Machine) -> list[str]
     if cut > mission.timeline.dt:
         out.append(f"Only a part of the mission was judged; times count from its start, {cut:.3f} s into the log.")
     return out
+
+
+def _alike(names: Sequence[str]) -> list[str]:
+    """Names of signals, those of several parts in one: ``wheel.{FR,FL}.v_true``."""
+    groups: dict[tuple[str, str], list[str]] = {}
+    for name in names:
+        group, _, rest = name.partition(".")
+        part, _, leaf = rest.rpartition(".")
+        groups.setdefault((group, leaf), []).append(part)
+    return [
+        ".".join(x for x in (group, parts[0] if len(parts) == 1 else f"{{{','.join(parts)}}}", leaf) if x)
+        for (group, leaf), parts in groups.items()
+    ]
 
 
 def _without_speed(timeline: Timeline, machine: Machine) -> float:

@@ -264,13 +264,13 @@ def _without_faults(
         text = f"No fault was found, but {who} could not be judged long enough to be called healthy."
         return Decision(Verdict.NOT_ASSESSED, "Not judged long enough", text)
     if against.unexplained:
+        named = sorted({c for c, _ in against.unexplained})
         who = join_words(
-            sorted(
-                {
-                    against.words.part_words(Kind.STEER if c in axles else Kind.WHEEL, c, Side.SENSOR_OR_ACTUATOR)
-                    for c, _ in against.unexplained
-                }
-            )
+            [
+                against.words.listed(kind, parts)
+                for kind in (Kind.WHEEL, Kind.STEER)
+                if (parts := [(c, Side.SENSOR_OR_ACTUATOR) for c in named if (c in axles) is (kind is Kind.STEER)])
+            ]
         )
         most = max(assessments[part].unexplained_s for part in against.unexplained)
         text = f"No fault was identified, but no single fault explains the residual of the {who} for up to {seconds_words(most)}."

@@ -11,7 +11,7 @@ from diagnosis.decision.short import Part, ToClear, short_parts, unjudged_axles
 from diagnosis.decision.wording import count_words, join_words
 from diagnosis.results.assessed import needed_s
 from diagnosis.results.assessment import Assessment
-from diagnosis.results.clearing import Check, Checked
+from diagnosis.results.clearing import MAY_EXPLAIN, Check, Checked, share_covered
 from diagnosis.results.left_out import is_left_out
 from diagnosis.results.machine_words import MachineWords
 from diagnosis.results.result import FaultInterval
@@ -21,7 +21,6 @@ from replay.machine.config import Limits
 
 _STEERING = "steering was not judged"
 _NAMED = 2  # open checks
-_AFTER_S = 0.5  # of a fault, in which it still shows
 _STEERED = (Check.STILL, Check.RATE, Check.LASTING_RATE)
 _TURNED = (Check.YAW, Check.LASTING_YAW)
 
@@ -64,7 +63,7 @@ def to_clear(
             parts = {c for c, _ in against.unexplained if (c in axles) is (kind is Kind.STEER)}
             if not parts:
                 continue
-            who = join_words(sorted(words.part_words(kind, c, Side.SENSOR_OR_ACTUATOR) for c in parts))
+            who = words.listed(kind, [(c, Side.SENSOR_OR_ACTUATOR) for c in sorted(parts)])
             logged = all(
                 p in assessments and assessments[p].tier is Tier.DIRECT for p in ((c, "actuator") for c in parts)
             )
@@ -119,12 +118,16 @@ def _brief(part: Part, decided_s: Mapping[Part, float], driven: Mapping[Part, fl
 
 
 def _meanwhile(check: Checked, faults: Sequence[FaultInterval]) -> FaultInterval | None:
-    """The most severe fault that lasts while a check deviates, or just before; None where there is none."""
+    """The fault that may explain why a check deviates, one of the same part before others; None where there is none.
+
+    It lasts for a good part of the check's window, or ended just before.
+    """
     start, stop = check.start_s, check.stop_s
     if start is None or stop is None:
         return None
-    counted = (f for f in faults if f.severity is not Severity.INFO)
-    return next((f for f in counted if f.start_s < stop and f.stop_s + _AFTER_S > start), None)
+    share = {f.id: share_covered(start, stop, (f.start_s, f.stop_s)) for f in faults if f.severity is not Severity.INFO}
+    counted = (f for f in faults if share.get(f.id, 0.0) >= MAY_EXPLAIN)
+    return max(counted, key=lambda f: (f.component == check.component, share[f.id]), default=None)
 
 
 def _of_faults(blamed: Sequence[tuple[Checked, FaultInterval]], words: MachineWords) -> list[ToClear]:
@@ -138,7 +141,7 @@ def _of_faults(blamed: Sequence[tuple[Checked, FaultInterval]], words: MachineWo
         part = words.part_words(fault.kind, fault.component, fault.side)
         out.append(
             ToClear(
-                f"While {name} lasts, which may explain it: {_some([check.text for check, _ in mine])}.",
+                f"At the time of {name}, which may explain it: {_some([check.text for check, _ in mine])}.",
                 f"repair the {part} ({name}), then diagnose the next mission",
             )
         )

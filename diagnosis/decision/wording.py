@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from diagnosis.results.candidates import candidates, unclear_words
+from diagnosis.results.candidates import UNCLEAR, candidates, unclear_words
 from diagnosis.results.document import ActionRow
 from diagnosis.results.fault_rows import mode_words
 from diagnosis.results.machine_words import MachineWords
 from diagnosis.results.result import FaultInterval
+from diagnosis.results.sizes import loss_known
 from diagnosis.results.vocabulary import Severity
 from replay.faults import FaultMode, Side
 
@@ -81,10 +82,13 @@ def fault_words(f: FaultInterval) -> str:
 
 
 def _course(faults: Sequence[FaultInterval]) -> str:
-    """What one part was, kind by kind, and for how long."""
+    """What one part was, kind by kind, and for how long; what is unclear with its candidates where they are the same ones."""
+    said = [fault_words(f) for f in faults]
+    if len({kind for kind in said if kind.startswith(UNCLEAR)}) > 1:
+        said = [UNCLEAR if kind.startswith(UNCLEAR) else kind for kind in said]
     kinds: dict[str, list[FaultInterval]] = {}
-    for f in faults:
-        kinds.setdefault(fault_words(f), []).append(f)
+    for kind, f in zip(said, faults, strict=True):
+        kinds.setdefault(kind, []).append(f)
     return join_words([_how_long(kind, same) for kind, same in kinds.items()])
 
 
@@ -95,18 +99,21 @@ def _how_long(words: str, faults: Sequence[FaultInterval]) -> str:
 
 
 def _lost(faults: Sequence[FaultInterval]) -> str:
-    """What faults take of their part's effectiveness, where that is what they are: of one its 95 % bounds, of several their course."""
+    """What faults take of their part's effectiveness, where that is what they are, with 95 % bounds; of several with their course."""
     if not all(f.mode.scaled and f.mode is not FaultMode.OUTSIDE_TABLE for f in faults):
         return ""
-    known = [f.epsilon for f in faults if f.epsilon is not None]
+    sized = [f.epsilon for f in faults if f.epsilon is not None]
+    known = [e for e in sized if loss_known(e.low, e.high)]
     if not known:
-        return ""
-    if len(known) == 1:
-        value, low, high = (f"{100 * x:.0f}" for x in (known[0].value, known[0].low, known[0].high))
-        bounds = f", 95 % bounds {low} to {high} %" if low != high else ""  # which the rounding holds
-        return f" ({value} % lost{bounds})"
-    span = dict.fromkeys(f"{100 * x:.0f}" for x in (min(e.value for e in known), max(e.value for e in known)))
-    return f" ({' to '.join(span)} % lost{', from fault to fault' if len(span) > 1 else ''})"
+        return " (how much is lost is not known)" if sized else ""
+    sizes = [e.value for e in known]
+    span = list(dict.fromkeys(f"{100 * x:.0f}" for x in (min(sizes), max(sizes))))
+    low, high = (f"{100 * x:.0f}" for x in (min(e.low for e in known), max(e.high for e in known)))
+    course = ", from fault to fault" if len(span) > 1 else ""
+    bounds = (
+        f", 95 % bounds {low} to {high} %" if (low, high) != (span[0], span[-1]) else ""
+    )  # which the rounding holds
+    return f" ({' to '.join(span)} % lost{course}{bounds})"
 
 
 def sentence_of(faults: Sequence[FaultInterval], words: MachineWords) -> str:
@@ -120,9 +127,11 @@ def sentence_of(faults: Sequence[FaultInterval], words: MachineWords) -> str:
 
 
 def seconds_words(value: float) -> str:
-    """A duration [s] as shown: ``140 ms``, ``6.4 s``."""
+    """A duration [s] as shown: ``140 ms``, ``6.4 s``, ``3.4 min``; the pages say the same."""
     value = round(value, 6)  # which a difference of times may miss by its last digit
-    return f"{value * 1e3:.0f} ms" if value < 1 else f"{value:.1f} s"
+    if value < 120:
+        return f"{value * 1e3:.0f} ms" if value < 1 else f"{value:.1f} s"
+    return f"{value / 60:.1f} min" if value < 7200 else f"{value / 3600:.1f} h"
 
 
 def count_words(n: int, word: str) -> str:

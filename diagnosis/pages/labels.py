@@ -17,6 +17,7 @@ from diagnosis.results.document import IntervalRow
 from diagnosis.results.fault_rows import LOOKS, row_of, state_label
 from diagnosis.results.machine_words import MachineWords
 from diagnosis.results.size_rows import EpsilonRow
+from diagnosis.results.sizes import loss_known
 from replay.faults import FaultMode, Side
 from replay.machine.quantities import OPENING
 
@@ -168,7 +169,7 @@ def fault_title(fault: IntervalRow, words: MachineWords) -> str:
     if sat:
         noise = sat["rms"] * (epsilon["value"] if epsilon else 1.0)  # what stands in the readings is ε × sat
         sizes |= {"mean": sat_text(sat["mean"], sat["unit"], words), "rms": sat_text(noise, sat["unit"], words)}
-    if epsilon:
+    if epsilon and loss_known(epsilon["low"], epsilon["high"]):
         sizes["lost"] = f"{100 * epsilon['value']:.0f}"
     row = row_of(side, mode)
     if row is not None and row.title and {name for _, name, _, _ in Formatter().parse(row.title) if name} <= set(sizes):

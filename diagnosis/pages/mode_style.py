@@ -17,7 +17,7 @@ _RULES = (
     (".tyre.{m}, .axle.{m}", "stroke: var(--{m});"),
     (".bg.{m} > rect", "fill: var(--{m}); stroke: none;"),
     (".bg.{m} .gl", "color: var(--on-{m});"),
-    (".ln.{m}", "stroke: var(--{m}); stroke-width: 7;"),
+    (".ln.{m}", "stroke: var(--{m}); stroke-width: 12;"),
     (".fb.{m}", "background: var(--{m}); color: var(--on-{m});"),
     (".spark rect.{m}, .panel .f.{m}", "fill: var(--{m});"),
     (".conf .{m}, .stack .{m}", "background: var(--{m});"),

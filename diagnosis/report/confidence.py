@@ -11,6 +11,7 @@ from replay.faults import Side, State
 
 _WORDS = ((0.99, "Practically certain"), (0.9, "Very likely"), (0.7, "Likely"))
 _OPEN, _TIE = 0.9, 1e-3
+_NOTHING, _MOSTLY = 0.005, 0.5  # of the driving: judged for so little that it is none, and for most of it
 _UNLIKE = 0.1  # of the driving: sides that were judged for shares so far apart are told one by one
 _ANSWERS = {
     Verdict.STOP: "must not go out before repair",
@@ -52,14 +53,27 @@ def sure_of(fault: IntervalRow, report: ReportDocument) -> str:
     }
     if len(shares) > 1 and max(shares.values()) - min(shares.values()) > _UNLIKE:
         each = [
-            f"its {machine_words.part_name(fault['kind'], s)} was judged for {_share(shares[s]).replace('all', '100 %')}"
-            for s in side.sides
-            if s in shares
+            f"its {machine_words.part_name(fault['kind'], s)} was "
+            + (
+                "not judged"
+                if shares[s] < _NOTHING
+                else f"judged for {_share(shares[s]).replace('all', '100 %')} of the {machine_words.moving}"
+            )
+            for s in sorted(shares, key=lambda s: -shares[s])
         ]
-        words.append(f"{' and '.join(each)} of the {machine_words.moving}")
+        words.append(" and ".join(each))
     elif shares:
-        words.append(f"{_share(min(shares.values()))} of its {machine_words.moving} was judged")
+        words.append(_judged_words(min(shares.values()), machine_words.moving))
     return ", ".join(words)
+
+
+def _judged_words(share: float, moving: str) -> str:
+    """How much of a part's driving was judged: where that is little, the fault may be only what was seen of it."""
+    if share < _NOTHING:
+        return f"the rest of its {moving} could not be judged, so that it may be faulty for longer"
+    if share < _MOSTLY:
+        return f"only {_share(share)} of its {moving} was judged, so that it may be faulty for longer"
+    return f"{_share(share)} of its {moving} was judged"
 
 
 def _likely(p: float) -> str:

@@ -7,7 +7,7 @@ from typing import Any
 
 from diagnosis.pages.labels import bounded, grouped, number
 from diagnosis.report.judged_parts import kind_of
-from diagnosis.results.clearing import size_words
+from diagnosis.results.clearing import MAY_EXPLAIN, share_covered, size_words
 from diagnosis.results.clearing_rows import ClearingRow
 from diagnosis.results.document import (
     FileRow,
@@ -20,13 +20,13 @@ from diagnosis.results.fault_rows import state_label
 from diagnosis.results.left_out import only_left_out
 from diagnosis.results.loop_rows import LoopRow, MetricsRow
 from diagnosis.results.machine_words import MachineWords, words_of
+from diagnosis.results.vocabulary import Severity
 from replay.faults import FAULT_STATES, UNDECIDED, Side, State
 from replay.machine.quantities import OPENING
 
 #: What the template is given.
 Context = dict[str, Any]
 
-_AFTER_S = 0.5  # of a fault, in which it still shows in checks
 _TOLD_S = 0.1  # of a fault in which nothing of it shows, from which on that is worth a word
 
 
@@ -56,12 +56,16 @@ def coverage_rows(report: ReportDocument) -> list[Context]:
 
 
 def _meanwhile(report: ReportDocument, check: ClearingRow) -> str:
-    """The faults during which a check that does not pass deviates most, to follow its time."""
+    """The faults that may explain why a check does not pass, to follow its time."""
     start, stop = check["start_s"], check["stop_s"]
     if check["passed"] or start is None or stop is None:
         return ""
-    names = [f["id"] for f in report["intervals"] if f["start_s"] < stop and f["stop_s"] + _AFTER_S > start]
-    return f", during {', '.join(names)}" if names else ""
+    names = [
+        f["id"]
+        for f in report["intervals"]
+        if share_covered(start, stop, (f["start_s"], f["stop_s"])) >= MAY_EXPLAIN and f["severity"] != Severity.INFO
+    ]
+    return f", at the time of {', '.join(names)}" if names else ""
 
 
 def _unseen(faults: Sequence[IntervalRow], part: tuple[str, str], seen_s: float) -> list[str]:

@@ -11,6 +11,8 @@ from diagnosis.results.document import IntervalRow
 from diagnosis.results.fault_rows import mode_words, state_label
 from replay.faults import Side, State
 
+#: What a fault is called that has no such row.
+UNCLEAR = "faulty, kind unclear"
 _MAJORITY = 0.5  # of the probability of any fault of the part: a row that gives its name
 _CANDIDATE = 0.15  # one that is named beside others
 
@@ -46,12 +48,10 @@ def candidates_of(fault: IntervalRow) -> tuple[str, ...]:
 
 def label_of(fault: IntervalRow) -> str:
     """Heading of a fault: ``Stuck``, or ``Faulty, kind unclear``."""
-    return "Faulty, kind unclear" if candidates_of(fault) else state_label(fault["mode"], fault["side"])
+    return UNCLEAR.capitalize() if candidates_of(fault) else state_label(fault["mode"], fault["side"])
 
 
 def unclear_words(side: str, modes: Sequence[str]) -> str:
     """Candidates in words, to follow *was*: ``faulty, kind unclear (stuck or inefficient)``."""
     words = [mode_words(side, mode) for mode in modes]
-    return (
-        f"faulty, kind unclear ({', '.join(words[:-1])} or {words[-1]})" if len(words) > 1 else "faulty, kind unclear"
-    )
+    return f"{UNCLEAR} ({', '.join(words[:-1])} or {words[-1]})" if len(words) > 1 else UNCLEAR

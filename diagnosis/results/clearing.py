@@ -91,6 +91,9 @@ CHECK_WORDS: dict[Check, tuple[str, str]] = {
 }
 
 
+#: Share of a window that a fault must cover to explain what deviates over it: means of less are no total loss.
+MAY_EXPLAIN = 1 / 3
+_AFTER_S = (0.5, 3.0)  # of a fault, in which it still shows, at least and at most
 _BELOW = (Check.RESPONSE, Check.LASTING_RESPONSE)
 
 
@@ -158,6 +161,18 @@ class Checked:
         if self.check in _BELOW and self.worst > 1.0:
             return "over 100"
         return size_words(self.check, self.worst).removesuffix(" %")
+
+
+def after_s(start_s: float, stop_s: float) -> float:
+    """How long a fault still shows after its end [s]: what a loop has wound up in it takes as long to unwind, at most. Both in s."""
+    least, most = _AFTER_S
+    return min(max(stop_s - start_s, least), most)
+
+
+def share_covered(start_s: float, stop_s: float, fault: tuple[float, float]) -> float:
+    """Share of the window of a check [1] in which a fault lasts, or has just ended and still shows; all times in s."""
+    inside = min(stop_s, fault[1] + after_s(*fault)) - max(start_s, fault[0])
+    return max(0.0, inside) / max(stop_s - start_s, 1e-9)
 
 
 def size_words(check: str, value: float) -> str:

@@ -8,6 +8,12 @@ from diagnosis.results.plain_numbers import plain
 from replay.machine.quantities import OPENING
 
 _MOST, _LEAST = 1e6, 1.5
+_WIDEST = 0.95  # 95 % bounds of a loss that are as wide say nothing of it
+
+
+def loss_known(low: float, high: float) -> bool:
+    """Whether 95 % bounds of a loss [1] leave something known of it, so that a sentence may give its size."""
+    return high - low < _WIDEST
 
 
 def amount(value: float, unit: str, digits: int = 3) -> str:

@@ -32,9 +32,8 @@ class Doubted:
         if not self.wheels:
             return ""
         return (
-            f"{self.wheels} {{wheels}} deviate now and then from what the {{wheel}} model expects, each too little to name a fault. That several "
-            "parts fail in one mission is less probable than that the model does not fit this machine; no {wheel} is blamed, and these "
-            "times are not assessed."
+            f"{self.wheels} {{wheels}} deviate now and then from what the {{wheel}} model expects, each too little to name a fault; a "
+            "model that does not fit this machine is more probable than several faults, so no {wheel} is blamed, and these times are not assessed."
         )
 
 

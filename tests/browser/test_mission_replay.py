@@ -61,3 +61,15 @@ def test_it_plays_and_pauses_by_a_key(open_page: OPEN) -> None:
     stands = page.locator("#clock").inner_text()
     page.wait_for_timeout(200)
     assert page.locator("#clock").inner_text() == stands
+
+
+def test_plots_follow_the_clock_to_where_it_is_led(open_page: OPEN) -> None:
+    page = open_page("decided", "#fault=F1&t=27,39")
+    page.locator("#figure .main-svg").first.wait_for()
+    expect(page.locator("#badge")).not_to_have_text("drawing")
+    page.locator("#scrub").fill("80")
+    page.locator("#scrub").dispatch_event("change")
+    page.wait_for_url(re.compile(r"#fault=F1&t=74\.0000,86\.0000$"))
+    first = page.locator("#events button", has_text="FR speed sensor: the probability").first
+    first.click()
+    page.wait_for_url(re.compile(r"#fault=F1&t=2[45]\.\d+,3[67]\.\d+$"))

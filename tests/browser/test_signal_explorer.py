@@ -133,7 +133,7 @@ def test_signals_stand_by_part_and_several_are_added_at_once(open_page: OPEN) ->
     settled(page, r";d%3Awheel\.FL\.v,d%3Awheel\.FR\.v$")
     figure = page.locator("#signals-figure")
     expect(figure).to_contain_text("wheel.FL.v − wheel.FR.v")
-    expect(figure).to_contain_text("(m/s/s)")
+    expect(figure).to_contain_text("(m/s²)")
     columns = five_faults()[1]
     inside = (columns["t"] >= 28) & (columns["t"] <= 29)
     page.evaluate("location.hash = '#fault=F1&t=28,29&plots=wheel.FR.v%7Cwheel.FL.v;d%3Awheel.FL.v'")

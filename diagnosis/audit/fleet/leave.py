@@ -91,7 +91,8 @@ def _why(
     named += f" and {len(faults) - _FAULTS} more" if len(faults) > _FAULTS else ""
     if leave is Leave.MUST_NOT:
         place = faults[0]["last"] if faults else last
-        later = f"; {count(m['unjudged'], 'later mission')} not assessed" if m["unjudged"] else ""
+        was = "was" if m["unjudged"] == 1 else "were"
+        later = f"; {count(m['unjudged'], 'mission')} that may be later {was} not judged" if m["unjudged"] else ""
         return place, (named or m["standing"]) + later
     if leave is Leave.MAY:
         if any(not f["since"] for f in faults):

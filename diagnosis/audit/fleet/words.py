@@ -71,7 +71,7 @@ def forecast_words(f: Forecast, limit: float, axis: Axis = "hours") -> str:
 
 
 def standing(m: Machine) -> str:
-    """Where a machine stands: ``Stop and repair, and later missions not assessed``."""
+    """Where a machine stands: ``Stop and repair, and what may be later was not judged``."""
     words = m.verdict.short
     if m.verdict is Verdict.READY:
         return words
@@ -94,7 +94,7 @@ def standing(m: Machine) -> str:
             words += ", not cleared"
         elif lasting and m.cleared and not m.unjudged:
             words = "Ready, with faults to watch"
-    return words + (", and later missions not assessed" if m.unjudged else "")
+    return words + (", and what may be later was not judged" if m.unjudged else "")
 
 
 def _is_open(m: Machine) -> bool:

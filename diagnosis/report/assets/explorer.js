@@ -60,7 +60,7 @@ class Explorer {
     const of = (n) => { const c = this.names.get(n); return c === undefined ? null : { c, k: Data.view.channels[c].k, unit: Data.view.channels[c].unit }; };
     const plain = of(name);
     if (plain) return plain;
-    if (name.startsWith("d:")) { const t = of(name.slice(2)); return t && { ...t, op: "slope", unit: t.unit === "1" ? "1/s" : `${t.unit}/s`, words: `d/dt ${name.slice(2)}` }; }
+    if (name.startsWith("d:")) { const t = of(name.slice(2)); return t && { ...t, op: "slope", unit: t.unit === "1" ? "1/s" : t.unit.endsWith("/s") ? `${t.unit}²` : `${t.unit}/s`, words: `d/dt ${name.slice(2)}` }; }
     for (let i = name.indexOf("|"); i > 0; i = name.indexOf("|", i + 1)) {
       const t = of(name.slice(0, i)), other = this.names.get(name.slice(i + 1));
       if (t && other !== undefined) return { ...t, op: "minus", other, words: `${name.slice(0, i)} − ${name.slice(i + 1)}` };
@@ -123,7 +123,7 @@ class Explorer {
     one("#plots").replaceChildren(...this.plots.map((names, i) => {
       const item = document.createElement("li"), head = document.createElement("b");
       head.textContent = `Plot ${i + 1}`;
-      item.append(head, ...names.map((n) => button(n, i, n, `Remove ${n} from plot ${i + 1}`)));
+      item.append(head, ...names.map((n) => button(this.meaning(n).words ?? n, i, n, `Remove ${this.meaning(n).words ?? n} from plot ${i + 1}`)));
       if (names.length > 1) item.append(button("all", i, undefined, `Remove plot ${i + 1}`));
       return item;
     }));

@@ -174,7 +174,7 @@ class FigureLooks {
         domain: [Math.max(0, top - panel / plot), top], gridcolor: grid, zerolinecolor: line, fixedrange: true, nticks: 5, tickformat: ".4~g",
         ...Figure.ranged(cuts[i], row), ...(row.clip ? { autorangeoptions: { clipmin: row.clip[0], clipmax: row.clip[1] } } : {}),
       };
-      if (row.rightUnit) layout[`yaxis${100 + i}`] = { overlaying: `y${i ? i + 1 : ""}`, side: "right", anchor: "x", showgrid: false, zeroline: false, fixedrange: true, nticks: 4, tickfont: { color: muted }, tickformat: ".3~g", title: { text: Figure.text(`${row.rightUnit.title} (${row.rightUnit.unit})`), font: { size: 11, color: muted }, standoff: 2 } };
+      if (row.rightUnit) layout[`yaxis${100 + i}`] = { overlaying: `y${i ? i + 1 : ""}`, side: "right", anchor: "x", showgrid: false, zeroline: false, fixedrange: true, tickmode: "auto", nticks: 4, tickfont: { color: muted }, tickformat: ".3~g", title: { text: Figure.text(`${row.rightUnit.title} (${row.rightUnit.unit})`), font: { size: 11, color: muted }, standoff: 2 } };
       for (const level of row.levels ?? [row.level]) if (level !== undefined) layout.shapes.push({ type: "line", xref: "paper", yref: `y${i ? i + 1 : ""}`, x0: 0, x1: 1, y0: level, y1: level, line: { color: Figure.colour("stuck"), width: 1.3, dash: "dash" } });
       layout.annotations.push({
         xref: "paper", yref: "paper", x: 0, y: top, yshift: 3, xanchor: "left", yanchor: "bottom", showarrow: false, align: "left", font: { size: 12 },

@@ -98,9 +98,14 @@
   const mark = (name) => Now.t !== null && Now.set(Now.t, { [name]: Now.t });
 
   let pictures = null;
+  // Plots whose time in view does not hold the clock's move there, with the clock at a place of the view: 0 its beginning, 0.5 its middle.
+  const reach = (place) => {
+    const [a, b] = evidence?.drawn && Now.t !== null ? evidence.range : [Now.t, Now.t];
+    if (Now.t < a || Now.t > b) evidence.pan((Now.t - a) / (b - a) - place);
+  };
   root.addEventListener("now", () => {
     for (const f of Object.values(figures)) if (f?.drawn) f.read().show();
-    if (Now.playing && evidence?.drawn && (Now.t < evidence.range[0] || Now.t > evidence.range[1])) evidence.pan((Now.t - evidence.range[0]) / (evidence.range[1] - evidence.range[0]));
+    if (Now.playing) reach(0);
     Data.later().then(() => { (pictures ??= new Pictures(document)).show(); return replay?.show(); });
   });
 
@@ -115,7 +120,8 @@
   }));
   const play = () => one("#replay") && stage().then(() => replay.play());
   one("#scrub")?.addEventListener("input", (e) => { Now.set(+e.target.value, { held: true }); stage(); });
-  one("#events")?.addEventListener("click", (e) => { const b = e.target.closest("button"); if (b) Now.set(+b.dataset.at, { held: true }); });
+  one("#scrub")?.addEventListener("change", () => reach(0.5));
+  one("#events")?.addEventListener("click", (e) => { const b = e.target.closest("button"); if (b) { Now.set(+b.dataset.at, { held: true }); reach(0.5); } });
   // The cursor may as well be led along the timeline.
   one("#timeline")?.addEventListener("pointermove", (e) => {
     const box = e.target.closest(".track")?.getBoundingClientRect();

@@ -150,7 +150,9 @@ class Replay {
       const shares = await Promise.all(part.modes.map(({ channel }) => Data.at(channel, t).then(([a, b]) => (a + b) / 2)));
       let top = -1;
       shares.forEach((p, i) => { part.bar.children[i].style.width = `${100 * (p || 0)}%`; if (p > (shares[top] ?? -1)) top = i; });
-      part.says.textContent = top < 0 ? "not judged" : `${Data.view.words[part.side][part.modes[top].m]} ${Math.round(100 * shares[top])} %`;
+      const most = top < 0 ? "not judged" : `${Data.view.words[part.side][part.modes[top].m]} ${Math.round(100 * shares[top])} %`, slight = top >= 0 && part.modes[top].m !== "healthy" && !Data.view.faults.some((f) => Replay.of(f, part) && f.start <= t && t < f.stop);
+      part.bar.classList.toggle("slight", slight);
+      part.says.textContent = slight ? `healthy: deviates by less than counts (${most})` : most;
       part.bar.setAttribute("aria-label", `${part.words}: ${part.says.textContent}`);
     }
   }

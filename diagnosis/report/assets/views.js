@@ -43,7 +43,7 @@ const Views = {
   values: (t, range) => (t.op ? Figure.computed(t, ...range) : Data.samples(t.c, ...range).then((d) => ({ ...d, y: d.y.map((v) => v * t.k) }))),
 
   async draw(element, kind, rows, range) {
-    const Plotly = await Data.plotly(), [text, muted, line, grid] = ["text", "muted", "line", "line2"].map(Figure.colour), traces = [], notes = [], named = (t) => `${t.name}${t.unit === "1" ? "" : ` (${t.unit})`}`;
+    const Plotly = await Data.plotly(), [text, muted, line, grid] = ["text", "muted", "line", "line2"].map(Figure.colour), traces = [], notes = [], named = (t) => `${t.name.replace(/ →$/, "")}${t.unit === "1" ? "" : ` (${t.unit})`}`;
     const used = kind === "xy" ? rows.filter((r) => r.traces.length > 1) : rows, one = used.length, axes = {};
     for (const [i, row] of used.entries()) {
       const all = await Promise.all(row.traces.map((t) => Views.values(t, range))), n = i ? i + 1 : "", top = 1 - i / one, coarse = Math.max(...all.map((d) => d.stride)), parts = kind === "xy" ? all.slice(1) : all;

@@ -63,6 +63,24 @@ def test_what_a_stated_fault_makes_of_its_part_is_not_held_against_it() -> None:
     assert [c.text for c in told.values() if not c.passed and c.worst is not None] == []
 
 
+def test_a_stated_fault_explains_no_more_than_its_own_time() -> None:
+    """Windows of three seconds reach beyond a brief fault that is stated within a longer one."""
+    fault = FaultSpec("FR", Side.SENSOR, FaultMode.INEFFICIENT, 20.2, 23.0, 0.5, 0.0)
+    cells = in_cells(simulated(fault), base=False)
+
+    def second(*stated: tuple[float, float]) -> Checked:
+        found = checks_of(replace(cells, stated={"FR": list(stated)}), HYDRAULIC)
+        return next(
+            c for c in found if (c.component, c.check) == ("FR", Check.SECOND_MEASUREMENT) and c.side is Side.SENSOR
+        )
+
+    assert second((20.2, 23.0)).passed
+    brief = second((21.4, 21.8))
+    assert not brief.passed
+    assert brief.start_s is not None
+    assert 18.0 < brief.start_s < 23.0
+
+
 def test_spikes_and_delay_do_not_pass() -> None:
     mission = simulated()
     rng = np.random.default_rng(1)

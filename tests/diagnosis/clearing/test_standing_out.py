@@ -53,7 +53,14 @@ def test_an_axle_that_stands_still_is_named_and_explains_its_wheels() -> None:
     found = _found(FaultSpec("front", Side.ACTUATOR, FaultMode.NO_SIGNAL, *WHOLE))
     assert list(found) == ["front"]
     assert found["front"].mode is FaultMode.NO_SIGNAL
-    assert "stands still" in found["front"].evidence[0]
+    fault = found["front"]
+    assert "stands still" in fault.evidence[0]
+    rest = np.full(
+        fault.stop + 100, CODE[State.NOT_EXCITED], dtype=np.int8
+    )  # which a command that moves nothing is not
+    after = with_findings({("front", "actuator"): Assessment(rest)}, found)["front", "actuator"]
+    assert set(after.states[fault.start : fault.stop]) == {CODE[State.NO_SIGNAL]}
+    assert after.states[fault.stop] == CODE[State.NOT_EXCITED]
 
 
 def test_states_of_both_sides_say_the_fault_but_where_nothing_was_known() -> None:

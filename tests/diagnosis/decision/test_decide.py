@@ -14,6 +14,7 @@ from diagnosis.results.assessment import CODE, Assessment, Finding, unassessed
 from diagnosis.results.detectability import Detectable, Deviation
 from diagnosis.results.machine_event import not_following
 from diagnosis.results.machine_words import HYDRAULIC
+from diagnosis.results.result import Epsilon, Hypothesis
 from diagnosis.results.vocabulary import Kind, Tier
 from diagnosis.results.wheel_model import WheelModelFit
 from replay.faults import FaultMode, Side, State
@@ -271,6 +272,30 @@ def test_the_sentence_names_parts_in_the_order_of_the_actions_with_what_they_los
         "The FL drive valve was without control signal for 4.0 s and stuck for 2.0 s; the FR speed sensor was stuck for 9.0 s."
     )
     assert "inefficient (40 % lost, 95 % bounds 39 to 41 %) for 3.0 s" in str(got.actions[0]["text"])
+
+
+def test_what_is_unclear_in_several_ways_is_said_once_and_losses_have_bounds() -> None:
+    def unclear(start: int, *modes: str) -> Finding:
+        rows = [Hypothesis("actuator", mode, 0.9 / len(modes)) for mode in modes]
+        found = finding(Side.ACTUATOR, FaultMode.STUCK, start, start + 500)
+        return replace(found, hypotheses=(*rows, Hypothesis("none", "healthy", 0.1)))
+
+    parts = (
+        unclear(0, "stuck", "inefficient", "noisy"),
+        unclear(2000, "stuck", "no_signal", "noisy"),
+        finding(Side.ACTUATOR, FaultMode.INEFFICIENT, 9_000, 139_000, epsilon=0.4),
+        finding(Side.ACTUATOR, FaultMode.INEFFICIENT, 200_000, 201_000, epsilon=0.5),
+    )
+    text = str(verdict(machine(FR_actuator=assessed(*parts))).actions[0]["text"])
+    assert "faulty, kind unclear for 1.0 s in 2 faults" in text
+    assert "inefficient (40 to 50 % lost, from fault to fault, 95 % bounds 39 to 51 %) for 2.2 min in 2 faults" in text
+
+
+def test_a_loss_of_which_nothing_is_known_has_no_size() -> None:
+    vague = replace(finding(Side.ACTUATOR, FaultMode.INEFFICIENT, 9_000, 19_000), epsilon=Epsilon(0.5, 0.0, 1.0))
+    text = str(verdict(machine(FR_actuator=assessed(vague))).actions[0]["text"])
+    assert "inefficient (how much is lost is not known) for 10.0 s" in text
+    assert "50 %" not in text
 
 
 def test_open_driving_has_the_reason_that_it_has_while_driving() -> None:

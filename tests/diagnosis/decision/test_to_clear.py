@@ -62,9 +62,9 @@ def test_what_deviates_while_a_fault_lasts_is_told_as_its_possible_doing() -> No
     parts = {("RR", "actuator"): assessed(finding(Side.ACTUATOR, FaultMode.STUCK, 1000, 3000))}
     faults = intervals_of(parts, haulotte(), HYDRAULIC, 0, 1_000_000)
     part = (Kind.WHEEL, "FR", Side.SENSOR_OR_ACTUATOR, Check.RESPONSE, 0.4, 0.1)
-    during, after, lasting = (Checked(*part, a, b) for a, b in ((2.0, 5.0), (4.0, 7.0), (None, None)))
+    during, after, lasting = (Checked(*part, a, b) for a, b in ((2.0, 5.0), (4.2, 7.2), (None, None)))
     rows = to_clear(Reservations(open=(during,)), PARTS, {}, {}, [], Limits(), faults)
-    assert rows[0].reason.startswith("While F1 lasts, which may explain it: the speed of FR per opening falls")
+    assert rows[0].reason.startswith("At the time of F1, which may explain it: the speed of FR per opening falls")
     assert rows[0].act == "repair the RR drive valve (F1), then diagnose the next mission"
     for check in (after, lasting):
         (row,) = to_clear(Reservations(open=(check,)), PARTS, {}, {}, [], Limits(), faults)

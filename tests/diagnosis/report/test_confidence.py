@@ -51,7 +51,7 @@ def test_phrase_of_a_fault() -> None:
     )
     unlike = samples.report_with(coverage=[row("actuator", 10.0), row("sensor", 98.0)])
     assert sure_of(fault(0.995, side="sensor_or_actuator"), unlike).endswith(
-        "its speed sensor was judged for 98 % and its drive valve was judged for 10 % of the driving"
+        "its speed sensor was judged for 98 % of the driving and its drive valve was judged for 10 % of the driving"
     )
     # certainly faulty, the row less so
     words = sure_of(fault(0.49, hypotheses=[{"side": "actuator", "mode": "stuck", "p": 0.49}]), nothing)
@@ -67,9 +67,23 @@ def test_phrase_of_a_fault() -> None:
 
 def test_both_sides_count_where_they_are_not_told_apart() -> None:
     report = samples.report_with(coverage=[row("actuator", 40.0), row("sensor", 100.0)])
-    assert "for 100 % and its drive valve was judged for 40 % of the driving" in sure_of(
+    assert "for 100 % of the driving and its drive valve was judged for 40 % of the driving" in sure_of(
         fault(0.99, side="sensor_or_actuator", tier="tracking"), report
     )
+
+
+def test_a_fault_of_a_part_that_was_hardly_judged_may_last_for_longer() -> None:
+    def words(*rows: dict[str, Any], side: str = "actuator") -> str:
+        return sure_of(fault(0.93, side=side), samples.report_with(coverage=list(rows)))
+
+    assert words(row("actuator", 0.0)).endswith(
+        "the rest of its driving could not be judged, so that it may be faulty for longer"
+    )
+    assert words(row("actuator", 23.0)).endswith(
+        "only 23 % of its driving was judged, so that it may be faulty for longer"
+    )
+    both = words(row("actuator", 0.0), row("sensor", 100.0), side="sensor_or_actuator")
+    assert both.endswith("its speed sensor was judged for 100 % of the driving and its drive valve was not judged")
 
 
 def test_phrase_of_a_verdict() -> None:

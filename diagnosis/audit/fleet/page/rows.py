@@ -16,6 +16,7 @@ from diagnosis.audit.store.outcome import MissionState
 from diagnosis.pages import labels
 from diagnosis.results.fault_rows import state_label
 from diagnosis.results.machine_words import ANY_DRIVE, MachineWords, words_of
+from diagnosis.results.sizes import loss_known
 from diagnosis.results.vocabulary import Verdict
 from replay.faults import SCALED
 
@@ -45,7 +46,8 @@ def fault_words(fault: FleetFaultRow | MissionFaultRow, machine_words: MachineWo
     words = machine_words.part_words(fault["kind"], fault["component"], fault["side"])
     words += f" {state_label(fault['mode'], fault['side']).lower()}"
     e = fault["epsilon"]
-    return words + (f" {100 * e['value']:.0f} %" if e and fault["mode"] in SCALED else "")
+    sized = e is not None and fault["mode"] in SCALED and loss_known(e["low"], e["high"])
+    return words + (f" {100 * e['value']:.0f} %" if e and sized else "")
 
 
 def _verdict_words(verdict: Verdict | None) -> str:

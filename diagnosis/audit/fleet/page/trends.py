@@ -76,7 +76,9 @@ def course(t: TrendRow, machines: Sequence[MachineRow], unit: str) -> Context:
     words, beyond = t["forecast"]["words"], t["points"][-1][2] >= t["limit"]
     if beyond and t["forecast"]["state"] == "not_known":
         notes.insert(0, f"how it goes on is {words}")
-        words = f"above the limit of {round_to(t['limit'])}: ε̂ {t['points'][-1][2]:.2f} in its last mission"
+        words = (
+            f"above the limit of {round_to(t['limit'])}: ε̂ {t['points'][-1][2]:.2f} over the whole of its last mission"
+        )
     state = "above" if beyond or t["forecast"]["state"] == "above" else "near" if t["approaching"] else "calm"
     return {
         "title": title,

@@ -91,8 +91,8 @@ def test_a_log_whose_clock_runs_ahead_makes_no_other_one_older(tmp_path: Path) -
 @pytest.mark.parametrize(
     ("verdict", "severity", "standing"),
     [
-        ("stop", "high", "Stop and repair, and later missions not assessed"),
-        ("watch", "low", "Faults to watch, and later missions not assessed"),
+        ("stop", "high", "Stop and repair, and what may be later was not judged"),
+        ("watch", "low", "Faults to watch, and what may be later was not judged"),
     ],
 )
 def test_a_finding_stays_though_later_missions_were_not_judged(

@@ -1,0 +1,53 @@
+"""Statements on how much of a part was judged, and on what its faults explain, that cannot be true beside its table and states."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from diagnosis.report.confidence import sure_of
+
+_SURE = 0.9
+_STILL_SHOWS_S = 0.5
+_EXPLAINS = 0.3
+
+
+def of_coverage(report: Mapping[str, Any]) -> Iterator[str]:
+    """A fault that is sure though nothing of its part was judged, or nothing moved that could show it."""
+    for fault in report["intervals"]:
+        name = f"{fault['id']} {fault['component']} {fault['side']} {fault['mode']}"
+        words = sure_of(fault, report)  # type: ignore[arg-type]
+        if re.search(r"\b0 % of", words):
+            yield f"{name}: {words!r}"
+        sides = ("sensor", "actuator") if fault["side"] == "sensor_or_actuator" else (fault["side"],)
+        if fault["probability"] < _SURE or fault["severity"] == "info":
+            continue
+        resting = [_resting(fault, side, report) for side in sides]
+        if min(resting) > 0.5:
+            yield f"{name}: its part is not excited for {100 * min(resting):.0f} % of it"
+
+
+def _resting(fault: Mapping[str, Any], side: str, report: Mapping[str, Any]) -> float:
+    """Share of a fault in which nothing moved that could show one."""
+    start, stop, out = fault["start_s"], fault["stop_s"], 0.0
+    for s in report["states"]:
+        if (s["component"], s["side"], s["state"]) == (fault["component"], side, "not_excited"):
+            out += max(0.0, min(stop, s["stop_s"]) - max(start, s["start_s"]))
+    return out / max(stop - start, 1e-9)
+
+
+def of_checks(report: Mapping[str, Any]) -> Iterator[str]:
+    """A check that is put down to a fault which lasts for a moment of its window alone."""
+    faults = {f["id"]: f for f in report["intervals"]}
+    for row in report["verdict"]["to_clear"]:
+        found = re.match(r"At the time of (F\d+), ", row["reason"])
+        if not found:
+            continue
+        fault = faults[found.group(1)]
+        for start, stop in re.findall(r" at ([\d.]+)–([\d.]+) s", row["reason"]):
+            a, b = float(start), float(stop)
+            after = min(max(fault["stop_s"] - fault["start_s"], _STILL_SHOWS_S), b - a)
+            shared = min(b, fault["stop_s"] + after) - max(a, fault["start_s"])
+            if shared < _EXPLAINS * (b - a) - 0.1:
+                yield f"{fault['id']} lasts for {max(shared, 0.0):.1f} s of what it may explain: {row['reason']!r}"
