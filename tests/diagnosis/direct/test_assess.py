@@ -383,3 +383,27 @@ def test_causal_probability_of_a_fault() -> None:
     assert probability.shape == (N,)
     assert np.median(probability[: START - 10]) < 0.01
     assert np.median(probability[START + 50 : STOP]) > 0.99
+
+
+def test_a_loss_beside_a_resting_command_is_what_it_is_where_the_command_moves() -> None:
+    """A valve does not stick at just the share of its command that it lost before."""
+    rng = np.random.default_rng(9)
+    x = drive()
+    x[9000:] = x[9000]
+    y = x + 0.002 * rng.normal(size=N)
+    y[4000:] = 0.5 * x[4000:] + 0.002 * rng.normal(size=N - 4000)
+    found = assess_pair(pair(Side.ACTUATOR, y, x), LIMITS).findings
+    assert {f.mode for f in found} == {FaultMode.INEFFICIENT}
+    assert all(f.probability > 0.9 for f in found)
+    assert all(f.epsilon is not None and abs(f.epsilon.value - 0.5) < 0.05 for f in found)
+
+
+def test_a_gain_within_the_limits_is_not_joined_to_a_loss_that_follows_it() -> None:
+    rng = np.random.default_rng(10)
+    true = drive()
+    y = 1.01 * true + 0.001 * rng.normal(size=N)
+    y[7000:] = 0.5 * true[7000:] + 0.001 * rng.normal(size=N - 7000)
+    y[7000:7030] += 0.1 * rng.normal(size=30)
+    found = single(assess_pair(pair(Side.SENSOR, y, true + 0.001 * rng.normal(size=N)), LIMITS))
+    assert found.mode is FaultMode.INEFFICIENT
+    assert abs(found.start - 7000) < 100

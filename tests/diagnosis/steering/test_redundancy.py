@@ -72,3 +72,20 @@ def test_a_valve_behind_a_lag_in_a_slow_log_follows_its_command() -> None:
     assert np.isnan(r.share).all()
     assert np.nanquantile(np.abs(apart), 0.99) < 2.0
     assert np.nanmedian(np.sqrt(r.opening_variance)) < 0.01
+
+
+def test_a_valve_that_lags_does_not_follow_jitter_at_once() -> None:
+    """A controller that switches to and fro at the edge of a dead band, and a valve whose lag passes some of that on."""
+    rng = np.random.default_rng(6)
+    step, lag = 10 * DT, 0.06
+    t = np.arange(SIZE) * step
+    u = np.where(np.sin(0.8 * t) > 0.9, 0.7, 0.0) + 0.08 * (rng.random(SIZE) < 0.5)
+    keep, opening = np.exp(-step / lag), np.empty_like(u)
+    y = 0.0
+    for k, value in enumerate(u):
+        y = keep * y + (1 - keep) * value
+        opening[k] = y
+    opening += rng.normal(0.0, 1e-3, SIZE)
+    found, _ = with_valve_opening(blocks_of(np.zeros(SIZE), u, ALWAYS, ALWAYS, step), u, opening, ALWAYS, step)
+    apart = np.abs(found.redundancy.opening - found.redundancy.command)[5:]
+    assert np.nanmax(apart) < 0.1

@@ -111,3 +111,13 @@ def test_a_sensor_that_shows_hardly_anything_leaves_its_valve_open() -> None:
     (finding,) = out.findings
     assert out.opened[Side.ACTUATOR][finding.start : finding.stop].all()
     assert not found(weighed(100, 200, Side.SENSOR, FaultMode.INEFFICIENT)).opened[Side.ACTUATOR].any()
+
+
+@pytest.mark.parametrize(("step", "p", "stated"), [(False, 0.75, False), (True, 0.75, True), (False, 0.85, True)])
+def test_a_loss_that_is_hardly_probable_needs_its_step(step: bool, p: float, stated: bool) -> None:
+    """At 0.3 m/s half of the speed cannot go without one."""
+    y = 0.3 + 0.001 * np.random.default_rng(5).normal(size=BLOCKS * WIDTH)
+    if step:
+        y[1000:2000] *= 0.5
+    out = found(weighed(100, 200, Side.SENSOR, FaultMode.INEFFICIENT, p=p), y=y)
+    assert bool(out.findings) is stated

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -218,3 +220,19 @@ def test_a_sensor_that_moves_is_not_stuck() -> None:
     resting = judged(of, np.full(SIZE, 0.2)).finding
     assert resting is not None
     assert resting.mode is FaultMode.STUCK
+
+
+def test_a_row_that_the_wheels_own_model_does_not_prefer_is_no_certain_one() -> None:
+    def with_evidence(m: int, ahead: float) -> float:
+        of = run(m, {m: 0.97})
+        evidence = of.evidence.copy()
+        evidence[m] = ahead
+        y = np.full(SIZE, 0.2) if m == S_STUCK else moving()
+        got = judged(replace(of, evidence=evidence), y).finding
+        assert got is not None
+        assert sum(h.p for h in got.hypotheses) == pytest.approx(1.0, abs=0.01)
+        return got.probability
+
+    assert with_evidence(S_GAIN, 50.0) == pytest.approx(0.97)
+    assert with_evidence(S_GAIN, -50.0) == pytest.approx(0.88)
+    assert with_evidence(S_STUCK, -50.0) == pytest.approx(0.97)  # a value that is held is seen by itself
