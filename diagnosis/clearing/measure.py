@@ -111,8 +111,10 @@ def off_commands(cells: Cells, openings: Array, commands: Array, floor: float) -
     """How far openings are off their commands in each window, as `Compared.off` has it, shape (windows, valves).
 
     A valve is as slow as most of a machine's valves, or as the next slower or quicker would be; what is in one window and in
-    none beside it is what is left of a jump before it. All arguments as of `as_followed`.
+    none beside it is what is left of a jump before it. All arguments as of `as_followed`, openings and commands [1].
     """
+    if not openings.shape[1]:
+        return np.zeros((cells.frame.starts.size, 0))
     best = _best_lag(cells, openings, commands, floor)
     tried = [_behind(commands, cells.dt, lag) for lag in _LAGS_S[max(0, best - 1) : best + 2]]
     off = np.column_stack(
