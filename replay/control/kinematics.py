@@ -2,7 +2,8 @@
 
 Readings of the printed text: the angle is taken along the direction in which the wheel rolls, so that reversing does
 not turn the wheels round (φ = atan2(s·v_ky, s·v_kx), s = sgn(v_kx)), and ω_j of L1 is the yaw rate of the wheel frame,
-ω_b + φ̇. Then v_c,i = s·|v_k| − (ω_b + φ̇)·d_i exactly.
+ω_b + φ̇. Then v_c,i = s·|v_k| − (ω_b + φ̇)·d_i exactly. Where some wheels are not steered, v_c is the speed of the middle between
+them: nothing else moves along the machine alone, as L1 supposes of its centre.
 """
 
 from __future__ import annotations
@@ -142,7 +143,7 @@ def wheel_commands(
     angle = np.empty((v.size, len(geometry.wheels)))
     speed = np.empty(angle.shape)
     for i, (name, w) in enumerate(geometry.wheels.items()):
-        v_x, v_y = v - omega * w.y, omega * w.x
+        v_x, v_y = v - omega * w.y, omega * (w.x - geometry.still_x)
         s = np.where(v_x < 0, -1.0, 1.0)
         if w.axle == "fixed":
             angle[:, i] = 0.0
@@ -176,7 +177,7 @@ def _axle_angles(
     """Direction of the velocity at the middle of each steered axle [rad], shape (n, axles); the state is carried on."""
     out = np.empty((v.size, len(geometry.axles)))
     for j, axle in enumerate(geometry.axles):
-        x = geometry.axle_x(axle)
+        x = geometry.axle_x(axle) - geometry.still_x
         y = next((w.y for name, w in geometry.wheels.items() if axle == own_axle(name)), 0.0)
         key = f"axle {axle}"
         out[:, j] = steering_angle(v - omega * y, omega * x, max_steer, state.held.get(key, 0.0))

@@ -54,6 +54,20 @@ class Geometry:
         """Steered axles in order of first use."""
         return tuple(dict.fromkeys(w.axle for w in self.wheels.values() if w.axle != "fixed"))
 
+    @property
+    def still_x(self) -> float:
+        """Where the body does not move sideways in a turn [m]: mean x of its unsteered wheels; 0 where all are steered."""
+        xs = [w.x for w in self.wheels.values() if w.axle == "fixed"]
+        return sum(xs) / len(xs) if xs else 0.0
+
+    @property
+    def steering_base(self) -> float | None:
+        """From the unsteered wheels forward to the steered ones [m]; None where it is not one end of the machine that steers."""
+        still, xs = self.still_x, [w.x for w in self.wheels.values() if w.axle != "fixed"]
+        if not xs or len(xs) == len(self.wheels) or min(xs) <= still <= max(xs):
+            return None
+        return sum(xs) / len(xs) - still
+
     def axle_x(self, axle: str) -> float:
         """Position of an axle along the machine [m]: mean x of its joints."""
         xs = [w.x for w in self.wheels.values() if w.axle == axle]

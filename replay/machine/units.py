@@ -43,6 +43,12 @@ def known_unit(text: str) -> str | None:
     return _ALIASES.get(word) or _NO_CASE.get(word)
 
 
+def is_angle(unit: str) -> bool:
+    """Whether a recorded unit is one of angles."""
+    name = known_unit(unit)
+    return name is not None and UNITS[name][0] == "angle"
+
+
 def kept_unit(signal: str, recorded: str) -> str:
     """Unit in which a signal is kept: SI, of an effort the one of its kind: ``A`` of one in mA, ``1`` of a share.
 
@@ -114,6 +120,10 @@ def si_factor(
             )
         return factor / UNITS[speed_unit][1] / (gear_ratio if at == "motor" else 1.0)
     if quantity == wanted or (wanted == "effort" and quantity == "fraction"):
+        return factor
+    if (
+        signal == "cmd.omega" and quantity == "angle"
+    ):  # of a car's steering; `turned_by_steering` makes a yaw rate of it
         return factor
     if quantity == "effort" and signal.endswith(".u"):
         raise ConfigError(

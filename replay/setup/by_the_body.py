@@ -1,4 +1,4 @@
-"""Wheel radius and track by what measures the body itself: odometry or GNSS beside the wheels, the yaw rate beside the two sides."""
+"""Wheel radius, track and wheelbase by what measures the body itself: odometry or GNSS beside the wheels, the yaw rate beside the two sides or the steering."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from replay.log.source_options import SignalSource
 from replay.machine.geometry import WheelGeometry
 from replay.setup.motion import held
 from replay.signals.signal import Signal, Signals
+from replay.signals.steering_command import is_steering_command
 
 Array = NDArray[np.float64]
 
@@ -91,6 +92,29 @@ def track_by_yaw(
     left, right = (np.mean([_forward(s, origins, at) for s in side], axis=0) for side in sides)
     gain = _gain(held(yaw, at), radius * (right - left))
     return Measured(abs(gain), "the yaw rate") if gain is not None else None
+
+
+def base_by_yaw(found: Signals, base: float) -> Measured | None:
+    """Distance from unsteered to steered wheels that makes the commanded steering angle the measured yaw rate; None where nothing measures it.
+
+    Parameters
+    ----------
+    found : Signals
+        With a commanded yaw rate that was made of a steering angle with that distance taken to be `base`.
+    base : float
+        Distance [m].
+
+    Returns
+    -------
+    Measured or None
+        Negative where the angle is positive to the right.
+    """
+    yaw, asked = found.items.get("imu.yaw_rate"), found.items.get("cmd.omega")
+    if yaw is None or asked is None or not is_steering_command(asked):
+        return None
+    at = _moments([yaw, asked])
+    gain = _gain(held(yaw, at), base * held(asked, at))
+    return Measured(gain, "the yaw rate beside commanded speed and steering angle") if gain is not None else None
 
 
 def _forward(signal: Signal, origins: Mapping[str, SignalSource], at: NDArray[np.int64]) -> Array:

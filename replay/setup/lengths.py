@@ -11,10 +11,10 @@ import numpy as np
 from replay.log.raw_log import RawLog
 from replay.log.source_options import SignalSource
 from replay.machine.config import Limits, Machine, haulotte
-from replay.machine.geometry import WheelGeometry
+from replay.machine.geometry import Geometry, WheelGeometry
 from replay.machine.quantities import UNITS
 from replay.machine.units import known_unit
-from replay.setup.by_the_body import Measured, track_by_yaw
+from replay.setup.by_the_body import Measured, base_by_yaw, track_by_yaw
 from replay.setup.draft_notes import Draft
 from replay.setup.motion import WheelMotion
 from replay.setup.structure import ONE, Structure
@@ -24,6 +24,7 @@ from replay.signals.signal import Signal, Signals
 from replay.signals.to_si import peak_of
 
 _RADII, _TRACKS = (0.02, 2.5), (0.05, 4.0)  # m
+_BASES = 20.0  # m; the longest
 _HEADROOM = 1.2
 _DIFFERS = 0.15
 _STANDS_IN_RADIUS = 0.1  # m; where nothing tells it
@@ -191,6 +192,9 @@ def wheel_places(
     base = max(p.x for p in places.values()) - min(p.x for p in places.values())
     if "wheelbase" in structure.measured:
         draft.say("geometry", f"Wheelbase {base:.4g} m from {structure.how}.")
+    elif (by_yaw := _base_by_yaw(draft, places, None if measured is None else measured[0])) is not None:
+        stretch = by_yaw / base
+        places = {w: replace(p, x=round(p.x * stretch, 4)) for w, p in places.items()}
     elif base:
         matters = "fixed wheels do not need it" if fixed else "steering angles need it"
         draft.ask(
@@ -198,6 +202,22 @@ def wheel_places(
         )
     scale = track / max(max(p.y for p in places.values()) - min(p.y for p in places.values()), 1e-9)
     return {w: replace(p, y=round(p.y * scale, 4)) for w, p in places.items()}
+
+
+def _base_by_yaw(draft: Draft, places: Mapping[str, WheelGeometry], found: Signals | None) -> float | None:
+    """Distance of steered from unsteered wheels [m] by how the machine turns; None where nothing tells it."""
+    base = Geometry(dict(places), 1.0).steering_base
+    turned = None if found is None or base is None else base_by_yaw(found, abs(base))
+    if turned is None or not _TRACKS[0] <= abs(turned.length) <= _BASES:
+        return None
+    length = float(_round(abs(turned.length)))
+    draft.ask("geometry", f"are front and rear wheels {length:g} m apart? By {turned.by}. Measure it.")
+    if turned.length < 0:
+        draft.ask(
+            "signals",
+            "is the commanded steering angle positive to the right? The machine turns against it; give cmd.omega gain = -1.",
+        )
+    return length
 
 
 def _sides(

@@ -25,6 +25,7 @@ from replay.signals.name_parts import wheel_said
 from replay.signals.rules import candidates, wanted_type
 from replay.signals.scale_doubt import scale_doubt
 from replay.signals.signal import Signal, Signals
+from replay.signals.steering_command import turn_by_steering
 from replay.signals.to_si import Converted, choose_motor_or_wheel, convert, usable_unit
 from replay.signals.unfilled import unfilled, unfilled_note
 from replay.signals.unit_doubts import Doubt, doubt, questions
@@ -125,6 +126,7 @@ def map_signals(logs: Sequence[RawLog], machine: Machine) -> Signals:
     for name in machine.canonical_signals():
         if name not in machine.signals:
             _take_guess(draft, name, by_signal.get(name, []))
+    turn_by_steering(draft.items, draft.missing, machine)
     if draft.named:
         draft.notes.append(
             f"{len(draft.named)} signals were recorded under their own names, in SI unless a unit is given"

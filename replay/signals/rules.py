@@ -86,8 +86,11 @@ def _by_message(channel: Channel, machine: Machine, others: Mapping[str, Channel
     elif leaf.startswith("AckermannDrive"):
         if field in ("speed", "drive.speed"):
             yield found("cmd.v", "m/s", 4)
-        elif field in ("steering_angle", "drive.steering_angle") and "front" in machine.axles:
-            yield found("steer.front.phi_ref", "rad", 4)
+        elif field in ("steering_angle", "drive.steering_angle"):
+            if "front" in machine.axles:
+                yield found("steer.front.phi_ref", "rad", 4)
+            if machine.geometry is not None and machine.geometry.steering_base is not None:
+                yield found("cmd.omega", "rad", 5)
     elif leaf == "Odometry":
         rank = 1 if plain == "odom" else 2 if "odom" in plain else 4
         rank += 3 * bool(re.search(r"filter|gps|gnss|global|map", topic.lower()))

@@ -222,3 +222,24 @@ def test_low_pass_in_blocks_is_the_whole() -> None:
         out, state = _scan_low_pass(block, a, state)
         parts.append(out)
     assert_array_equal(np.concatenate(parts), whole)
+
+
+@pytest.mark.parametrize("middle", [0.0, 0.6, -0.4])
+def test_a_car_turns_about_its_unsteered_axle(middle: float) -> None:
+    """Wherever the file's origin lies: the single-track model's steering angle comes back, and a front wheel's own angle."""
+    base, track, v, delta = 1.2, 0.7, 1.0, 0.3
+    places = {
+        name: WheelGeometry(middle + x, y, 0.0, "front" if x else "fixed")
+        for name, x, y in (
+            ("FR", base, -track / 2),
+            ("FL", base, track / 2),
+            ("RR", 0.0, -track / 2),
+            ("RL", 0.0, track / 2),
+        )
+    }
+    omega = v * np.tan(delta) / base
+    found = wheel_commands(np.full(3, v), np.full(3, omega), Geometry(places, 0.3), dt=0.01, max_steer=MAX)
+    assert_allclose(found.axle_angle[:, 0], delta)
+    assert_allclose(np.tan(found.angle[:, 1]), base / (base / np.tan(delta) - track / 2))
+    assert_allclose(found.speed[:, 1], np.hypot(v - omega * track / 2, omega * base))
+    assert_allclose(found.speed[:, 3], v - omega * track / 2)

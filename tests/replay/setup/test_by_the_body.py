@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
 from replay.log.source_options import SignalSource
 from replay.machine.geometry import WheelGeometry
-from replay.setup.by_the_body import radius_by_body, track_by_yaw
+from replay.setup.by_the_body import base_by_yaw, radius_by_body, track_by_yaw
 from replay.signals.signal import Signal, Signals
 
 Array = NDArray[np.float64]
@@ -67,3 +69,16 @@ def test_a_speed_that_is_no_share_of_the_wheels_tells_nothing() -> None:
     other = Signals({**found.items, "odom.v": signal("odom.v", 0.05, rng.normal(0.0, 1.0, 1200))}, {}, ())
     assert radius_by_body(other, ("R", "L"), ("R", "L"), {}) is None
     assert track_by_yaw(Signals({"wheel.L.v": found.items["wheel.L.v"]}, {}, ()), PLACES, RADIUS, {}) is None
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_steering_command_tells_the_wheelbase_by_the_yaw_rate(sign: float) -> None:
+    """The command was made a yaw rate with a base that stands in; a negative length says that it is positive to the right."""
+    found = robot(np.random.default_rng(6))
+    yaw, base, stands_in = found.items["imu.yaw_rate"], 1.3, 0.5
+    asked = signal("cmd.omega", 0.05, sign * yaw.values[::5] * base / stands_in)
+    angle = replace(asked, origin=replace(asked.origin, unit="rad"))
+    measured = base_by_yaw(Signals({**found.items, "cmd.omega": angle}, {}, ()), stands_in)
+    assert measured is not None
+    assert measured.length == pytest.approx(sign * base, rel=0.03)
+    assert base_by_yaw(Signals({**found.items, "cmd.omega": asked}, {}, ()), stands_in) is None
