@@ -43,7 +43,7 @@ from diagnosis.response.power import powers_of
 from diagnosis.response.rivals import by_each_other, held_back_together, jumped, others_fault, shared
 from diagnosis.response.sides import sides_of
 from diagnosis.response.spells import spells_of, where_asked
-from diagnosis.response.turning import turning_of, turns_with
+from diagnosis.response.turning import turning_of, turns_with, wrong_yaw_rate
 from diagnosis.results.assessment import CODE, Assessment, Finding
 from replay.faults import State
 from replay.machine.config import Limits
@@ -120,7 +120,7 @@ def assess_response(
         w: [
             less_sure(s, w, judged, width * dt)
             for s in j.spells
-            if not others_fault(s, w, judged) and not consequence(s, w, judged)
+            if not others_fault(s, w, judged) and not consequence(s, w, judged) and not wrong_yaw_rate(s, j)
         ]
         for w, j in judged.items()
     }
@@ -228,6 +228,7 @@ def _judge(one: Judged, beside: Beside | None, dt: float, width: int) -> Judged:
         posterior=p,
         spells=[s if jumped(one, s) else shared(s, beside) for s in cut(spells_of(p, block_s), joint, blocks)],
         speed=None if beside is None else beside.speed,
+        across=None if beside is None else beside.across,
         joint=joint,
         wheel=one.wheel._replace(
             blocks=blocks, compared="" if beside is None else beside.compared, own=beside is not None and beside.own

@@ -126,6 +126,7 @@ def _by_wheels(
     others = [o for o in wheels if o != w and same_side(w, o, geometry)]
     speeds = [s for o in others if (s := _scaled(blocks[w].mean, blocks[o].mean)) is not None]
     speed: Array | None = None
+    across: Array | None = None
     if speeds:
         speed = np.asarray(np.median(np.array(speeds), axis=0))
         if len(speeds) == 2:  # of two that differ none is known to be right
@@ -134,8 +135,8 @@ def _by_wheels(
             ] = np.nan
     elif yaw is not None and (far := [o for o in wheels if o != w and not same_side(w, o, geometry)]):
         others = far
-        mean = np.asarray(np.mean([blocks[o].mean for o in far], axis=0))
-        speed = _turned(blocks[w].mean, mean, yaw)
+        across = np.asarray(np.mean([blocks[o].mean for o in far], axis=0))
+        speed = _turned(blocks[w].mean, across, yaw)
     if speed is None:
         return None
     if len(speeds) > 1:
@@ -147,7 +148,7 @@ def _by_wheels(
     rough = np.asarray(np.max([blocks[o].rough for o in others], axis=0))
     noise = _noise(blocks[w], speed)
     alone = not speeds and len(wheels) == 2 and _turns_by_wheels(blocks[w].mean, blocks[others[0]].mean)
-    return Beside(speed, noise, blame, rough, " and ".join(wheels[o] for o in others), own=alone)
+    return Beside(speed, noise, blame, rough, " and ".join(wheels[o] for o in others), alone, across)
 
 
 def _turns_by_wheels(y: Array, x: Array) -> bool:

@@ -46,6 +46,8 @@ class Judged(NamedTuple):
         The position of its joint.
     alone : bool
         Whether it is the only drive.
+    across : Array or None, shape (b,)
+        As in `models.Beside`.
     """
 
     data: FollowerData
@@ -58,6 +60,7 @@ class Judged(NamedTuple):
     calm: Flags
     joint: Joint | None = None
     alone: bool = False
+    across: Array | None = None
 
 
 def standstills(idle: Sequence[tuple[int, int]], dt: float) -> tuple[str, ...]:

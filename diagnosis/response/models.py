@@ -95,6 +95,8 @@ class Beside(NamedTuple):
         What the view is by, in words.
     own : bool
         Whether it shows how this wheel itself turns, rather than how it should.
+    across : Array or None, shape (b,)
+        Speed of the other side [m/s], to which the view adds a share of the yaw rate; None where it takes no yaw rate.
     """
 
     speed: Array
@@ -103,6 +105,7 @@ class Beside(NamedTuple):
     rough: Array
     compared: str = ""
     own: bool = False
+    across: Array | None = None
 
 
 def blocks_of(samples: Samples, response: Response, cell: int, width: int, size: int) -> Blocks:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from diagnosis.response.machine import Judged
 from diagnosis.response.spells import Spell
+from replay.faults import FaultMode
 from replay.machine.geometry import Geometry
 
 Array = NDArray[np.float64]
@@ -26,6 +27,7 @@ _MOST_ERROR = 0.15
 _SURE = 2.5  # standard errors
 _MIDDLE = 0.5
 _LIES = -0.5, 1.6  # what a share may be at all
+_LEAST_SPELL, _BETTER = 6, 0.5  # blocks; of the misfit of any wheel's gain, that a fault of the yaw rate leaves
 
 
 class Turning(NamedTuple):
@@ -116,3 +118,39 @@ def _fitted(apart: Array, yaw: Array, sound: NDArray[np.bool_]) -> tuple[float, 
     if noise > _FITS * float(np.std(weights[0] * apart[sound])):
         return None
     return float(weights[0]), float(weights[1]), noise
+
+
+def wrong_yaw_rate(spell: Spell, one: Judged) -> bool:
+    """Whether a deviation beside the other side and the yaw rate is the yaw rate's fault rather than a wheel's.
+
+    A wheel that reads a share of its speed is off by a share of what it reads, whether the machine turns or not. A yaw rate that is dead,
+    frozen, scaled or shifted puts the wheel off by a share of the difference of the sides and by a constant: a·(y − x) + b.
+
+    Parameters
+    ----------
+    spell : Spell
+        Of the wheel.
+    one : Judged
+        The wheel.
+    """
+    if (
+        one.across is None
+        or one.speed is None
+        or spell.own
+        or not (spell.mode.scaled or spell.mode is FaultMode.OUTSIDE_TABLE)
+    ):
+        return False
+    part = slice(spell.start, spell.stop)
+    y, x, view = one.wheel.blocks.mean[part], one.across[part], one.speed[part]
+    known = np.isfinite(y) & np.isfinite(x) & np.isfinite(view)
+    if np.count_nonzero(known) < _LEAST_SPELL:
+        return False
+    y, x, off = y[known], x[known], (y - view)[known]
+    by_wheel = min(_rest(off, y[:, np.newaxis]), _rest(off, x[:, np.newaxis]))
+    return _rest(off, np.column_stack([y - x, np.ones(y.size)])) < _BETTER * by_wheel
+
+
+def _rest(off: Array, columns: Array) -> float:
+    """Mean square that columns leave of a deviation, each of them taken as one degree of freedom."""
+    left = off - columns @ np.linalg.lstsq(columns, off, rcond=None)[0]
+    return float(np.sum(left**2)) / max(off.size - columns.shape[1], 1)

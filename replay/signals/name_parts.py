@@ -17,6 +17,11 @@ _LONG = {
     "middle": "middle", "mid": "middle", "center": "middle", "centre": "middle", "mitte": "middle", "mittig": "middle",
     "vorder": "front", "va": "front", "hinter": "rear", "ha": "rear", "av": "front", "ar": "rear", "li": "left", "re": "right",
     "avant": "front", "arriere": "rear", "gauche": "left", "droite": "right", "droit": "right",
+    "delantera": "front", "delantero": "front", "trasera": "rear", "trasero": "rear", "izquierda": "left", "izquierdo": "left",
+    "izq": "left", "derecha": "right", "derecho": "right", "central": "middle", "centrale": "middle",
+    "anteriore": "front", "posteriore": "rear", "sinistra": "left", "sinistro": "left", "sx": "left", "destra": "right",
+    "destro": "right", "dx": "right", "dianteira": "front", "dianteiro": "front", "traseira": "rear", "traseiro": "rear",
+    "esquerda": "left", "esquerdo": "left", "direita": "right", "direito": "right", "meio": "middle", "milieu": "middle",
 }  # fmt: skip
 _PAIRS = {
     "fl": ("front", "left"), "lf": ("front", "left"), "fr": ("front", "right"), "rf": ("front", "right"),
@@ -29,8 +34,10 @@ _PAIRS = {
 _ANGLES = frozenset(("winkel", "angle", "ang", "phi"))
 _OF_STEERING = _ANGLES | {"valve", "vlv", "ventil"}  # beside which str is no text, but steering
 _FRENCH = frozenset(("av", "ar", "avant", "arriere"))
-_STEER = re.compile(r"steer|lenk|kingpin|azimuth|swivel|knuckle|braquage")
-_DRIVE = re.compile(r"wheel|drive|(?<![a-z])drv|motor|rad(?![a-z]|_?s(?![a-z])|/)|traction|hub|antrieb|roue|moteur")
+_STEER = re.compile(r"steer|lenk|kingpin|azimuth|swivel|knuckle|braquage|sterz|direccion(?!al)")
+_DRIVE = re.compile(
+    r"wheel|drive|(?<![a-z])drv|motor|rad(?![a-z]|_?s(?![a-z])|/)|traction|hub|antrieb|roue|moteur|rueda|ruota|roda(?![a-z])"
+)
 _LOOSE = re.compile(r"(?<![A-Za-z0-9])[fblr](?![A-Za-z0-9])")
 _NO_DRIVE = re.compile(r"castor|caster|arm|grip|finger|flipper|head|neck|elbow|shoulder|wrist|hip|knee|lift|torso")
 _INDEX = re.compile(r"\[(\d+)\]|(?<=[A-Za-z_])[ #-]?(\d+)(?![\d.,/])")

@@ -1,4 +1,4 @@
-"""Words of a recorded name, those of German and French programs in English: ``Lenkwinkel_soll``, ``consigne_angle``: steer angle ref."""
+"""Words of a recorded name, those of programs in other languages in English: ``Lenkwinkel_soll``, ``consigne_angle``: steer angle ref."""
 
 from __future__ import annotations
 
@@ -27,19 +27,19 @@ _MEANINGS = {
     "ref": "soll sollwert vorgabe vorg consigne cons",
     "cmd": "ansteuerung commande",
     "act": "ist istwert mess messwert gemessen rueckmeldung mesure mesuree mes reel reelle",
-    "speed": "geschwindigkeit geschw vitesse vit spd speeds velocities",
+    "speed": "geschwindigkeit geschw vitesse vit spd speeds velocities velocidad velocidade velocita",
     "rpm": "drehzahl regime",
     "angle": "winkel ang",
-    "steer": "lenk lenkung braquage strg",
+    "steer": "lenk lenkung braquage strg sterzo",
     "valve": "ventil vanne distributeur vlv",
     "spool": "schieber tiroir",
     "torque": "drehmoment couple trq",
     "current": "strom courant curr",
     "voltage": "spannung tension",
     "press": "druck pression",
-    "wheel": "roue",
+    "wheel": "roue rueda ruota roda",
     "drive": "antrieb drv",
-    "motor": "moteur",
+    "motor": "moteur motore",
     "axle": "achse achs essieu",
     "yaw_rate": "gierrate drehrate lacet gier",
     "joystick": "fahrhebel manche",

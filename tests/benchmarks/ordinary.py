@@ -10,7 +10,7 @@ machine file is the one that `mfhca config init --log` writes, unedited, from th
    is a right side too where the finding leaves it open); findings with p ≥ .9 or of high severity that are wrong; missions cleared
    although the fault was not named; how much of the faulty driving its side was called healthy.
 
-An ignored command and an emergency stop are nobody's fault: nothing may be named.
+An ignored command, an emergency stop, and a fault of gyro or odometry are no wheel's: none may be named.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
-from ordinary_robots.faults import EVENTS, FAULTS, Fault, fault_of
+from ordinary_robots.faults import BODY, EVENTS, FAULTS, Fault, fault_of
 from ordinary_robots.habits import HABITS, Habits
 from ordinary_robots.log import write_log
 from ordinary_robots.machines import KINDS, H, Robot, course_of, robot_of
@@ -123,7 +123,7 @@ def fault_score(c: Case) -> Counter[str]:
     assert f is not None
     hits = [i for i in c.told if c.meets(i)]
     wrong = [i for i in c.told if not c.right(i)]
-    event = f.kind in EVENTS
+    event = f.kind in (*EVENTS, *BODY)
     out = Counter(
         missions=1,
         found=bool(hits) and not event,

@@ -13,7 +13,9 @@ SENSORS = ("encoder_dead", "encoder_frozen", "encoder_scaled", "encoder_noisy", 
 DRIVES = ("motor_dead", "motor_weak", "motor_on", "jammed")
 #: Nobody's fault: no part may be named for them.
 EVENTS = ("ignored", "estop")
-FAULTS = (*SENSORS, *DRIVES, *EVENTS)
+#: Of the inertial unit and of odometry: no wheel may be named for them.
+BODY = ("gyro_dead", "gyro_frozen", "gyro_scaled", "gyro_offset", "odometry_frozen", "odometry_scaled")
+FAULTS = (*SENSORS, *DRIVES, *EVENTS, *BODY)
 
 
 @dataclass(frozen=True)
@@ -27,7 +29,7 @@ class Fault:
     wheel, first, last : int
         Where and when.
     size : float
-        Scale, noise [rad/s], delay [s], share of the duty, duty, time in which a jammed wheel comes to rest [s].
+        Scale, noise [rad/s], delay [s], share of the duty, duty, time in which a jammed wheel comes to rest [s], offset [rad/s].
     counted : bool
         Whether it is in the counts, so that position and speed loop have it too, or in the published speed alone.
     """
@@ -41,7 +43,7 @@ class Fault:
 
     @property
     def side(self) -> str:
-        """Side of the wheel, or ``machine``."""
+        """Side of the wheel, or ``machine`` where no wheel has a fault."""
         return "sensor" if self.kind in SENSORS else "actuator" if self.kind in DRIVES else "machine"
 
 
@@ -74,6 +76,9 @@ def fault_of(kind: str, wheels: int, moving: NDArray[np.bool_], step: float, rng
         "jammed": float(rng.uniform(0.02, 0.15)),
         "motor_weak": float(rng.uniform(0.2, 0.5)),
         "motor_on": float(rng.choice([-1, 1]) * rng.uniform(0.4, 0.9)),
+        "gyro_scaled": float(rng.choice([rng.uniform(0.3, 0.7), rng.uniform(1.4, 2.2)])),
+        "odometry_scaled": float(rng.choice([rng.uniform(0.3, 0.7), rng.uniform(1.4, 2.2)])),
+        "gyro_offset": float(rng.choice([-1, 1]) * rng.uniform(0.1, 0.5)),
     }.get(kind, 1.0)
     return Fault(kind, int(rng.integers(wheels)), first, last, size, bool(rng.random() < 0.5))
 
@@ -97,4 +102,20 @@ def published(t: Array, speed: Array, fault: Fault, step: float, rng: np.random.
         out[hit] += fault.size * rng.choice([-1, 1], hit.size)
     elif fault.kind == "encoder_late":
         out[inside] = np.interp(t[inside] - fault.size, t, speed)
+    return out
+
+
+def of_the_body(t: Array, x: Array, fault: Fault | None, sensor: str, step: float) -> Array:
+    """What a ``gyro`` or ``odometry`` shows of x at the times `t` [s] with a fault of it; x itself where it has none."""
+    if fault is None or not fault.kind.startswith(f"{sensor}_"):
+        return x
+    inside = np.flatnonzero((t >= fault.first * step) & (t < fault.last * step))
+    out = x.copy()
+    if inside.size:
+        out[inside] = {
+            "dead": np.zeros(inside.size),
+            "frozen": np.full(inside.size, x[inside[0]]),
+            "scaled": fault.size * x[inside],
+            "offset": x[inside] + fault.size,
+        }[fault.kind.rpartition("_")[2]]
     return out

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from rosbags.rosbag2 import Writer as BagWriter
 from rosbags.typesys import Stores, get_typestore
 
-from .faults import Fault, published
+from .faults import Fault, of_the_body, published
 from .habits import USUAL, Habits
 from .machines import STEERED, Course, H, Robot
 from .physics import Driven
@@ -36,7 +36,7 @@ def write_log(
     rows = [
         *_joints(robot, driven, fault, rng, habits),
         *habits.sent(_commands(robot, course, rng)),
-        *_inertia(course, driven, rng),
+        *_inertia(course, driven, fault, rng),
         *_odometry(robot, driven, fault, rng),
     ]
     rows = habits.stamped([r for r in rows if r[1] not in habits.without])
@@ -138,9 +138,12 @@ def _commands(robot: Robot, course: Course, rng: np.random.Generator) -> list[tu
     return rows
 
 
-def _inertia(course: Course, driven: Driven, rng: np.random.Generator) -> list[tuple[float, str, str, Any]]:
+def _inertia(
+    course: Course, driven: Driven, fault: Fault | None, rng: np.random.Generator
+) -> list[tuple[float, str, str, Any]]:
     t, arrives = _clock(100.0 if rng.random() < 0.5 else 50.0, course.v.size * H, rng)
     yaw = _sampled(driven.body[:, 2], t) * rng.normal(1.0, 0.01) + rng.normal(0.0, 0.01) + rng.normal(0.0, 0.01, t.size)
+    yaw = of_the_body(t, yaw, fault, "gyro", H)
     along = np.gradient(driven.body[:, 0], H) + 9.81 * np.sin(course.slope)
     along = _sampled(along, t) + rng.normal(0.0, 0.1) + rng.normal(0.0, 0.3, t.size)
     zeros, vector = np.zeros(9), STORE.types["geometry_msgs/msg/Vector3"]
@@ -174,6 +177,7 @@ def _odometry(
     else:
         v, omega = (_sampled(driven.body[:, i], t) * rng.normal(1.0, 0.01) for i in (0, 2))
         v, omega = v + rng.normal(0.0, 0.02, t.size), omega + rng.normal(0.0, 0.01, t.size)
+    v, omega = (of_the_body(t, z, fault, "odometry", H) for z in (v, omega))
     step = np.diff(t, prepend=t[0])
     yaw = np.cumsum(omega * step)
     x, y = np.cumsum(v * np.cos(yaw) * step), np.cumsum(v * np.sin(yaw) * step)

@@ -112,6 +112,9 @@ def found(channel: Channel) -> list[tuple[str, str]]:
         ("Valves/Valve 3 command [%]", "wheel.RR.u"),
         ("Valves/Valve 3 spool position [%]", "wheel.RR.u_applied"),
         ("roue_avant_droite_commande_vanne_pct", "wheel.FR.u"),
+        ("velocidad_rueda_delantera_izquierda [rad/s]", "wheel.FL.v"),
+        ("velocita_ruota_posteriore_destra [rad/s]", "wheel.RR.v"),
+        ("velocidade_roda_traseira_esquerda [rad/s]", "wheel.RL.v"),
     ],
 )
 def test_columns(name: str, signal: str | None) -> None:
