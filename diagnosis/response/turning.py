@@ -153,4 +153,5 @@ def wrong_yaw_rate(spell: Spell, one: Judged) -> bool:
 def _rest(off: Array, columns: Array) -> float:
     """Mean square that columns leave of a deviation, each of them taken as one degree of freedom."""
     left = off - columns @ np.linalg.lstsq(columns, off, rcond=None)[0]
-    return float(np.sum(left**2)) / max(off.size - columns.shape[1], 1)
+    total = float(np.sum(left**2))
+    return total / max(int(off.size) - int(columns.shape[1]), 1)
