@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnosis.response.beside import Bodies, same_side, views
+from diagnosis.response.beside import Bodies, same_side, turns_by_wheels, views
 from diagnosis.response.body import BodySpeed
 from diagnosis.response.channel import Samples, holds_of, samples_of, without_holds
 from diagnosis.response.common_cause import (
@@ -134,7 +134,14 @@ def assess_response(
     together = held_back_together(judged)
     like = {w: by_peers(w, judged, geometry, cell) for w in judged}
     weak = {
-        w: _drives(w, judged, (like[w], by_motion.get(w)), (pulls.get(w), bool(mates[w])), width * dt) for w in judged
+        w: _drives(
+            w,
+            judged,
+            (like[w], by_motion.get(w)),
+            (pulls.get(w), bool(mates[w]) or not _turned_by(w, found)),
+            width * dt,
+        )
+        for w in judged
     }
     weak = {w: without_consequences(found, w, judged, width) for w, found in weak.items()}
     late = late_wheels(judged, width * dt)
@@ -155,6 +162,12 @@ def assess_response(
         powers = powers._replace(rows=(*powers.rows, delay))
         parts[w] = replace(sensor, powers=powers, notes=(*sensor.notes, told, *remarks)), drive
     return Judgement(parts, (*standstills(idle, dt), *(astray if lasts else ())))
+
+
+def _turned_by(wheel: str, found: Mapping[str, Judged]) -> bool:
+    """Whether a wheel and one of the others turn the machine by what they differ."""
+    means = {w: j.wheel.blocks.mean for w, j in found.items()}
+    return any(turns_by_wheels(means[wheel], means[o]) for o in means if o != wheel)
 
 
 def _doubted(sensor: Assessment, why: str) -> Assessment:
@@ -242,7 +255,7 @@ def _drives(
 ) -> list[Finding]:
     """What is known to be a drive's fault, each time once.
 
-    `known`: its blocks with what is expected of it, and how the ground moves; `pull`: its share of the load, and whether wheels of its side share it.
+    `known`: its blocks with what is expected of it, and how the ground moves; `pull`: its share of the load, and whether it is dragged along.
     """
     idle = idle_drives(judged[wheel], *pull, block_s)  # it says why: without power
     more = unanswered(wheel, judged, known, block_s)

@@ -92,11 +92,11 @@ def _beside(e: Array, other: Array, driving: NDArray[np.bool_]) -> Array | None:
     return np.where(pulled, np.abs(e) / (ratio * np.maximum(load, 1e-12)), np.nan) if ratio > 0.0 else None
 
 
-def idle_drives(one: Judged, share: Array | None, mates: bool, block_s: float) -> list[Finding]:
+def idle_drives(one: Judged, share: Array | None, dragged: bool, block_s: float) -> list[Finding]:
     """Times in which a drive pulls nothing while those of its side do, and the speed was to change.
 
-    Where no other wheel is on its side, nothing but its own drive holds its speed: without power it leaves its command, and one that
-    pulls nothing and follows it is the inner wheel of a curve, or rolls downhill.
+    Where two wheels turn the machine by what they differ, nothing but its own drive holds the speed of each: without power it leaves its
+    command, and one that pulls nothing and follows it is the inner wheel of a curve, or rolls downhill.
 
     Parameters
     ----------
@@ -104,8 +104,8 @@ def idle_drives(one: Judged, share: Array | None, mates: bool, block_s: float) -
         The wheel.
     share : Array or None, shape (b,)
         From `shares_of`.
-    mates : bool
-        Whether wheels of its side share the load.
+    dragged : bool
+        Whether others, or the steering, hold its wheel at nearly its speed while it has no power.
     block_s : float
         Length of a block [s].
     """
@@ -127,7 +127,9 @@ def idle_drives(one: Judged, share: Array | None, mates: bool, block_s: float) -
     if not long or not outside.any() or np.quantile(share[outside], _SELDOM) < _USUALLY:
         return []
     return [
-        _finding(one, a, b, mates, block_s) for a, b in long if _sped_up(one, a, b) and (mates or _astray(one, a, b))
+        _finding(one, a, b, dragged, block_s)
+        for a, b in long
+        if _sped_up(one, a, b) and (dragged or _astray(one, a, b))
     ]
 
 
@@ -158,12 +160,12 @@ def _astray(one: Judged, start: int, stop: int) -> bool:
     return bool(np.mean(off[start:stop]) > _PART)
 
 
-def _finding(one: Judged, start: int, stop: int, mates: bool, block_s: float) -> Finding:
+def _finding(one: Judged, start: int, stop: int, dragged: bool, block_s: float) -> Finding:
     width = int(one.wheel.blocks.start[1])
     wheel = one.data.name.split(".")[1]
     text = (
-        f"wheel.{wheel}.effort is next to nothing for {(stop - start) * block_s:.1f} s while {'the drives of its side pull' if mates else 'the other drive pulls'} as usual: its "
-        f"{{valve}} has no power{', and the others drag the {wheel} along' if mates else ''}."
+        f"wheel.{wheel}.effort is next to nothing for {(stop - start) * block_s:.1f} s while {'the drives beside it pull' if dragged else 'the other drive pulls'} as usual: its "
+        f"{{valve}} has no power{', and the others drag the {wheel} along' if dragged else ''}."
     )
     other = 0.5 * (1.0 - _P)
     return Finding(
