@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnosis.response.beside import Bodies, same_side, views
+from diagnosis.response.beside import Bodies, same_side, turns_by_wheels, views
 from diagnosis.response.body import BodySpeed
 from diagnosis.response.channel import Samples, holds_of, samples_of, without_holds
 from diagnosis.response.common_cause import (
@@ -109,7 +109,8 @@ def assess_response(
     sideways = any(d.commands.shape[1] > _BODY_COMMANDS for d in drives)
     bodies = Bodies(speeds, None if yaw is None else cells(yaw, width), width * dt, sideways)
     efforts = {w: cells(j.data.effort, width) for w, j in found.items() if j.data.effort is not None and not sideways}
-    pulls = shares_of(found, efforts, {w: _sharing(w, found, geometry) for w in found})
+    mates = {w: tuple(o for o in found if o != w and same_side(w, o, geometry)) for w in found}
+    pulls = shares_of(found, efforts, {w: mates[w] or tuple(o for o in found if o != w) for w in found})
     found = {
         w: j._replace(wheel=j.wheel._replace(pull=own_pull(j, efforts.get(w), pulls.get(w)))) for w, j in found.items()
     }
@@ -132,7 +133,16 @@ def assess_response(
     kept = {w: [s._replace(turns=turns_with(w, s, judged, turning)) for s in spells] for w, spells in kept.items()}
     together = held_back_together(judged)
     like = {w: by_peers(w, judged, geometry, cell) for w in judged}
-    weak = {w: _drives(w, judged, (like[w], by_motion.get(w)), pulls.get(w), width * dt) for w in judged}
+    weak = {
+        w: _drives(
+            w,
+            judged,
+            (like[w], by_motion.get(w)),
+            (pulls.get(w), bool(mates[w]) or not _turned_by(w, found)),
+            width * dt,
+        )
+        for w in judged
+    }
     weak = {w: without_consequences(found, w, judged, width) for w, found in weak.items()}
     late = late_wheels(judged, width * dt)
     kept = {w: [x for x in spells if not late_neighbour(x, w, late, width)] for w, spells in kept.items()}
@@ -154,10 +164,10 @@ def assess_response(
     return Judgement(parts, (*standstills(idle, dt), *(astray if lasts else ())))
 
 
-def _sharing(wheel: str, found: Mapping[str, Judged], geometry: Geometry | None) -> tuple[str, ...]:
-    """Wheels that share a wheel's load: those of its side, or, where it has none, all others."""
-    others = tuple(o for o in found if o != wheel)
-    return tuple(o for o in others if same_side(wheel, o, geometry)) or others
+def _turned_by(wheel: str, found: Mapping[str, Judged]) -> bool:
+    """Whether a wheel and one of the others turn the machine by what they differ."""
+    means = {w: j.wheel.blocks.mean for w, j in found.items()}
+    return any(turns_by_wheels(means[wheel], means[o]) for o in means if o != wheel)
 
 
 def _doubted(sensor: Assessment, why: str) -> Assessment:
@@ -240,11 +250,14 @@ def _drives(
     wheel: str,
     judged: Mapping[str, Judged],
     known: tuple[Blocks | None, Beside | None],
-    pull: Array | None,
+    pull: tuple[Array | None, bool],
     block_s: float,
 ) -> list[Finding]:
-    """What is known to be a drive's fault, each time once; `known`: its blocks with what is expected of it, and how the ground moves."""
-    idle = idle_drives(judged[wheel], pull, block_s)  # it says why: without power
+    """What is known to be a drive's fault, each time once.
+
+    `known`: its blocks with what is expected of it, and how the ground moves; `pull`: its share of the load, and whether it is dragged along.
+    """
+    idle = idle_drives(judged[wheel], *pull, block_s)  # it says why: without power
     more = unanswered(wheel, judged, known, block_s)
     return idle + [f for f in more if not any(f.start < g.stop and g.start < f.stop for g in idle)]
 

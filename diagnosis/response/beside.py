@@ -147,12 +147,15 @@ def _by_wheels(
         blame = _blame_by_commands(blocks[w], [blocks[o] for o in others])
     rough = np.asarray(np.max([blocks[o].rough for o in others], axis=0))
     noise = _noise(blocks[w], speed)
-    alone = not speeds and len(wheels) == 2 and _turns_by_wheels(blocks[w].mean, blocks[others[0]].mean)
+    alone = not speeds and len(wheels) == 2 and turns_by_wheels(blocks[w].mean, blocks[others[0]].mean)
     return Beside(speed, noise, blame, rough, " and ".join(wheels[o] for o in others), alone, across)
 
 
-def _turns_by_wheels(y: Array, x: Array) -> bool:
-    """Whether two wheels are what turns the machine: they turn against each other, as those of a steered car never do."""
+def turns_by_wheels(y: Array, x: Array) -> bool:
+    """Whether two wheels are what turns the machine: they turn against each other, as those of a steered car never do.
+
+    Both of shape (b,) [m/s].
+    """
     least = _AGAINST * float(np.nanquantile(np.abs(x), 0.95))
     return bool(np.count_nonzero((y * x < 0.0) & (np.abs(y) > least) & (np.abs(x) > least)) >= _AGAINST_BLOCKS)
 

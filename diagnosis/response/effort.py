@@ -31,6 +31,7 @@ _AROUND = 4  # blocks to each side of one, of which the median counts
 _GAP_BLOCKS = 3
 _LEAST_S, _P = 3.0, 0.94
 _CHANGES = 0.25  # of the top speed
+_OFF, _PART = 2.0, 0.3  # usual misfits beside the command, and part of the time, of a wheel that leaves it
 
 
 def shares_of(
@@ -91,8 +92,11 @@ def _beside(e: Array, other: Array, driving: NDArray[np.bool_]) -> Array | None:
     return np.where(pulled, np.abs(e) / (ratio * np.maximum(load, 1e-12)), np.nan) if ratio > 0.0 else None
 
 
-def idle_drives(one: Judged, share: Array | None, block_s: float) -> list[Finding]:
+def idle_drives(one: Judged, share: Array | None, dragged: bool, block_s: float) -> list[Finding]:
     """Times in which a drive pulls nothing while those of its side do, and the speed was to change.
+
+    Where two wheels turn the machine by what they differ, nothing but its own drive holds the speed of each: without power it leaves its
+    command, and one that pulls nothing and follows it is the inner wheel of a curve, or rolls downhill.
 
     Parameters
     ----------
@@ -100,6 +104,8 @@ def idle_drives(one: Judged, share: Array | None, block_s: float) -> list[Findin
         The wheel.
     share : Array or None, shape (b,)
         From `shares_of`.
+    dragged : bool
+        Whether others, or the steering, hold its wheel at nearly its speed while it has no power.
     block_s : float
         Length of a block [s].
     """
@@ -120,7 +126,11 @@ def idle_drives(one: Judged, share: Array | None, block_s: float) -> list[Findin
     # a wheel whose effort often comes near nothing tells nothing by it
     if not long or not outside.any() or np.quantile(share[outside], _SELDOM) < _USUALLY:
         return []
-    return [_finding(one, a, b, block_s) for a, b in long if _sped_up(one, a, b)]
+    return [
+        _finding(one, a, b, dragged, block_s)
+        for a, b in long
+        if _sped_up(one, a, b) and (dragged or _astray(one, a, b))
+    ]
 
 
 def _smooth(share: Array) -> Array:
@@ -143,12 +153,19 @@ def _sped_up(one: Judged, start: int, stop: int) -> bool:
     return bool(np.ptp(asked) > _CHANGES * float(np.nanquantile(np.abs(one.wheel.blocks.mean), 0.99)))
 
 
-def _finding(one: Judged, start: int, stop: int, block_s: float) -> Finding:
+def _astray(one: Judged, start: int, stop: int) -> bool:
+    """Whether the speed leaves what its command makes it be in a good part of blocks [start, stop)."""
+    b = one.wheel.blocks
+    off = np.abs(b.mean - np.clip(b.mean, b.low, b.high)) > _OFF * b.noise
+    return bool(np.mean(off[start:stop]) > _PART)
+
+
+def _finding(one: Judged, start: int, stop: int, dragged: bool, block_s: float) -> Finding:
     width = int(one.wheel.blocks.start[1])
     wheel = one.data.name.split(".")[1]
     text = (
-        f"wheel.{wheel}.effort is next to nothing for {(stop - start) * block_s:.1f} s while the drives of its side pull as usual: its "
-        "{valve} has no power, and the others drag the {wheel} along."
+        f"wheel.{wheel}.effort is next to nothing for {(stop - start) * block_s:.1f} s while {'the drives beside it pull' if dragged else 'the other drive pulls'} as usual: its "
+        f"{{valve}} has no power{', and the others drag the {wheel} along' if dragged else ''}."
     )
     other = 0.5 * (1.0 - _P)
     return Finding(

@@ -147,11 +147,10 @@ def wrong_yaw_rate(spell: Spell, one: Judged) -> bool:
         return False
     y, x, off = y[known], x[known], (y - view)[known]
     by_wheel = min(_rest(off, y[:, np.newaxis]), _rest(off, x[:, np.newaxis]))
-    return _rest(off, np.column_stack([y - x, np.ones(y.size)])) < _BETTER * by_wheel
+    return bool(_rest(off, np.column_stack([y - x, np.ones(y.size)])) < _BETTER * by_wheel)
 
 
 def _rest(off: Array, columns: Array) -> float:
     """Mean square that columns leave of a deviation, each of them taken as one degree of freedom."""
-    left = off - columns @ np.linalg.lstsq(columns, off, rcond=None)[0]
-    total = float(np.sum(left**2))
-    return total / max(int(off.size) - int(columns.shape[1]), 1)
+    left: Array = np.asarray(off - columns @ np.linalg.lstsq(columns, off, rcond=None)[0], dtype=np.float64)
+    return float(np.sum(left**2)) / max(off.size - int(columns.shape[1]), 1)

@@ -20,6 +20,7 @@ Counts = Mapping[str, NDArray[np.int16]]
 
 _LEAVES = ("phi", "phi_true", "u", "u_applied")
 _NO_NOISE = SensorNoise(1.0, 1.0, 0.0, 0.0)
+_SLOW = 0.1  # of the top speed, from which on commands of the body tell an angle
 _TOLERANCE = 0.15  # of the smallest saturation term: what two healthy angle sensors may differ by
 
 
@@ -123,11 +124,24 @@ def axle_inputs(timeline: Timeline, replay: Replay, machine: Machine, axle: int,
     logged = frozenset(leaf for leaf, x in found.items() if x is not None and bool(np.isfinite(x).any()))
     u = found["u"] if "u" in logged else found["u_applied"]
     if u is None or not np.isfinite(u).any():
-        u = replay.steer_u[:, axle]
+        u = _replayed(timeline, replay, machine, axle)
     inputs = AxleInputs(name, timeline, logged, u)
     if inputs.measured not in logged or not np.isfinite(u).any():
         return inputs
     return _with_blocks(inputs, machine, counts, _length(timeline, machine))
+
+
+def _replayed(timeline: Timeline, replay: Replay, machine: Machine, axle: int) -> Array:
+    """What the replayed loop commands, NaN where nothing tells an angle, shape (n,).
+
+    An angle that follows from commands of the body is a quotient of both: while these hardly ask for motion it is anything, and machines
+    leave their wheels where they are, or straight.
+    """
+    u, speed = replay.steer_u[:, axle], timeline.get("cmd.v")
+    if timeline.get(f"steer.{machine.axles[axle]}.phi_ref") is not None or speed is None:
+        return u
+    least = max(machine.limits.driving_speed, _SLOW * machine.max_speed)
+    return timeline.map(lambda u, v: np.where(np.abs(v) < least, np.nan, u), u, speed)
 
 
 def _length(timeline: Timeline, machine: Machine) -> int:

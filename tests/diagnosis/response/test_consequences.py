@@ -62,6 +62,28 @@ def test_a_drive_without_effort_is_told_where_its_speed_was_to_change() -> None:
     assert not any(found(with_efforts(6, still)).values())
 
 
+@pytest.mark.parametrize("dead", [False, True])
+def test_an_only_wheel_of_its_side_that_pulls_nothing_is_blamed_where_it_leaves_its_command(dead: bool) -> None:
+    pair = ("R", "L")
+    measured, asked, body = speeds(6, pair)
+    moved, _ = spans(asked["L"])
+    if dead:  # it rolls out
+        measured["L"][moved] = np.round(
+            measured["L"][moved.start] * np.exp(-np.arange(moved.stop - moved.start) * DT), 3
+        )
+    rng = np.random.default_rng(6)
+    data = {}
+    for w, one in followers_of(measured, asked, body).items():
+        effort = 20.0 * np.sign(measured[w]) + 30.0 * measured[w] + rng.normal(0.0, 1.0, measured[w].size)
+        if w == "L":
+            effort[moved] = rng.normal(0.0, 0.3, effort[moved].size)
+        data[w] = replace(one, effort=effort)
+    parts = assess_response(data, geometry(pair), None, LIMITS, DT).parts
+    idle = [f for f in parts["L"][1].findings if f.mode is FaultMode.NO_SIGNAL and f.side is Side.ACTUATOR]
+    assert bool(idle) == dead
+    assert not parts["R"][1].findings
+
+
 @pytest.mark.parametrize(("mode", "share"), [(FaultMode.INEFFICIENT, 0.85), (FaultMode.STUCK, 1.0)])
 def test_what_begins_soon_after_another_wheels_fault_is_less_sure(mode: FaultMode, share: float) -> None:
     def wheel(*spells: Spell) -> Any:  # whose channel never jumps
