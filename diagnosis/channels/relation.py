@@ -153,7 +153,7 @@ def relation_of(
         least = _misfit(places, best, dt, scale)
         plain = best
         found, misfit = _least(places, _trials(best, delays, span, dt), dt, scale)
-        if found.lag >= _LAGS_S[-1]:
+        if span and found.lag >= _LAGS_S[-1]:  # two speeds are measured closer to each other
             longer = (found._replace(lag=lag, delay=delay) for lag in _LONG_LAGS_S for delay in {found.delay, 0.0})
             found, misfit = min((found, misfit), _least(places, longer, dt, scale), key=lambda best: best[1])
         if misfit < least - _BETTER:

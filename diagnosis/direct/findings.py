@@ -119,7 +119,8 @@ def finding_of(run: Run, found: IdentifiedPair, limits: Limits) -> Finding | Non
     share = _left_share(isolated)
     if run.row in (STUCK, INEFFICIENT) and isolated.seen.still and share is not None:
         # nothing moved: a constant value and a constant share of a constant are the same
-        p[STUCK] = p[INEFFICIENT] = (p[STUCK] + p[INEFFICIENT]) / 2
+        if run.row == STUCK or p[STUCK] > p[INEFFICIENT]:
+            p[STUCK] = p[INEFFICIENT] = (p[STUCK] + p[INEFFICIENT]) / 2
         if run.row == STUCK:
             epsilon = Epsilon(1.0, 1.0 - share, 1.0)  # all, if it is stuck; else what is not left
         lines += (alike_sentence(found),)

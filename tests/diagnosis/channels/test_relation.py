@@ -90,3 +90,10 @@ def test_channels_of_one_kind_are_as_late_as_most_of_them() -> None:
     apart = [Relation(delay=d) for d in (0.0, 3.0, 6.0, 9.0)]
     assert relations_of_kind(apart, 0.001) == apart  # nobody agrees
     assert relations_of_kind(found[2:], 0.001) == found[2:]  # too few
+
+
+@pytest.mark.parametrize("lag", [0.1, 0.15])
+def test_large_pilot_stages_lag_by_more(lag: float) -> None:
+    x = command()
+    relation = found(noisy(Relation(lag=lag).expected(x, DT)), x, 1.0)
+    assert relation.lag + relation.delay * DT == pytest.approx(lag, rel=0.15)

@@ -38,5 +38,5 @@ def test_the_time_of_a_fault_can_be_left_out() -> None:
     gain = 1.0 + 0.02 * np.random.default_rng(1).standard_normal(200)
     gain[:150] = 0.4
     windows = gain_windows(samples(gain), DT)
-    assert windows.spread(0.36) > 0.5
+    assert windows.spread(0.36) == 0.1  # more than that no healthy channel varies by
     assert windows.spread(0.36, 0, 15_000) == pytest.approx(0.02, rel=0.3)

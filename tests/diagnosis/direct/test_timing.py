@@ -102,3 +102,13 @@ def test_swing_beside_a_command_at_rest_does_not_settle() -> None:
     x = np.full(N, 0.2)
     y = x + 0.02 * np.sin(np.arange(N) * 0.3) * ((np.arange(N) >= A) & (np.arange(N) < A + 40))
     assert not explained(pair(Side.ACTUATOR, y, x), FaultMode.NOISY, stop=A + 40, lag=0.005)
+
+
+@pytest.mark.parametrize(("late", "disturbed", "expected"), [(1, 0.0, True), (0, 0.3, False)])
+def test_an_opening_read_late_beside_a_restless_command_is_not_noisy(
+    late: int, disturbed: float, expected: bool
+) -> None:
+    rng = np.random.default_rng(6)
+    x = 0.3 + 0.1 * rng.normal(size=N)
+    y = np.roll(x, late) + disturbed * rng.normal(size=N)
+    assert explained(pair(Side.ACTUATOR, y, x), FaultMode.NOISY, stop=A + 2000) is expected
