@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from diagnosis.clearing.cells import Array, Cells, Frame
 from diagnosis.clearing.measure import compared, lasts, off_commands, worst
 from diagnosis.results.clearing import Check, Checked
 from diagnosis.results.vocabulary import Kind
 from replay.faults import Side
+
+Flags = NDArray[np.bool_]
 
 FLOOR_RAD, OPENING = 0.06, 0.03  # deviations are shares of at least this angle and opening
 _STILL_S, _STILL, _ANSWERED = 1.0, 0.015, 0.06  # s, rad/s, and of full opening
@@ -23,7 +26,8 @@ _RATE_S = 8.0
 _STEERED = 0.01  # of full opening beyond the dead band: below it, an axle is not steered
 _LEAST_S = 0.5  # of a window, in which it is steered
 _WRONG_WAY = 5.0  # for an axle that turns against its opening
-_EDGE, _STEPS = 0.5, 14  # mean opening beyond a dead band, as a share of it; dead bands that are tried
+_UNSURE, _EDGE = 0.02, 0.5  # by how much a dead band is not known: of full opening, and of itself
+_STEPS = 14  # dead bands that are tried
 VALVE = 1.4  # dead band and hysteresis of a healthy valve: its limit, likewise
 #: Limits of the rate in windows and over the mission, as multiples of the loss that counts, by whether angle and opening are measured twice.
 RATE = {False: (2.0, 1.0), True: (3.0, 2.0)}
@@ -185,23 +189,16 @@ def dead_bands(rate: Array, opening: Array) -> Array:
 
 def rates_of(cells: Cells, rate: Array, opening: Array) -> Rates:
     """Steering rates per opening beyond what of it moves nothing, while no fault is stated; arrays (cells, axles)."""
-    dead = dead_bands(rate, opening)
-    frame = Frame(cells.size, max(1, round(_RATE_S / cells.dt)), cells.frame.hop)
-    beyond = np.maximum(np.abs(opening) - dead, 0.0)
-    told = np.zeros(rate.shape, dtype=np.bool_)
+    dead, frame = dead_bands(rate, opening), Frame(cells.size, max(1, round(_RATE_S / cells.dt)), cells.frame.hop)
+    use = np.isfinite(rate) & np.isfinite(opening)
     for k, axle in enumerate(cells.machine.axles):
-        told[:, k] = cells.told(axle) & ~cells.mostly_explained(axle)
-    steered = np.isfinite(rate) & (np.nan_to_num(beyond) > _STEERED) & ~told
-    ahead = np.where(steered, rate * np.sign(opening), 0.0)
-    opened = np.where(steered, beyond, 0.0)
-    time = frame.sums(steered.astype(np.float64)) * cells.dt
-    # at the edge of a dead band, what of an opening moves something is not known
-    time = np.where(frame.sums(opened) * cells.dt >= _EDGE * dead * time, time, 0.0)
+        use[:, k] &= np.asarray(~cells.told(axle) | cells.mostly_explained(axle), dtype=np.bool_)
+    unsure = np.maximum(_UNSURE, _EDGE * dead)
+    off = _nearest([_off(frame, cells.dt, rate, opening, use, dead + k * unsure) for k in (-1.0, 0.0, 1.0)])
+    steered, ahead, opened = _beyond(rate, opening, use, dead)
     with np.errstate(divide="ignore", invalid="ignore"):
-        log = np.where(time >= _LEAST_S, np.log(np.maximum(frame.sums(ahead) / frame.sums(opened), 1e-3)), np.nan)
         whole = np.log(np.maximum(ahead.sum(axis=0) / opened.sum(axis=0), 1e-3))
     whole = np.where(steered.sum(axis=0) * cells.dt >= _FEW_S, whole, np.nan)
-    off = log - np.array([float(np.nanmedian(x)) if np.isfinite(x).any() else np.nan for x in log.T])
     apart: list[float | None] = [None] * len(whole)
     if len(apart) == 1:
         apart[0] = _by_plant(cells, ahead[:, 0], np.where(steered, opening, 0.0)[:, 0])
@@ -212,6 +209,29 @@ def rates_of(cells: Cells, rate: Array, opening: Array) -> Rates:
             between = float(abs(whole[a] - whole[b]))
             apart[a], apart[b] = max(apart[a] or 0.0, between), max(apart[b] or 0.0, between)
     return Rates(frame, off, whole, apart, ahead)
+
+
+def _beyond(rate: Array, opening: Array, use: Flags, dead: Array) -> tuple[Flags, Array, Array]:
+    """Where axles are steered beyond their dead bands, their rates ahead [rad/s] and the openings beyond [1] there, (cells, axles)."""
+    beyond = np.maximum(np.abs(opening) - np.maximum(dead, 0.0), 0.0)
+    steered = use & (np.nan_to_num(beyond) > _STEERED)
+    return steered, np.where(steered, rate * np.sign(opening), 0.0), np.where(steered, beyond, 0.0)
+
+
+def _off(frame: Frame, dt: float, rate: Array, opening: Array, use: Flags, dead: Array) -> Array:
+    """ln of the steering rate per opening beyond such dead bands against its usual one, (windows, axles)."""
+    steered, ahead, opened = _beyond(rate, opening, use, dead)
+    time = frame.sums(steered.astype(np.float64)) * dt
+    with np.errstate(divide="ignore", invalid="ignore"):
+        log = np.where(time >= _LEAST_S, np.log(np.maximum(frame.sums(ahead) / frame.sums(opened), 1e-3)), np.nan)
+    return log - np.array([float(np.nanmedian(x)) if np.isfinite(x).any() else np.nan for x in log.T])
+
+
+def _nearest(off: Sequence[Array]) -> Array:
+    """The smallest deviation of those that different dead bands give, 0 where they do not agree on its sign."""
+    every = np.stack(off)
+    low, high = every.min(axis=0), every.max(axis=0)
+    return np.where(low > 0.0, low, np.where(high < 0.0, high, 0.0 * low))
 
 
 def _by_plant(cells: Cells, ahead: Array, opening: Array) -> float | None:

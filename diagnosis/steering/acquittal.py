@@ -3,7 +3,8 @@
 Where a mission's motions scatter about the best plant by more than half a per cent even where it fits best, valves creep within
 their overlap, axles push each other, oil warms: the filters' evidence, which knows none of that, is sure of faults that are none.
 A fault of the sensor must then show between two angles, and one of the valve between its command and its opening, beyond what they
-differ by at such motion all through the mission; without a second measurement only a sensor that comes no more is told.
+differ by at such motion all through the mission; without a second measurement only a sensor that comes no more is told, or one
+that never rests and repeats one reading to its last digit.
 """
 
 from __future__ import annotations
@@ -35,6 +36,10 @@ _BEYOND = 2.5  # times what is usual at such motion
 _MOSTLY = 0.4  # of a finding: its ends may come late
 _READ = 0.5  # of a finding: what delivers less is silent
 _TELLING_S = 0.3  # for which a fault would have to show
+_FOLLOWED = 0.25  # of the power that a fault would leave between a command and its opening: one that leaves less follows
+_RESTLESS, _FROZEN = 0.3, 0.01  # share of readings that change: of a sensor that never rests, and of one that repeats itself
+_FEW_READINGS = 25
+_CALM = 0.1  # quantile of stretches of so many readings: in the others they change more often
 _LEFT = 0.5  # of the power between two measurements: what a fault that is believed leaves of it, at most
 _LEAST = {Side.SENSOR: 0.012, Side.ACTUATOR: 0.02}  # rad and of full opening: less is nobody's fault
 _BELIEVED = 0.5  # of these, where axles move as their model says
@@ -112,13 +117,15 @@ def acquitted(
     growth = noise_growth(usual, moved, blocks.dt) or NoiseGrowth(0.0, 0.0)
     least = _LEAST[side] * (_BELIEVED if believed else 1.0)
     limit = np.maximum(_BEYOND**2 * growth.variance(moved), least**2)
-    kept, open_ = [], list(found.unexplained)
+    kept, open_, refuted = [], list(found.unexplained), list(found.refuted)
     for f, (a, b) in zip(found.findings, spans, strict=True):
-        if _shown(f, apart[a:b], by[a:b], limit[a:b], blocks.dt, believed=believed):
+        if _shown(f, apart[a:b], by[a:b], limit[a:b], blocks.dt, believed=believed) or _frozen(f, found, inputs):
             kept.append(f)
+        elif side is Side.ACTUATOR and _followed(f, apart[a:b], by[a:b], limit[a:b]):
+            refuted.append((a, b))
         else:
             open_.append((a, b))
-    return SideFindings(tuple(kept), tuple(open_))
+    return SideFindings(tuple(kept), tuple(open_), tuple(refuted))
 
 
 def _apart(side: Side, inputs: AxleInputs, blocks: SteeringBlocks) -> tuple[Array, Array, Array]:
@@ -143,14 +150,44 @@ def _shown(finding: Finding, apart: Array, by: Array, limit: Array, dt: float, *
         return believed or (finding.side is Side.SENSOR and finding.mode is FaultMode.NO_SIGNAL)
     if finding.mode.varying:
         return _mostly(apart[known] ** 2 > limit[known])
-    kept = 0.0 if finding.mode.total or finding.epsilon is None else 1.0 - finding.epsilon.value
-    level = finding.sat.mean if finding.sat is not None and finding.mode is FaultMode.STUCK else 0.0
-    should = kept * by + level - by  # what such a fault puts between both
+    should = _puts_between(finding, by)
     telling = known & (should**2 > limit)
     if np.count_nonzero(telling) < _TELLING_S / dt:
         return False
     left = float(np.sum((apart - should)[telling] ** 2))
     return _mostly(apart[telling] ** 2 > limit[telling]) and left < _LEFT * float(np.sum(apart[telling] ** 2))
+
+
+def _puts_between(finding: Finding, by: Array) -> Array:
+    """What a fault puts between a channel and its second measurement, which is `by` in health."""
+    kept = 0.0 if finding.mode.total or finding.epsilon is None else 1.0 - finding.epsilon.value
+    level = finding.sat.mean if finding.sat is not None and finding.mode is FaultMode.STUCK else 0.0
+    return kept * by + level - by
+
+
+def _followed(finding: Finding, apart: Array, by: Array, limit: Array) -> bool:
+    """Whether an opening that is known throughout follows its command, and not as the fault would have it."""
+    if finding.mode.varying or not np.isfinite(apart).all():
+        return False
+    power = float(np.mean(apart**2))
+    left = float(np.mean((apart - _puts_between(finding, by)) ** 2))
+    return power <= min(float(np.mean(limit)), _FOLLOWED * left)
+
+
+def _frozen(finding: Finding, found: SideFindings, inputs: AxleInputs) -> bool:
+    """Whether a sensor repeats one reading although its last digits hardly ever rest, not even while the axle stands."""
+    if finding.side is not Side.SENSOR or not finding.mode.total:
+        return False
+    usual = inputs.fresh & np.isfinite(inputs.angle)
+    at = np.flatnonzero(usual[finding.start : finding.stop]) + finding.start
+    for f in found.findings:
+        usual[f.start : f.stop] = False
+    elsewhere = np.abs(np.diff(inputs.angle[usual]))
+    if at.size < _FEW_READINGS or elsewhere.size < 2 * _FEW_READINGS or at.size > elsewhere.size:
+        return False
+    windows = elsewhere[: elsewhere.size // _FEW_READINGS * _FEW_READINGS].reshape(-1, _FEW_READINGS)
+    restless = float(np.quantile(np.mean(windows > 0.0, axis=1), _CALM))
+    return restless >= _RESTLESS and float(np.mean(np.diff(inputs.angle[at]) != 0.0)) <= _FROZEN
 
 
 def _mostly(shown: NDArray[np.bool_]) -> bool:

@@ -51,10 +51,13 @@ class SideFindings(NamedTuple):
         Faults, their ends at samples.
     unexplained : tuple[tuple[int, int], ...]
         Blocks in a faulty row of which no fault may be stated.
+    refuted : tuple[tuple[int, int], ...]
+        Blocks in a faulty row that a measurement of the same quantity refutes.
     """
 
     findings: tuple[Finding, ...]
     unexplained: tuple[Span, ...]
+    refuted: tuple[Span, ...] = ()
 
 
 @dataclass(frozen=True)

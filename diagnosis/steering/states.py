@@ -88,7 +88,7 @@ def states_of(
         Whether this side can be judged by the plant.
     """
     y = inputs.angle
-    states = _of_blocks(side, axle, path, found.unexplained, judged)
+    states = _of_blocks(side, axle, path, found, judged)
     states = np.repeat(states, axle.blocks.length)[: y.size].astype(np.int8)
     if side is Side.ACTUATOR:
         for a, b in masked:
@@ -101,21 +101,23 @@ def states_of(
 
 
 def _of_blocks(
-    side: Side, axle: AxleFilter, path: SteeringPath, unexplained: Sequence[Span], judged: bool
+    side: Side, axle: AxleFilter, path: SteeringPath, found: SideFindings, judged: bool
 ) -> NDArray[np.int8]:
     """States of blocks without faults, shape (m,)."""
     blocks = axle.blocks
-    rows = path.sensor if side is Side.SENSOR else path.actuator
+    fine = (path.sensor if side is Side.SENSOR else path.actuator) == HEALTHY
+    for a, b in found.refuted:
+        fine[a:b] = True
     shown = exercised(axle)
     if side is Side.SENSOR and axle.model.noise.resolved:
         shown[:] = True
-    healthy = vouched(rows == HEALTHY, shown, blocks.dt, seen=axle.model.opening_measured)
+    healthy = vouched(fine, shown, blocks.dt, seen=axle.model.opening_measured)
     states = np.where(healthy, CODE[State.HEALTHY], CODE[State.NOT_EXCITED]).astype(np.int8)
     if not judged:
         states[:] = CODE[State.NOT_ASSESSED]
     if side is Side.SENSOR:
         unseen = blocks.blind & (blocks.status == PAIR) & ~blocks.redundancy.known
         states[unseen & (states == CODE[State.HEALTHY])] = CODE[State.NOT_ASSESSED]
-    for a, b in unexplained:
+    for a, b in found.unexplained:
         states[a:b] = CODE[State.NOT_ASSESSED]
     return states
