@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.clearing.cells import Array, Cells, Frame
-from diagnosis.clearing.measure import compared, lasts, off_commands, worst
+from diagnosis.clearing.measure import alone, compared, lasts, off_commands, times, worst
+from diagnosis.clearing.responses import largest_change
 from diagnosis.results.clearing import Check, Checked
 from diagnosis.results.vocabulary import Kind
 from replay.faults import Side
@@ -31,6 +32,8 @@ _STEPS = 14  # dead bands that are tried
 VALVE = 1.4  # dead band and hysteresis of a healthy valve: its limit, likewise
 #: Limits of the rate in windows and over the mission, as multiples of the loss that counts, by whether angle and opening are measured twice.
 RATE = {False: (2.0, 1.0), True: (3.0, 2.0)}
+_LEAST_WINDOWS = 16  # for a change
+_CHANGED, _ALONE = 0.75, 3.0  # of the loss that counts, and times the other axle's: a change of one axle alone
 _FEW_S = 2.0  # in which an axle is steered, for its usual rate
 
 
@@ -46,6 +49,7 @@ def axle_checks(cells: Cells, clear_at: float) -> Iterator[Checked]:
     behind = off_commands(cells, opening, command, OPENING)
     place = np.minimum(np.arange(cells.frame.starts.size), len(rates.off) - 1)
     limit = answered(cells)
+    changes = [alone(rates.changes, j, share, _CHANGED * share, _ALONE, others=1) for j in range(len(rates.changes))]
     for j, axle in enumerate(cells.machine.axles):
         about = (Kind.STEER, axle)
         if not np.isfinite(angle[:, j]).any():
@@ -62,7 +66,9 @@ def axle_checks(cells: Cells, clear_at: float) -> Iterator[Checked]:
             twice = bool(np.isfinite(second[:, j]).any() and np.isfinite(opening[:, j]).any())
             brief, long = RATE[twice]
             off = _alone(rates.off, j) if twice else np.abs(rates.off[:, j])
-            yield worst(cells, (*about, either, Check.RATE), off[place], brief * share)
+            deviates = worst(cells, (*about, either, Check.RATE), off[place], brief * share)
+            changed = lasts(cells, (*about, either, Check.RATE), rates.changes[j], changes[j])
+            yield deviates if changed.worst is None else max(deviates, changed, key=times)
             if len(cells.machine.axles) > 1:
                 yield lasts(cells, (*about, either, Check.LASTING_RATE), rates.apart[j], long * share)
             elif not twice:  # both sides of which are measured twice needs nothing to compare with
@@ -90,13 +96,17 @@ def answered(cells: Cells) -> float:
 
     What counts is the axle that needs least, by how long it stands still and by what the rates of all show of their overlap.
     """
-    need = [largest for j in range(len(cells.machine.axles)) if np.isfinite(largest := _longest_still(cells, j)[0])]
     opening = cells.axles("u_applied")
     used = np.where(np.isfinite(opening), opening, cells.axles("u"))
     dead = dead_bands(rate_of(cells.axles("phi"), cells.dt), used)
     least = float(np.nanmin(np.where(np.isfinite(used).any(axis=0), dead, np.nan))) if np.isfinite(used).any() else 0.0
-    stands = _ALIKE * min(need) if len(need) > 1 else 0.0
-    return float(min(max(_ANSWERED, stands, _ALIKE * least + _HYSTERESIS), _OVERLAP))
+    return float(min(max(_ANSWERED, _ALIKE * _stands(cells), _ALIKE * least + _HYSTERESIS), _OVERLAP))
+
+
+def _stands(cells: Cells) -> float:
+    """Opening at which even the axle that needs least stands still for a second [1]; 0 where only one is known."""
+    need = [largest for j in range(len(cells.machine.axles)) if np.isfinite(largest := _longest_still(cells, j)[0])]
+    return min(need) if len(need) > 1 else 0.0
 
 
 def _still(cells: Cells, j: int, limit: float) -> Checked:
@@ -155,6 +165,9 @@ class Rates(NamedTuple):
         How far that is from the other axle's, or, of the only one, from what the machine file's [steering] lets expect.
     weight : Array, shape (cells, axles)
         Rate that counts in a window, 0 where none does [rad/s].
+    changes : list[float | None]
+        By how much each axle's usual one changes in the mission at most, alone and beside the other axle's; None where few
+        windows tell.
     """
 
     frame: Frame
@@ -162,6 +175,7 @@ class Rates(NamedTuple):
     whole: Array
     apart: list[float | None]
     weight: Array
+    changes: list[float | None]
 
 
 def dead_bands(rate: Array, opening: Array) -> Array:
@@ -194,8 +208,12 @@ def rates_of(cells: Cells, rate: Array, opening: Array) -> Rates:
     for k, axle in enumerate(cells.machine.axles):
         use[:, k] &= np.asarray(~cells.told(axle) | cells.mostly_explained(axle), dtype=np.bool_)
     unsure = np.maximum(_UNSURE, _EDGE * dead)
-    off = _nearest([_off(frame, cells.dt, rate, opening, use, dead + k * unsure) for k in (-1.0, 0.0, 1.0)])
     steered, ahead, opened = _beyond(rate, opening, use, dead)
+    # at the edge of a dead band, what of an opening moves something is not known
+    enough = frame.sums(opened) >= _EDGE * dead * frame.sums(steered.astype(np.float64))
+    most = np.maximum(dead + unsure, min(_ALIKE * _stands(cells), _OVERLAP))
+    off = _nearest([_off(frame, cells.dt, rate, opening, use, tried) for tried in (dead - unsure, dead, most)])
+    off = np.where(enough, off, np.nan)
     with np.errstate(divide="ignore", invalid="ignore"):
         whole = np.log(np.maximum(ahead.sum(axis=0) / opened.sum(axis=0), 1e-3))
     whole = np.where(steered.sum(axis=0) * cells.dt >= _FEW_S, whole, np.nan)
@@ -208,7 +226,21 @@ def rates_of(cells: Cells, rate: Array, opening: Array) -> Rates:
         if np.isfinite(whole[a]) and np.isfinite(whole[b]):
             between = float(abs(whole[a] - whole[b]))
             apart[a], apart[b] = max(apart[a] or 0.0, between), max(apart[b] or 0.0, between)
-    return Rates(frame, off, whole, apart, ahead)
+    return Rates(frame, off, whole, apart, ahead, [_changes(cells, frame, off, j) for j in range(len(whole))])
+
+
+def _changes(cells: Cells, frame: Frame, off: Array, j: int) -> float | None:
+    """By how much an axle's rate per opening changes, and not that of all axles: their supply's doing [ln]."""
+    name = cells.machine.axles[j]
+    own = np.where(cells.explained(name, frame), np.nan, off[:, j])
+    if np.count_nonzero(np.isfinite(own)) < _LEAST_WINDOWS:
+        return None
+    found = [largest_change(own, [np.isfinite(own)])]
+    for k in range(off.shape[1]):
+        beside = np.isfinite(own - off[:, k])
+        if k != j and np.count_nonzero(beside) >= _LEAST_WINDOWS:
+            found.append(largest_change(own - off[:, k], [beside]))
+    return min(found)
 
 
 def _beyond(rate: Array, opening: Array, use: Flags, dead: Array) -> tuple[Flags, Array, Array]:
@@ -224,14 +256,14 @@ def _off(frame: Frame, dt: float, rate: Array, opening: Array, use: Flags, dead:
     time = frame.sums(steered.astype(np.float64)) * dt
     with np.errstate(divide="ignore", invalid="ignore"):
         log = np.where(time >= _LEAST_S, np.log(np.maximum(frame.sums(ahead) / frame.sums(opened), 1e-3)), np.nan)
-    return log - np.array([float(np.nanmedian(x)) if np.isfinite(x).any() else np.nan for x in log.T])
+    return np.asarray(log - np.array([float(np.nanmedian(x)) if np.isfinite(x).any() else np.nan for x in log.T]))
 
 
 def _nearest(off: Sequence[Array]) -> Array:
     """The smallest deviation of those that different dead bands give, 0 where they do not agree on its sign."""
     every = np.stack(off)
     low, high = every.min(axis=0), every.max(axis=0)
-    return np.where(low > 0.0, low, np.where(high < 0.0, high, 0.0 * low))
+    return np.asarray(np.where(low > 0.0, low, np.where(high < 0.0, high, 0.0 * low)))
 
 
 def _by_plant(cells: Cells, ahead: Array, opening: Array) -> float | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -174,6 +175,33 @@ def _alike(x: Array, y: Array, delay: int) -> float:
     a, b = a[known], b[known]
     power = float(a @ a) * float(b @ b)
     return float(a @ b) / power**0.5 if power > 0.0 else 0.0
+
+
+def alone(
+    values: Sequence[float | None], i: int, limit: float, least: float, times: float, *, others: int = 2
+) -> float:
+    """Limit of one part: lower where the others deviate by much less than it.
+
+    Parameters
+    ----------
+    values : Sequence[float or None]
+        By how much each part deviates, in any unit; None or NaN where nothing is known.
+    i : int
+        The part.
+    limit, least : float
+        What it is at most and at least, in that unit.
+    times : float
+        By how many times the largest of the others' it may deviate.
+    others : int
+        Of how many that must be known.
+    """
+    beside = [abs(x) for j, x in enumerate(values) if j != i and x is not None and np.isfinite(x)]
+    return min(limit, max(least, times * max(beside))) if len(beside) >= others else limit
+
+
+def times(check: Checked) -> float:
+    """A check's value as a multiple of its limit; less than any where it is not known."""
+    return -1.0 if check.worst is None else check.worst / check.limit
 
 
 def worst(

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.clearing.cells import Array, Cells
-from diagnosis.clearing.measure import lowest_passed
+from diagnosis.clearing.measure import alone, lowest_passed
 
 _LAG_S = 0.15  # of a valve and its drive
 _SETTLED_S, _SETTLED = 0.6, 0.03  # a command that has changed by less than this [m/s] over this time
@@ -23,6 +23,7 @@ _SURELY, _FOLLOWS = 0.8, 0.45
 _CHANGED = 0.88  # a change counts by its limit in windows, not over the mission
 #: A deviation counts from so many times the largest of the other wheels' on, a change likewise, and from this [ln]: tyres hide most of a valve's loss.
 _ALONE, _CHANGED_ALONE, _LEAST = 3.0, 2.2, 0.1
+_LEAST_TWICE = 0.75  # of the loss that counts, where both sides are measured twice
 OTHERS = 2
 #: Limits of speed per opening below and above the other wheels', in windows and over the mission, as multiples of the loss
 #: that counts, by whether opening and speed are measured twice. What measurements judge need not be judged by its likeness to
@@ -114,7 +115,7 @@ def responses_of(cells: Cells, speed: Array, opening: Array, reference: Array) -
                 if np.count_nonzero(here) * frame.hop * cells.dt >= 3.0:
                     usual.append(middle)
                     ways[-1] = middle
-        changes.append(_change(own, [ahead[:, i], ~ahead[:, i]]) if usual else None)
+        changes.append(largest_change(own, [ahead[:, i], ~ahead[:, i]]) if usual else None)
         lasting.append(
             Usual(max(0.0, -min(usual)), max(0.0, *usual), min(usual), max(usual), (ways[0], ways[1]))
             if usual
@@ -123,8 +124,8 @@ def responses_of(cells: Cells, speed: Array, opening: Array, reference: Array) -
     return Responses(off, log, lasting, np.where(settled, np.abs(speed), 0.0), ahead, changes)
 
 
-def _change(log: Array, ways: list[NDArray[np.bool_]]) -> float:
-    """Largest difference between the medians before and after any moment, of forward or of reverse [ln].
+def largest_change(log: Array, ways: Sequence[NDArray[np.bool_]]) -> float:
+    """Largest difference between the medians before and after any moment, of each of some sorts of windows alone [ln].
 
     A loss that lasts about half of the mission is half of what is usual.
     """
@@ -174,28 +175,25 @@ def usual_limits(twice: tuple[bool, bool], clear_at: float) -> Limits:
 def response_limits(responses: Responses, twice: Sequence[tuple[bool, bool]], clear_at: float) -> list[Limits]:
     """Limits of every wheel [ln]: those of windows and of changes are lower where the other wheels deviate by much less.
 
-    Not of one whose sides are both measured twice: what is left to be seen of it is its load. Arguments as of `usual_limits`.
+    Of one whose sides are both measured twice only that of a change: what is left to be seen of it is its load. Arguments as of
+    `usual_limits`.
     """
-
-    def alone(values: Sequence[float | None], i: int, limit: float, times: float = _ALONE) -> float:
-        others = [abs(x) for j, x in enumerate(values) if j != i and x is not None and np.isfinite(x)]
-        return min(limit, max(_LEAST, times * max(others))) if len(others) >= OTHERS else limit
-
-    largest = [[float(x) for x in _largest(sign * responses.windows)] for sign in (-1.0, 1.0)]
+    most = [[float(x) for x in largest(sign * responses.windows)] for sign in (-1.0, 1.0)]
     usual = [usual_limits(both, clear_at) for both in twice]
+    least = -_LEAST_TWICE * float(np.log1p(-clear_at))
     return [
-        limit
+        limit._replace(changed=alone(responses.changes, i, limit.changed, least, _CHANGED_ALONE))
         if all(twice[i])
         else limit._replace(
-            below=alone(largest[0], i, limit.below),
-            above=alone(largest[1], i, limit.above),
-            changed=alone(responses.changes, i, limit.changed, _CHANGED_ALONE),
+            below=alone(most[0], i, limit.below, _LEAST, _ALONE),
+            above=alone(most[1], i, limit.above, _LEAST, _ALONE),
+            changed=alone(responses.changes, i, limit.changed, _LEAST, _CHANGED_ALONE),
         )
         for i, limit in enumerate(usual)
     ]
 
 
-def _largest(windows: Array) -> Array:
+def largest(windows: Array) -> Array:
     """Largest value of each wheel; NaN where none is known. From shape (windows, wheels) to (wheels,)."""
     most = np.max(np.where(np.isfinite(windows), windows, -np.inf), axis=0, initial=-np.inf)
     return np.where(np.isfinite(most), np.maximum(most, 0.0), np.nan)
@@ -225,8 +223,8 @@ def openings_tell(cells: Cells, responses: Responses) -> bool:
     if explained > _SURELY:  # several faulty wheels make no torque of the openings
         return True
     limit = usual_limits((True, True), cells.machine.limits.clear_at).below
-    largest = _largest(np.abs(responses.windows))
-    known = np.sort(largest[np.isfinite(largest)])
+    most = largest(np.abs(responses.windows))
+    known = np.sort(most[np.isfinite(most)])
     alike = not known.size or known[(known.size - 1) // 2] <= _ALIKE * limit
     return bool(alike and explained > _FOLLOWS)
 

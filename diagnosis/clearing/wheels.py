@@ -8,9 +8,10 @@ from typing import NamedTuple
 import numpy as np
 
 from diagnosis.clearing.cells import Array, Cells
-from diagnosis.clearing.measure import compared, lasts, late, off_commands, worst
+from diagnosis.clearing.measure import alone, compared, lasts, late, off_commands, times, worst
 from diagnosis.clearing.responses import (
     OTHERS,
+    largest,
     measured_twice,
     openings_tell,
     others_at,
@@ -27,6 +28,7 @@ OPENING = 0.03  # of full opening: likewise
 ROUGH, _ROUGHER = 0.15, 5.0  # quick changes: share of the speed, times those of the other wheels
 LATE_S = 0.2
 _TRACKING = 0.35
+_SLOWER = 3.0  # times the other valves' deviation: a slow one
 VALVE = 1.4  # dead band and hysteresis of a healthy valve: the limit as a multiple of the loss that counts
 
 
@@ -39,6 +41,7 @@ def wheel_checks(cells: Cells, clear_at: float) -> Iterator[Checked]:
     apart = np.column_stack([cells.apart(wheel) for wheel in cells.machine.wheels])
     speed, second, opening = (np.where(apart, x, np.nan) for x in (speed, second, opening))
     behind = off_commands(cells, opening, command, OPENING)
+    slowest = [float(x) for x in largest(behind)]
     responses = responses_of(cells, speed, used, reference)
     tells = openings_tell(cells, responses)
     windows, lasting, changes = responses.windows, responses.usual, responses.changes
@@ -56,19 +59,18 @@ def wheel_checks(cells: Cells, clear_at: float) -> Iterator[Checked]:
             off = compared(cells, speed[:, i], second[:, i], FLOOR * top).off
             yield worst(cells, (*about, Side.SENSOR, Check.SECOND_MEASUREMENT), off, clear_at, apart=True)
         if twice[i][0]:
-            yield worst(
-                cells, (*about, Side.ACTUATOR, Check.SECOND_MEASUREMENT), behind[:, i], VALVE * clear_at, apart=True
-            )
+            limit = alone(slowest, i, VALVE * clear_at, clear_at, _SLOWER)
+            yield worst(cells, (*about, Side.ACTUATOR, Check.SECOND_MEASUREMENT), behind[:, i], limit, apart=True)
         # where an opening is no speed, nothing of it is asked of a wheel that is measured twice on either side
         if _known(used[:, i]) and speed.shape[1] > OTHERS and (tells or not all(twice[i])):
-            limit = limits[i]
-            yield worst(cells, (*about, either, Check.RESPONSE), -windows[:, i], limit.below, apart=True)
-            below = lasts(cells, (*about, either, Check.LASTING_RESPONSE), lasting[i].below, limit.lasting_below)
-            changed = lasts(cells, (*about, either, Check.LASTING_RESPONSE), changes[i], limit.changed)
-            yield max(below, changed, key=_times)
+            own = limits[i]
+            yield worst(cells, (*about, either, Check.RESPONSE), -windows[:, i], own.below, apart=True)
+            below = lasts(cells, (*about, either, Check.LASTING_RESPONSE), lasting[i].below, own.lasting_below)
+            changed = lasts(cells, (*about, either, Check.LASTING_RESPONSE), changes[i], own.changed)
+            yield max(below, changed, key=times)
             if not all(twice[i]):  # of a wheel that is measured twice on both sides, it is the ground's doing
-                yield worst(cells, (*about, either, Check.EXCESS), windows[:, i], limit.above, apart=True)
-                yield lasts(cells, (*about, either, Check.LASTING_EXCESS), lasting[i].above, limit.lasting_above)
+                yield worst(cells, (*about, either, Check.EXCESS), windows[:, i], own.above, apart=True)
+                yield lasts(cells, (*about, either, Check.LASTING_EXCESS), lasting[i].above, own.lasting_above)
         if _known(reference[:, i]):
             if (
                 _known(used[:, i]) or twice[i][1]
@@ -81,11 +83,6 @@ def wheel_checks(cells: Cells, clear_at: float) -> Iterator[Checked]:
 
 def _known(x: Array) -> bool:
     return bool(np.isfinite(x).any())
-
-
-def _times(check: Checked) -> float:
-    """A check's value as a multiple of its limit; less than any where it is not known."""
-    return -1.0 if check.worst is None else check.worst / check.limit
 
 
 def _tracking(cells: Cells, speed: Array, reference: Array) -> Array:

@@ -36,8 +36,13 @@ _BEYOND = 2.5  # times what is usual at such motion
 _MOSTLY = 0.4  # of a finding: its ends may come late
 _READ = 0.5  # of a finding: what delivers less is silent
 _TELLING_S = 0.3  # for which a fault would have to show
-_FOLLOWED = 0.25  # of the power that a fault would leave between a command and its opening: one that leaves less follows
-_RESTLESS, _FROZEN = 0.3, 0.01  # share of readings that change: of a sensor that never rests, and of one that repeats itself
+_FOLLOWED = (
+    0.25  # of the power that a fault would leave between a command and its opening: one that leaves less follows
+)
+_RESTLESS, _FROZEN = (
+    0.3,
+    0.01,
+)  # share of readings that change: of a sensor that never rests, and of one that repeats itself
 _FEW_READINGS = 25
 _CALM = 0.1  # quantile of stretches of so many readings: in the others they change more often
 _LEFT = 0.5  # of the power between two measurements: what a fault that is believed leaves of it, at most

@@ -100,9 +100,7 @@ def states_of(
     return states
 
 
-def _of_blocks(
-    side: Side, axle: AxleFilter, path: SteeringPath, found: SideFindings, judged: bool
-) -> NDArray[np.int8]:
+def _of_blocks(side: Side, axle: AxleFilter, path: SteeringPath, found: SideFindings, judged: bool) -> NDArray[np.int8]:
     """States of blocks without faults, shape (m,)."""
     blocks = axle.blocks
     fine = (path.sensor if side is Side.SENSOR else path.actuator) == HEALTHY
