@@ -27,8 +27,8 @@ FLOOR = 0.16  # of the top speed: a deviation is a share of at least this
 OPENING = 0.03  # of full opening: likewise
 ROUGH, _ROUGHER = 0.15, 5.0  # quick changes: share of the speed, times those of the other wheels
 LATE_S = 0.2
-_TRACKING = 0.35
-_SLOWER = 3.0  # times the other valves' deviation: a slow one
+_TRACKING, _TRACKING_ALONE = 0.35, 0.12  # at most, and at least where the other wheels follow much better
+_SLOWER = 3.0  # times the deviation of the others' valves, or speeds: a slow one
 VALVE = 1.4  # dead band and hysteresis of a healthy valve: the limit as a multiple of the loss that counts
 
 
@@ -48,6 +48,7 @@ def wheel_checks(cells: Cells, clear_at: float) -> Iterator[Checked]:
     limits = response_limits(responses, twice, clear_at)
     tracking, rough = _tracking(cells, speed, reference), _rough_beside_others(roughness_of(cells, speed))
     rough = np.fmax(rough, wild_readings(cells, speed, FLOOR * cells.machine.max_speed))
+    worst_tracking = [float(x) for x in largest(tracking)]
     delays = late(speed, reference, cells.dt)
     either = Side.SENSOR_OR_ACTUATOR
     top = cells.machine.max_speed
@@ -75,7 +76,8 @@ def wheel_checks(cells: Cells, clear_at: float) -> Iterator[Checked]:
             if (
                 _known(used[:, i]) or twice[i][1]
             ):  # a drive with a command alone is judged by how it answers it, not by its lag
-                yield worst(cells, (*about, either, Check.TRACKING), tracking[:, i], _TRACKING, apart=True)
+                limit = alone(worst_tracking, i, _TRACKING, _TRACKING_ALONE, _SLOWER)
+                yield worst(cells, (*about, either, Check.TRACKING), tracking[:, i], limit, apart=True)
             if delays[i] is not None:
                 yield lasts(cells, (*about, Side.SENSOR, Check.DELAY), delays[i], LATE_S)
         yield worst(cells, (*about, Side.SENSOR, Check.ROUGHNESS), rough[:, i], ROUGH, apart=True)

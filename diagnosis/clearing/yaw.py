@@ -17,25 +17,31 @@ from replay.faults import Side
 _FIXED = "fixed"  # axle of wheels that are not steered
 _STILL, _STILL_S = 0.01, 1.0  # m/s; at rest for this long, a gyro shows its bias
 _MOVING = 0.25  # of the top speed
-OFF, LASTING_OFF = 0.06, 0.04  # rad
+OFF = 1.5  # times the offset that counts, for three seconds
+_ASKED = np.pi / 2  # rad: from here on no offset is asked for
 _STRAIGHT, _SHORTEST = 0.08, 0.1  # rad, m
 _LEAST_S = 6.0  # of driving straight
 ANSWERED = 0.7  # of an angle by which one axle alone is off: tyres give way sideways
 
 
 def yaw_checks(cells: Cells) -> Iterator[Checked]:
-    """Checks of both ends of a machine together; none without a yaw rate, two axles of which one is steered at least, and some driving straight.
+    """Checks of both ends of a machine together, which take a yaw rate, two axles of which one is steered at least, and some driving straight.
 
-    In turns tyres and the wheels' offsets make the angles an approximation.
+    In turns tyres and the wheels' offsets make the angles an approximation. Without all that, an axle whose angle is not measured
+    twice stays open.
     """
-    straight, part = off_straight(cells), Side.SENSOR_OR_ACTUATOR
+    straight, part, limit = off_straight(cells), Side.SENSOR_OR_ACTUATOR, cells.machine.limits.clear_offset
     if straight is None:
+        known, second = (np.atleast_1d(np.isfinite(cells.axles(leaf)).any(axis=0)) for leaf in ("phi", "phi_true"))
+        for axle, once in zip(cells.machine.axles, known & ~second, strict=True):
+            if once and limit < _ASKED:
+                yield Checked(Kind.STEER, axle, Side.SENSOR, Check.LASTING_YAW, None, limit)
         return
     windows, lasting = np.abs(cells.frame.mean(straight)), abs(float(np.nanmedian(straight)))
     for axle in cells.machine.axles:
         if np.isfinite(windows).any():
-            yield worst(cells, (Kind.STEER, axle, part, Check.YAW), windows, OFF)
-        yield lasts(cells, (Kind.STEER, axle, part, Check.LASTING_YAW), lasting, LASTING_OFF)
+            yield worst(cells, (Kind.STEER, axle, part, Check.YAW), windows, OFF * limit)
+        yield lasts(cells, (Kind.STEER, axle, part, Check.LASTING_YAW), lasting, limit)
 
 
 def off_straight(cells: Cells) -> Array | None:

@@ -1,4 +1,4 @@
-"""What a steering model alone claims and the readings deny: noise that shakes nothing, a sensor that is stuck and trembles.
+"""What a steering model alone claims and the readings deny: noise that shakes nothing, stuck sensors that tremble, stuck valves that obey.
 
 To the filters everything that their plant leaves unexplained for a while looks like noise of one side, and an angle that stays
 like a stuck sensor, whoever holds it.
@@ -19,6 +19,8 @@ from replay.faults import FaultMode, Side
 
 _SHAKEN = 2.0  # times the usual power of what changes from reading to reading
 _RESTLESS = 0.1  # share of changing readings from which on a sensor lives
+_MOTION_S, _LATEST_S, _FEW_MOTIONS = 0.5, 0.3, 6  # of an angle, and by how much it may be later than its command
+_OBEYS = 0.8  # correlation
 _READ = 0.5  # of a finding: what delivers less is silent
 _LEAST_USUAL_S = 5.0  # for which a reading must be known without its fault
 _DISTURBED = 0.6  # probability of noise behind an opening that nobody measured: none of 10 was right on tuning seeds
@@ -54,6 +56,9 @@ def not_denied(
         kept = tuple(f for f in sensor.findings if f not in denied)
         out[Side.SENSOR] = SideFindings(kept, (*sensor.unexplained, *(_span(f, blocks) for f in denied)))
     if not inputs.valve_redundant:
+        obeyed = [f for f in valve.findings if f.mode.total and _obeys(*_span(f, blocks), blocks)]
+        kept = tuple(f for f in valve.findings if f not in obeyed)
+        valve = valve._replace(findings=kept, unexplained=(*valve.unexplained, *(_span(f, blocks) for f in obeyed)))
         findings = tuple(limited(f, _DISTURBED, _UNSEEN) if f.mode is FaultMode.NOISY else f for f in valve.findings)
         out[Side.ACTUATOR] = valve._replace(findings=findings)
     return {side: one._replace(findings=_not_brief(one.findings, inputs.timeline.dt)) for side, one in out.items()}
@@ -75,6 +80,25 @@ def _trembles(finding: Finding, inputs: AxleInputs) -> bool:
     known = np.isfinite(inputs.angle[part])
     y = inputs.angle[part][known & inputs.fresh[part]]
     return bool(y.size > 1 and np.mean(known) > _READ and np.mean(np.diff(y) != 0.0) > _RESTLESS)
+
+
+def _obeys(a: int, b: int, blocks: SteeringBlocks) -> bool:
+    """Whether the angle moves as its command asks in blocks [a, b), by however much: no valve does that without its command.
+
+    That of a closed loop turns against whatever a stuck valve does.
+    """
+    n = max(2, round(_MOTION_S / blocks.dt))
+    known = np.where(blocks.count > 0, blocks.mean, np.nan)
+    moved = known[a + n : b : n // 2] - known[a : b - n : n // 2]
+    driven = np.concatenate([[0.0], np.cumsum(np.nan_to_num(blocks.u)) * blocks.dt])
+    for late in range(0, round(_LATEST_S / blocks.dt) + 1, max(1, n // 4)):
+        first = np.arange(a, b - n, n // 2)[: moved.size] - late
+        use = (first >= 0) & np.isfinite(moved)
+        x, y = driven[first[use] + n] - driven[first[use]], moved[use]
+        power = float(x @ x) * float(y @ y)
+        if x.size >= _FEW_MOTIONS and power > 0.0 and float(x @ y) > _OBEYS * power**0.5:
+            return True
+    return False
 
 
 def _span(finding: Finding, blocks: SteeringBlocks) -> tuple[int, int]:

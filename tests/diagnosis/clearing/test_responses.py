@@ -40,7 +40,16 @@ def test_a_wheel_that_deviates_alone_is_held_to_a_lower_limit() -> None:
 
 def test_a_wheel_that_is_measured_twice_on_both_sides_keeps_its_limit() -> None:
     of = responses(0.3, 0.02, 0.03, 0.03, changes=(0.3, 0.02, 0.01, None))
-    assert response_limits(of, [TWICE] * 4, CLEAR_AT) == [usual_limits(TWICE, CLEAR_AT)] * 4
+    usual = usual_limits(TWICE, CLEAR_AT)
+    limits = response_limits(of, [TWICE] * 4, CLEAR_AT)
+    assert [limit._replace(changed=usual.changed) for limit in limits] == [usual] * 4
+
+
+def test_a_change_that_one_wheel_alone_makes_counts_although_it_is_measured_twice() -> None:
+    of = responses(0.0, 0.0, 0.0, 0.0, changes=(0.3, 0.02, 0.01, 0.02))
+    first, *others = response_limits(of, [TWICE] * 4, CLEAR_AT)
+    assert first.changed == pytest.approx(0.75 * -np.log(0.75))
+    assert all(limit.changed == usual_limits(TWICE, CLEAR_AT).changed for limit in others)
 
 
 def test_where_all_deviate_alike_the_limit_stays() -> None:
