@@ -240,7 +240,7 @@ def _changes(cells: Cells, frame: Frame, off: Array, j: int) -> float | None:
         beside = np.isfinite(own - off[:, k])
         if k != j and np.count_nonzero(beside) >= _LEAST_WINDOWS:
             found.append(largest_change(own - off[:, k], [beside]))
-    return min(found)
+    return float(min(found))
 
 
 def _beyond(rate: Array, opening: Array, use: Flags, dead: Array) -> tuple[Flags, Array, Array]:

@@ -196,7 +196,7 @@ def alone(
         Of how many that must be known.
     """
     beside = [abs(x) for j, x in enumerate(values) if j != i and x is not None and np.isfinite(x)]
-    return min(limit, max(least, times * max(beside))) if len(beside) >= others else limit
+    return float(min(limit, max(least, times * max(beside)))) if len(beside) >= others else limit
 
 
 def times(check: Checked) -> float:

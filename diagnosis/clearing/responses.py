@@ -135,7 +135,7 @@ def largest_change(log: Array, ways: Sequence[NDArray[np.bool_]]) -> float:
         least = max(_LEAST_WINDOWS, round(_PART * x.size))
         for k in range(least, x.size - least + 1, max(1, x.size // 40)):
             largest = max(largest, abs(_median(x[:k]) - _median(x[k:])))
-    return largest
+    return float(largest)
 
 
 def _median(x: Array) -> float:

@@ -113,7 +113,13 @@ def test_an_angle_that_is_off_turns_the_machine() -> None:
     assert healthy.passed
     assert not off.passed
     assert "° off its measured angle" in off.text
-    assert key not in checks_by_part(driven[0], base=True)
+    unseen = checks_by_part(driven[0], base=True)["rear", "sensor", Check.LASTING_YAW]
+    assert unseen.worst is None
+    assert "does not show" in unseen.text
+    machine = in_cells(driven[0], base=True).machine
+    none = replace(machine, limits=replace(machine.limits, clear_offset=3.2))
+    cells = replace(in_cells(driven[0], base=True), machine=none)
+    assert not [c for c in checks_of(cells, HYDRAULIC) if c.check is Check.LASTING_YAW]
 
 
 def _with_yaw_rate(mission: SimulatedMission) -> SimulatedMission:
@@ -176,3 +182,30 @@ def test_what_is_left_of_a_jump_is_not_held_against_a_slow_valve() -> None:
         opening[k] = keep * opening[k - 1] + (1.0 - keep) * command[k]
     assert np.nanmax(off_commands(cells, opening, command, 0.03)) < 0.3
     assert np.nanmax(off_commands(cells, 0.5 * opening, command, 0.03)) > 0.4
+
+
+@pytest.mark.parametrize(("kept", "passes"), [(1.0, True), (0.68, False)])
+def test_a_reading_that_loses_scale_on_one_axle_changes_its_rate(kept: float, passes: bool) -> None:
+    mission = simulated(seed=8)
+    half = mission.stamps > mission.stamps[mission.stamps.size // 2]
+    angle = mission.columns["steer.front.phi"] * np.where(half, kept, 1.0)
+    one = replace(mission, columns={**mission.columns, "steer.front.phi": angle})
+    found = checks_by_part(one, base=True)
+    assert found["front", "sensor_or_actuator", Check.RATE].passed is passes
+    assert found["rear", "sensor_or_actuator", Check.RATE].passed
+
+
+def test_a_valve_that_is_slow_beside_the_others_is_not_cleared() -> None:
+    mission = simulated(seed=8)
+    names = [name for name in mission.columns if name.startswith("wheel.") and name.endswith(".u_applied")]
+    assert all(
+        checks_by_part(mission, base=False)[name.split(".")[1], "actuator", Check.SECOND_MEASUREMENT].passed
+        for name in names
+    )
+    opening, dt = mission.columns["wheel.FR.u_applied"].copy(), 0.01
+    for k in range(1, opening.size):
+        opening[k] = opening[k - 1] + dt / 0.6 * (mission.columns["wheel.FR.u"][k] - opening[k - 1])
+    slow = replace(mission, columns={**mission.columns, "wheel.FR.u_applied": opening})
+    found = checks_by_part(slow, base=False)
+    assert not found["FR", "actuator", Check.SECOND_MEASUREMENT].passed
+    assert found["RL", "actuator", Check.SECOND_MEASUREMENT].passed

@@ -155,3 +155,28 @@ def test_a_sensor_that_fails_all_through_is_no_habit() -> None:
     assert kept(Side.SENSOR, finding(Side.SENSOR, FaultMode.NO_SIGNAL, 0, SIZE), dead)
     near = with_second_angle(blocks(u, angle + 0.003), angle + 0.003, angle, ALWAYS, DT, 0.0015)
     assert not kept(Side.SENSOR, finding(Side.SENSOR, FaultMode.INEFFICIENT, 500, 800, 0.3), near)
+
+
+@pytest.mark.parametrize(("noise", "named"), [(5e-4, True), (0.0, False)])
+def test_a_sensor_that_never_rests_and_repeats_one_reading_is_dead_whatever_the_model_says(
+    noise: float, named: bool
+) -> None:
+    u, angle = moved(0.0)
+    reading = angle + np.random.default_rng(6).normal(0.0, noise, SIZE)
+    reading[4000:5000] = reading[4000]
+    if not named:
+        reading = np.round(reading, 1)  # such a sensor rests most of the time
+    inputs: Any = SimpleNamespace(angle_redundant=False, angle=reading, fresh=ALWAYS)
+    stuck = SideFindings((finding(Side.SENSOR, FaultMode.STUCK, 4000, 5000),), ())
+    found = acquitted(Side.SENSOR, stuck, inputs, blocks(u, reading), believed=False)
+    assert bool(found.findings) is named
+
+
+def test_an_opening_that_follows_refutes_a_dead_valve() -> None:
+    u, _ = moved(0.0)
+    inputs: Any = SimpleNamespace(angle_redundant=True)
+    dead = SideFindings((finding(Side.ACTUATOR, FaultMode.NO_SIGNAL, 2000, 4000),), ())
+    found = acquitted(Side.ACTUATOR, dead, inputs, valve(u, u), believed=False)
+    assert not found.findings
+    assert not found.unexplained
+    assert found.refuted == ((2000, 4000),)

@@ -87,3 +87,17 @@ def test_a_sensor_whose_last_digit_changes_is_not_stuck(trembles: bool) -> None:
     stuck = SideFindings((replace(claimed, mode=FaultMode.STUCK),), ())
     out = not_denied({Side.SENSOR: stuck, Side.ACTUATOR: NOTHING}, inputs(reading=reading), axle(None))[Side.SENSOR]
     assert bool(out.findings) is not trembles
+
+
+@pytest.mark.parametrize("obeys", [True, False])
+def test_a_valve_that_moves_its_axle_as_it_is_told_is_not_stuck(obeys: bool) -> None:
+    t = np.arange(SIZE) * DT
+    command = 0.2 * np.cos(0.5 * t)
+    rate = 0.6 * command if obeys else np.full(SIZE, 0.02)
+    angle = np.cumsum(rate) * DT + np.random.default_rng(7).normal(0.0, 3e-4, SIZE)
+    of = blocks_of(angle, command, ALWAYS, ALWAYS, DT)
+    (claimed,) = noise(Side.ACTUATOR).findings
+    stuck = SideFindings((replace(claimed, mode=FaultMode.STUCK),), ())
+    out = not_denied({Side.SENSOR: NOTHING, Side.ACTUATOR: stuck}, inputs(), of)[Side.ACTUATOR]
+    assert bool(out.findings) is not obeys
+    assert bool(out.unexplained) is obeys
