@@ -40,7 +40,7 @@ _FEW_S = 2.0  # in which an axle is steered, for its usual rate
 def axle_checks(cells: Cells, clear_at: float) -> Iterator[Checked]:
     """Checks of all steering axles; `clear_at` is the loss that counts [1]."""
     angle, second, command, opening = (cells.axles(leaf) for leaf in ("phi", "phi_true", "u", "u_applied"))
-    either, share = Side.SENSOR_OR_ACTUATOR, -np.log1p(-clear_at)
+    either, share = Side.SENSOR_OR_ACTUATOR, -float(np.log1p(-clear_at))
     used = np.where(np.isfinite(opening), opening, command)
     rate = rate_of(angle, cells.dt)
     rates = rates_of(cells, rate, used)
