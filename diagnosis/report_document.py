@@ -79,8 +79,8 @@ class Judged:
     @cached_property
     def checks(self) -> tuple[Checked, ...]:
         """What stands behind an all-clear."""
-        told = {(c.component, c.check): c for c in self.named_by}
-        return tuple(told.get((c.component, c.check), c) for c in checks_of(self.cells, self.found.words))
+        told = {(c.component, c.side, c.check): c for c in self.named_by}
+        return tuple(told.get((c.component, c.side, c.check), c) for c in checks_of(self.cells, self.found.words))
 
     @cached_property
     def hints(self) -> tuple[Hint, ...]:

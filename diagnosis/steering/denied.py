@@ -11,10 +11,10 @@ from collections.abc import Mapping
 import numpy as np
 
 from diagnosis.results.assessment import Finding
+from diagnosis.results.limited import limited
 from diagnosis.steering.blocks import SteeringBlocks
 from diagnosis.steering.findings import SideFindings
 from diagnosis.steering.inputs import AxleInputs
-from diagnosis.steering.reliability import limited
 from replay.faults import FaultMode, Side
 
 _SHAKEN = 2.0  # times the usual power of what changes from reading to reading

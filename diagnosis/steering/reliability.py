@@ -8,18 +8,17 @@ machines of the structures for tuning; ``tests/benchmarks/calibrate_steering.py`
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.results.assessment import Finding
-from diagnosis.results.result import Hypothesis
+from diagnosis.results.limited import limited
 from diagnosis.results.vocabulary import Tier
 from diagnosis.steering.excitation import asked as moving
 from diagnosis.steering.findings import SideFindings
 from diagnosis.steering.path import AxleFilter
-from replay.faults import FaultMode, Side, State
+from replay.faults import FaultMode, Side
 
 _WEIGHTS = (-4.46, 4.72, -2.24, -0.69, -0.99)  # constant, and of `features_of`
 _LONG_S = 6.0  # from here on a finding gains nothing by being longer
@@ -155,18 +154,6 @@ def _shared(own: Stretch, others: Sequence[Stretch]) -> bool:
 def _usually(features: NDArray[np.float64]) -> float:
     """Share of findings of this sort that were right."""
     return float(1.0 / (1.0 + np.exp(-_WEIGHTS[0] - features @ np.array(_WEIGHTS[1:]))))
-
-
-def limited(finding: Finding, most: float, why: str) -> Finding:
-    """A finding that is at most so probable, with a sentence that says why; what is missing goes to no fault."""
-    if finding.probability <= most:
-        return finding
-    share = most / finding.probability
-    named = [replace(h, p=h.p * share) for h in finding.hypotheses]
-    faults = [h for h in named if h.mode != State.HEALTHY.value]
-    none = Hypothesis("none", State.HEALTHY.value, 1.0 - sum(h.p for h in faults))
-    hypotheses = tuple(sorted([*faults, none], key=lambda h: -h.p))
-    return replace(finding, probability=most, hypotheses=hypotheses, evidence=(*finding.evidence, why))
 
 
 def _as_usual(finding: Finding, share: float, words: str) -> Finding:

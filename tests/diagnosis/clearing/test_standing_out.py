@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -75,3 +77,20 @@ def test_states_of_both_sides_say_the_fault_but_where_nothing_was_known() -> Non
         assert a.findings == (fault,)
         assert (a.states[: fault.start + 5] == CODE[State.NO_DATA]).all()
         assert (a.states[fault.start + 5 : fault.stop] == CODE[State.INEFFICIENT]).all()
+
+
+def test_an_angle_that_is_off_its_second_measurement_all_the_time_is_its_sensors_fault() -> None:
+    mission = simulated()
+    angle = mission.columns["steer.rear.phi"] - 0.2
+    cells = in_cells(replace(mission, columns={**mission.columns, "steer.rear.phi": angle}), base=False)
+    found = what_stands_out(checks_of(cells, HYDRAULIC), cells, HYDRAULIC)
+    fault = found["rear"]
+    assert (fault.side, fault.mode) == (Side.SENSOR, FaultMode.OUTSIDE_TABLE)
+    assert "reads 11° less" in fault.evidence[0]
+    states = np.full(round(100 * LENGTH) + 1, CODE[State.HEALTHY])
+    loss = replace(fault, side=Side.ACTUATOR, mode=FaultMode.INEFFICIENT, probability=0.99, hypotheses=(), evidence=())
+    before = {("rear", "sensor"): Assessment(states), ("rear", "actuator"): Assessment(states, findings=(loss,))}
+    after = with_findings(before, found)
+    assert [f.mode for f in after["rear", "sensor"].findings] == [FaultMode.OUTSIDE_TABLE]
+    (valve,) = after["rear", "actuator"].findings
+    assert valve.probability == pytest.approx(0.65)
