@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from diagnosis.response.beside import same_side
 from diagnosis.response.identification import Response, as_another
 from diagnosis.response.inputs import cells
+from diagnosis.response.jumps import falls_dead
 from diagnosis.response.machine import Judged, unlike_others
 from diagnosis.response.models import Beside, Blocks
 from diagnosis.results.assessment import Finding
@@ -40,6 +41,7 @@ _MUCH_S = 0.4, 0.8, 1.6  # of the top speed, missing for as long
 _P = 0.8, 0.9, 0.95  # that the drive is at fault, by how much is missing
 _ALONE_P = 0.6  # that a single drive is at fault, not its commands
 _STANDS, _FULL = 0.1, 0.9  # of what the command makes it do
+_PAIR = 2  # wheels, of which each turns the body alone
 _ANSWER_S = 1.0  # within which a drive answers
 _STEADY = 0.25  # spread of a speed that does not follow its command, by its size
 
@@ -147,7 +149,7 @@ def unanswered(
         much = float(np.sum(off[start:stop][there[start:stop]])) * block_s / top
         long = (stop - start) * block_s >= _LEAST_S and np.mean(there[start:stop]) > 0.5 and much > least
         if long and _proven(one, beside / top, slice(max(0, start - reach // 2), stop + reach // 2)):
-            found.append(_finding(one, blocks, view, (start, stop), much, block_s))
+            found.append(_finding(one, blocks, view, (start, stop), much, block_s, alike=len(judged) > _PAIR))
     return found
 
 
@@ -175,6 +177,12 @@ def _off_asked(one: Judged, block_s: float) -> Array:
     return np.nan_to_num(np.abs(blocks.mean - np.clip(blocks.mean, low, high)), nan=np.inf)
 
 
+_AT_ONCE = (
+    "It fell to 0 from one reading to the next, as a dead sensor's does and that of a drive without power does not, yet the body moves as if the "
+    "reading were right: which of both fails is open."
+)
+
+
 def _spans(there: Flags, gap: int) -> list[tuple[int, int]]:
     edge = np.flatnonzero(np.diff(np.r_[False, there, False].astype(np.int8)))
     out: list[tuple[int, int]] = []
@@ -186,8 +194,10 @@ def _spans(there: Flags, gap: int) -> list[tuple[int, int]]:
     return out
 
 
-def _finding(one: Judged, blocks: Blocks, view: Beside, span: tuple[int, int], much: float, block_s: float) -> Finding:
-    """One finding in blocks `span`; `much`: what is missing over its time, by the top speed [s]."""
+def _finding(
+    one: Judged, blocks: Blocks, view: Beside, span: tuple[int, int], much: float, block_s: float, *, alike: bool
+) -> Finding:
+    """One finding in blocks `span`; `much`: what is missing over its time, by the top speed [s]; `alike`: more than two wheels."""
     start, stop = span
     part = slice(start, stop)
     width = int(blocks.start[1]) if blocks.start.size > 1 else 1
@@ -217,9 +227,16 @@ def _finding(one: Judged, blocks: Blocks, view: Beside, span: tuple[int, int], m
         texts += (
             "With a single drive, one that does not answer and commands that are ignored cannot be distinguished.",
         )
-    rest = Hypothesis(Side.SENSOR.value, mode.value, 0.5 * (1.0 - p))
+    side, other = Side.ACTUATOR, 0.5 * (1.0 - p)
+    if alike and mode is FaultMode.NO_SIGNAL and falls_dead(one.wheel.samples, start * width, one.wheel.dt):
+        side, other, texts = Side.SENSOR_OR_ACTUATOR, 0.0, (texts[0], _AT_ONCE)
+    hypotheses = (
+        Hypothesis(side.value, mode.value, p),
+        Hypothesis(Side.SENSOR.value, mode.value, other),
+        Hypothesis("none", State.HEALTHY.value, 1.0 - p - other),
+    )
     return Finding(
-        start=start * width, stop=min(stop * width, one.data.y.size), side=Side.ACTUATOR, mode=mode, probability=p,
-        hypotheses=(Hypothesis(Side.ACTUATOR.value, mode.value, p), rest, Hypothesis("none", State.HEALTHY.value, 0.5 * (1.0 - p))),
+        start=start * width, stop=min(stop * width, one.data.y.size), side=side, mode=mode, probability=p,
+        hypotheses=tuple(h for h in hypotheses if h.p > 0.0),
         epsilon=epsilon, sat=None, evidence=texts, tier=Tier.RESPONSE,
     )  # fmt: skip

@@ -15,6 +15,7 @@ Array = NDArray[np.float64]
 _SEARCH_S = 2.5
 _CALM = 0.15  # of the top speed: by as much may the expected speed change around a calm moment
 _STRONG, _LEAST = 2.0, 0.08  # times what a calm sample changes by (99 of 100); of the top speed
+_DEAD_S, _DEAD, _SUDDEN = 0.8, 5, 3.0  # around a beginning; readings; times what its readings change by (99 of 100)
 _ALIKE = 1.35  # by which the ratio of a jump may differ from the deviation's
 
 
@@ -69,3 +70,24 @@ def onset_of(jumps: Jumps, samples: Samples, at: int, ratio: float, dt: float) -
         fits = (jumps.ratio > ratio / _ALIKE) & (jumps.ratio < ratio * _ALIKE)
     near = np.flatnonzero(fits & (far <= _SEARCH_S))
     return int(jumps.place[near[np.argmin(far[near])]]) if near.size else None
+
+
+def falls_dead(samples: Samples, at: int, dt: float) -> bool:
+    """Whether readings fall to 0 from one to the next, calm or not, and stay there to the last digit: no drive without power stops a wheel like that.
+
+    Parameters
+    ----------
+    samples : Samples
+        Of the channel.
+    at : int
+        Timeline step at which it begins to stand still, about.
+    dt : float
+        Step [s].
+    """
+    size = np.abs(np.nan_to_num(samples.change))
+    turning = size[np.nan_to_num(samples.value) != 0.0]
+    if not turning.size:
+        return False
+    sudden = size > _SUDDEN * float(np.quantile(turning, 0.99))
+    near = np.flatnonzero(sudden & (samples.value == 0.0) & (np.abs(samples.step - at) * dt <= _DEAD_S))
+    return any(bool((samples.value[k : k + _DEAD] == 0.0).all()) for k in near.tolist())

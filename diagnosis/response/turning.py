@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from diagnosis.response.jumps import falls_dead
 from diagnosis.response.machine import Judged
 from diagnosis.response.spells import Spell
 from replay.faults import FaultMode
@@ -26,6 +27,7 @@ _ALIKE_BLOCKS = 8.0  # of the noise: its blocks are no independent ones
 _MOST_ERROR = 0.15
 _SURE = 2.5  # standard errors
 _MIDDLE = 0.5
+_PAIR = 2  # wheels, of which each turns the body alone
 _LIES = -0.5, 1.6  # what a share may be at all
 _LEAST_SPELL, _BETTER = 6, 0.5  # blocks; of the misfit of any wheel's gain, that a fault of the yaw rate leaves
 
@@ -76,6 +78,11 @@ def turns_with(wheel: str, spell: Spell, judged: Mapping[str, Judged], turning: 
         return None
     one, part = judged[wheel], slice(spell.start, spell.stop)
     b = one.wheel.blocks
+    width = int(b.start[1]) if b.start.size > 1 else 1
+    if len(judged) > _PAIR and falls_dead(one.wheel.samples, spell.start * width, one.wheel.dt):
+        return (
+            None  # a loop that winds up behind a dead sensor turns the body, too, against the other wheels of its side
+        )
     should = 0.5 * (b.low + b.high) if one.speed is None else one.speed
     share = turning.sides[wheel] / sum(s == turning.sides[wheel] for s in turning.sides.values())
     apart = np.zeros(b.mean.size)

@@ -34,7 +34,8 @@ def judged(
     measured, asked, body = speeds(seed, wheels)
     yaw = yaw_of(measured, seed)
     part = slice(round(span[0] / DT), round(span[1] / DT))
-    measured[faulty][part] = np.round(share * measured[faulty][part], 3)
+    slows = np.minimum(np.arange(part.stop - part.start) * DT / 0.3, 1.0) if share == 0.0 and not sensor else 1.0
+    measured[faulty][part] = np.round((1.0 - (1.0 - share) * slows) * measured[faulty][part], 3)
     if not sensor:
         yaw = yaw_of(measured, seed)
     data = followers_of(measured, asked, body)
@@ -92,3 +93,11 @@ def test_a_wheel_of_the_other_side_answers_the_turn_the_other_way() -> None:
     assert left.weights == pytest.approx([right.weights[0], -right.weights[1]])
     assert np.median(np.abs(left.expected - measured["L"])) < 0.03
     assert asked["L"].size == left.expected.size
+
+
+def test_a_reading_that_falls_dead_is_open_though_the_body_of_a_machine_with_more_wheels_turns_so() -> None:
+    measured, asked, body = speeds(3, WHEELS)
+    measured["RL"][round(60.0 / DT) : round(85.0 / DT)] = 0.0
+    data = followers_of(measured, asked, body)
+    found = told(dict(assess_response(data, geometry(WHEELS), yaw_of(measured, 3), LIMITS, DT).parts))
+    assert {(w, f.side) for w, f in found} == {("RL", Side.SENSOR_OR_ACTUATOR)}
