@@ -11,6 +11,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from diagnosis.response.inputs import FollowerData
 from diagnosis.response.machine import Judged
 from diagnosis.results.assessment import Finding
 from diagnosis.results.result import Epsilon, Hypothesis
@@ -23,6 +24,7 @@ _LEAST_BLOCKS = 80
 _USUAL = 0.75  # quantile that is the usual size: a drive may pull nothing for half of the mission
 _PULLS = 0.4  # of the usual effort of the others: from there on something is to be pulled
 _NOTHING, _OWN = 0.06, 0.9  # of that quantile of its own effort: next to nothing
+_NOISE, _MOST = 3.0, 0.12  # standard errors of the mean of a block; of its usual effort, however noisy it is
 _NO_DRIVE = 1e-3  # of the largest usual effort on the machine: never more is no drive at all
 _OWN_RUNS, _OTHER_RUNS = 4, 2  # runs of next to nothing that may be faults: of the drive in question, and of each other
 _LONGER = 3  # times as long as what is left of such runs
@@ -126,8 +128,8 @@ def idle_spans(
     runs, silent = {}, {}
     for w, e in efforts.items():
         pulls = _any_pulls([efforts[o] for o in sides.get(w, ()) if o in efforts], found[w].driving)
-        usual = float(np.nanquantile(np.abs(e), _OWN))
-        silent[w] = np.abs(np.nan_to_num(_smooth(np.where(found[w].driving, e, np.nan)), nan=np.inf)) < _NOTHING * usual
+        least = _next_to_nothing(e, found[w].data)
+        silent[w] = np.abs(np.nan_to_num(_smooth(np.where(found[w].driving, e, np.nan)), nan=np.inf)) < least
         known = pulls & np.isfinite(e)
         runs[w] = _runs(known, known & silent[w])
     lengths = {w: sorted((n for _, _, n in r), reverse=True) for w, r in runs.items()}
@@ -142,6 +144,15 @@ def idle_spans(
         w: [s for s in spans if not any(_most_of(s, x) for o, others in out.items() if o != w for x in others)]
         for w, spans in out.items()
     }
+
+
+def _next_to_nothing(effort: Array, data: FollowerData) -> float:
+    """Mean effort of a block below which a drive pulls nothing: a small share of its usual effort, or what noise makes of nothing."""
+    usual = float(np.nanquantile(np.abs(effort), _OWN))
+    read = np.diff(np.nan_to_num(np.zeros(0) if data.effort is None else data.effort[data.fresh]))
+    noise = 1.05 * float(np.median(np.abs(read))) if read.size else 0.0
+    each = noise / np.sqrt(max(1.0, read.size / effort.size))
+    return float(np.clip(_NOISE * each, _NOTHING * usual, _MOST * usual))
 
 
 def _any_pulls(others: list[Array], driving: NDArray[np.bool_]) -> NDArray[np.bool_]:
