@@ -22,6 +22,7 @@ from diagnosis.response.common_cause import (
 from diagnosis.response.drive import as_a_peer, by_peers, unanswered
 from diagnosis.response.effort import idle_drives, idle_spans, own_pull, powered, shares_of
 from diagnosis.response.findings import Wheel
+from diagnosis.response.gyro import wrong_gyro
 from diagnosis.response.identification import Response, identify_response, without_command
 from diagnosis.response.inputs import FollowerData, cell_of, cells
 from diagnosis.response.joint import cut, joint_of
@@ -62,10 +63,11 @@ _BODY_COMMANDS = 2  # speed and yaw rate
 
 @dataclass(frozen=True)
 class Judgement:
-    """Both sides of each wheel that could be judged, and what happened to the machine as a whole, a sentence each."""
+    """Both sides of each wheel that could be judged, and what happened to the machine as a whole, and to its gyro, a sentence each."""
 
     parts: Mapping[str, tuple[Assessment, Assessment]]
     events: tuple[str, ...]
+    gyro: tuple[str, ...] = ()
 
 
 def assess_response(
@@ -164,7 +166,8 @@ def assess_response(
         delay, told = smallest_delay(j, width * dt)
         powers = powers._replace(rows=(*powers.rows, delay))
         parts[w] = replace(sensor, powers=powers, notes=(*sensor.notes, told, *remarks)), drive
-    return Judgement(parts, (*standstills(idle, dt), *(astray if lasts else ())))
+    gyro = wrong_gyro(judged, kept, turning, width * dt)
+    return Judgement(parts, (*standstills(idle, dt), *(astray if lasts else ())), gyro)
 
 
 def _turned_by(wheel: str, found: Mapping[str, Judged]) -> bool:
