@@ -24,7 +24,7 @@ _OFF, _SHARE, _LEAST = 5.0, 0.25, 0.06  # usual misfits; of the yaw rate that th
 _TURNS = 0.35  # of the usual yaw rate: from there on a gyro that gives nothing, or a share, shows
 _AROUND, _GAP = 4, 3  # blocks around a wheel's fault; sound blocks that a deviation may be interrupted by
 _LEAST_S, _MOST_OF, _TURNING_S = 3.0, 0.8, 2.0  # of a deviation; of its blocks that deviate; of turning in it
-_FITS = 0.3  # of a deviation: what gain and constant may leave of it
+_FITS = 0.3  # of a deviation: what a gain, or a constant, may leave of it
 _STILL = 0.05  # of the usual yaw rate: a spread below that is one value
 _SAME, _ASIDE = 0.2, 0.15  # of one: a gain that is as before; of the usual yaw rate: a constant that matters
 _SOUND = 0.55  # of the mission, in which the gyro is sound
@@ -109,15 +109,16 @@ def _kind(about: _Spread, part: slice, sound: Flags, block_s: float) -> str:
         value = float(np.mean(measured))
         said = "gives next to nothing" if abs(value) < _ASIDE * about.usual else f"stays at {value:.2g} rad/s"
         return f"{said} while the {{wheels}} turn the machine at up to {np.max(np.abs(made)):.2g} rad/s"
-    columns = np.column_stack([made, np.ones(made.size)])
-    gain, constant = np.linalg.lstsq(columns, measured, rcond=None)[0].tolist()
-    rest = measured - columns @ np.array([gain, constant])
-    if np.sqrt(np.mean(rest**2)) > _FITS * np.sqrt(np.mean((measured - made) ** 2)):
+    size = float(np.sqrt(np.mean((measured - made) ** 2)))
+    constant = float(np.mean(measured - made))
+    gain = float(made @ measured) / max(float(made @ made), 1e-12)
+    by_constant, by_gain = float(np.std(measured - made)), float(np.sqrt(np.mean((measured - gain * made) ** 2)))
+    if min(by_constant, by_gain) > _FITS * size:
         return ""
-    aside = abs(constant) > _ASIDE * about.usual
-    if abs(gain - 1.0) < _SAME and aside:
-        return f"reads {constant:+.2g} rad/s more than the {{wheels}} make"
-    if not turns or aside or abs(gain - 1.0) < _SAME:
+    if by_constant < by_gain:
+        aside = abs(constant) > _ASIDE * about.usual
+        return f"reads {constant:+.2g} rad/s more than the {{wheels}} make" if aside else ""
+    if not turns or abs(gain - 1.0) < _SAME:
         return ""
     ground = ", unless the ground let them slip" if 0.0 < gain < 1.0 else ""
     return f"reads {gain:.2f} × what the {{wheels}} make{ground}"
