@@ -25,6 +25,7 @@ _USUAL = 0.75  # quantile that is the usual size: a drive may pull nothing for h
 _PULLS = 0.4  # of the usual effort of the others: from there on something is to be pulled
 _NOTHING, _OWN = 0.06, 0.9  # of that quantile of its own effort: next to nothing
 _NOISE, _MOST = 3.0, 0.12  # standard errors of the mean of a block; of its usual effort, however noisy it is
+_BRIEFLY, _BRIEF_BLOCKS = 2.0, 3  # times that much, in so many blocks, ends no run of nothing
 _NO_DRIVE = 1e-3  # of the largest usual effort on the machine: never more is no drive at all
 _OWN_RUNS, _OTHER_RUNS = 4, 2  # runs of next to nothing that may be faults: of the drive in question, and of each other
 _LONGER = 3  # times as long as what is left of such runs
@@ -129,9 +130,10 @@ def idle_spans(
     for w, e in efforts.items():
         pulls = _any_pulls([efforts[o] for o in sides.get(w, ()) if o in efforts], found[w].driving)
         least = _next_to_nothing(e, found[w].data)
-        silent[w] = np.abs(np.nan_to_num(_smooth(np.where(found[w].driving, e, np.nan)), nan=np.inf)) < least
+        size = np.abs(np.nan_to_num(_smooth(np.where(found[w].driving, e, np.nan)), nan=np.inf))
+        silent[w] = size < least
         known = pulls & np.isfinite(e)
-        runs[w] = _runs(known, known & silent[w])
+        runs[w] = _runs(known, silent[w], size < _BRIEFLY * least)
     lengths = {w: sorted((n for _, _, n in r), reverse=True) for w, r in runs.items()}
     out = {}
     for w, r in runs.items():
@@ -166,11 +168,23 @@ def _any_pulls(others: list[Array], driving: NDArray[np.bool_]) -> NDArray[np.bo
     return pulls & driving
 
 
-def _runs(known: NDArray[np.bool_], nothing: NDArray[np.bool_]) -> list[tuple[int, int, int]]:
-    """Runs of `nothing` among what is known: first block, block behind the last, and how many of it are known."""
+def _runs(
+    known: NDArray[np.bool_], nothing: NDArray[np.bool_], little: NDArray[np.bool_]
+) -> list[tuple[int, int, int]]:
+    """Runs of `nothing` among what is known: first block, block behind the last, and how many of it are known.
+
+    They go on over few blocks of `little`, as noise makes them.
+    """
     places = np.flatnonzero(known)
-    edge = np.flatnonzero(np.diff(np.r_[False, nothing[places], False].astype(np.int8)))
-    return [(int(places[a]), int(places[b - 1]) + 1, b - a) for a, b in zip(edge[::2], edge[1::2], strict=True)]
+    flags, near = nothing[places], little[places]
+    edge = np.flatnonzero(np.diff(np.r_[False, flags, False].astype(np.int8)))
+    out: list[list[int]] = []
+    for a, b in zip(edge[::2].tolist(), edge[1::2].tolist(), strict=True):
+        if out and a - out[-1][1] <= _BRIEF_BLOCKS and near[out[-1][1] : a].all():
+            out[-1][1] = b
+        else:
+            out.append([a, b])
+    return [(int(places[a]), int(places[b - 1]) + 1, b - a) for a, b in out]
 
 
 def _grown(start: int, stop: int, silent: NDArray[np.bool_]) -> tuple[int, int]:
