@@ -26,6 +26,7 @@ _AROUND, _GAP = 4, 3  # blocks around a wheel's fault; sound blocks that a devia
 _LEAST_S, _MOST_OF, _TURNING_S = 3.0, 0.8, 2.0  # of a deviation; of its blocks that deviate; of turning in it
 _FITS = 0.3  # of a deviation: what a gain, or a constant, may leave of it
 _STILL = 0.05  # of the usual yaw rate: a spread below that is one value
+_NOTHING = 0.1  # of what the wheels make
 _SAME, _ASIDE = 0.2, 0.15  # of one: a gain that is as before; of the usual yaw rate: a constant that matters
 _SOUND = 0.55  # of the mission, in which the gyro is sound
 _NEVER, _TURNED_S = 0.2, 20.0  # of the wheels' yaw rate, over a mission that turns for so long
@@ -120,6 +121,8 @@ def _kind(about: _Spread, part: slice, sound: Flags, block_s: float) -> str:
         return f"reads {constant:+.2g} rad/s more than the {{wheels}} make" if aside else ""
     if not turns or abs(gain - 1.0) < _SAME:
         return ""
+    if abs(gain) < _NOTHING:
+        return f"gives next to nothing while the {{wheels}} turn the machine at up to {np.max(np.abs(made)):.2g} rad/s"
     ground = ", unless the ground let them slip" if 0.0 < gain < 1.0 else ""
     return f"reads {gain:.2f} × what the {{wheels}} make{ground}"
 
