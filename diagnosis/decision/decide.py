@@ -308,7 +308,7 @@ def _sensors_alone(
     least = min(decided_s.get(p, 0.0) for p in assessments if p[0] not in axles and p[1] == Side.SENSOR)
     drives = [c for c, _ in against.short]
     who = f"the drive of {drives[0]} was" if len(drives) == 1 else f"the drives of {join_words(drives)} were"
-    why = assessments[against.short[0]].reasons.get(State.NOT_ASSESSED, "")
+    why = join_words(list(dict.fromkeys(assessments[p].reasons.get(State.NOT_ASSESSED, "") for p in against.short)))
     return (
         against.words.fill(f"No fault was seen in the {{wheel.sensor}}s over at least {least:.0f} s of {{moving}}; ")
         + f"{who} not judged, for {why}."

@@ -128,11 +128,20 @@ def _continues(a: Finding, b: Finding, states: Mapping[str, NDArray[np.int8]], d
     """Whether b goes on with the fault that a is."""
     if (a.side, a.mode, a.tier) != (b.side, b.mode, b.tier) or b.start < a.stop:
         return False
-    sides = [states[s.value][a.stop : b.start] for s in a.side.sides if s.value in states]
-    healthy = np.logical_and.reduce([np.isin(s, (CODE[State.HEALTHY], CODE[State.NO_DATA])) for s in sides])
-    seen = np.count_nonzero(healthy) * dt >= _SEEN_HEALTHY_S.get(a.tier, _SEEN_BY_MODELS_S)
+    seen = _healthy_steps(a, b, states) * dt >= _SEEN_HEALTHY_S.get(a.tier, _SEEN_BY_MODELS_S)
     changes = a.mode is FaultMode.INEFFICIENT and (b.start - a.stop) * dt <= _TOUCHES_S  # a loss that grows or fades
     return not seen and (changes or _alike(a.epsilon, b.epsilon)) and _same_value(a, b)
+
+
+def _healthy_steps(a: Finding, b: Finding, states: Mapping[str, NDArray[np.int8]]) -> int:
+    """Steps between two findings in which what they may be of is seen to be healthy, or gives no data.
+
+    A side of which nothing healthy is ever said, as of a drive without effort, does not speak against a sensor that reads right.
+    """
+    known = [states[s.value] for s in a.side.sides if s.value in states]
+    sides = [s for s in known if np.any(s == CODE[State.HEALTHY])] or known
+    healthy = [np.isin(s[a.stop : b.start], (CODE[State.HEALTHY], CODE[State.NO_DATA])) for s in sides]
+    return int(np.count_nonzero(np.logical_and.reduce(healthy)))
 
 
 def _alike(a: Epsilon | None, b: Epsilon | None) -> bool:

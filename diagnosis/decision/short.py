@@ -20,6 +20,7 @@ Part = tuple[str, str]
 
 _SAID_S = 0.05  # of judged driving: less is nothing
 _NOT_SAID = "no {valve} command"  # begins the reason of a model without it
+_NO_DRIVE = "no {valve} is seen there"  # ends the reason of a wheel whose effort is nothing from end to end
 
 
 @dataclass(frozen=True)
@@ -165,6 +166,10 @@ def _act(
         ),
         Tier.TRACKING: words.fill("log wheel.{c}.u (the {valve} command) or ") + second,
     }
+    if tier is Tier.RESPONSE and reason.endswith(words.fill(_NO_DRIVE)):
+        return words.fill(
+            "look whether the {wheel} has a {valve} at all: one that has is without power, or its effort is not logged"
+        )
     if tier in by_tier and "wrong unit" not in reason:
         return by_tier[tier]
     if tier in by_tier:

@@ -20,8 +20,9 @@ from diagnosis.response.common_cause import (
     without_consequences,
 )
 from diagnosis.response.drive import as_a_peer, by_peers, unanswered
-from diagnosis.response.effort import idle_drives, own_pull, shares_of
+from diagnosis.response.effort import idle_drives, idle_spans, own_pull, powered, shares_of
 from diagnosis.response.findings import Wheel
+from diagnosis.response.gyro import wrong_gyro
 from diagnosis.response.identification import Response, identify_response, without_command
 from diagnosis.response.inputs import FollowerData, cell_of, cells
 from diagnosis.response.joint import cut, joint_of
@@ -62,10 +63,11 @@ _BODY_COMMANDS = 2  # speed and yaw rate
 
 @dataclass(frozen=True)
 class Judgement:
-    """Both sides of each wheel that could be judged, and what happened to the machine as a whole, a sentence each."""
+    """Both sides of each wheel that could be judged, and what happened to the machine as a whole, and to its gyro, a sentence each."""
 
     parts: Mapping[str, tuple[Assessment, Assessment]]
     events: tuple[str, ...]
+    gyro: tuple[str, ...] = ()
 
 
 def assess_response(
@@ -110,9 +112,12 @@ def assess_response(
     bodies = Bodies(speeds, None if yaw is None else cells(yaw, width), width * dt, sideways)
     efforts = {w: cells(j.data.effort, width) for w, j in found.items() if j.data.effort is not None and not sideways}
     mates = {w: tuple(o for o in found if o != w and same_side(w, o, geometry)) for w in found}
-    pulls = shares_of(found, efforts, {w: mates[w] or tuple(o for o in found if o != w) for w in found})
+    efforts, none = powered(efforts)
+    beside_it = {w: tuple(o for o in mates[w] if o in efforts) or tuple(o for o in found if o != w) for w in found}
+    pulls, spans = shares_of(found, efforts, beside_it), idle_spans(efforts, found, beside_it, width * dt)
     found = {
-        w: j._replace(wheel=j.wheel._replace(pull=own_pull(j, efforts.get(w), pulls.get(w)))) for w, j in found.items()
+        w: j._replace(rolls=w in none, wheel=j.wheel._replace(pull=own_pull(j, efforts.get(w), pulls.get(w))))
+        for w, j in found.items()
     }
     names = {w: j.data.name for w, j in found.items()}
     beside, by_motion, left_notes = views(names, {w: j.wheel.blocks for w, j in found.items()}, geometry, bodies)
@@ -138,7 +143,7 @@ def assess_response(
             w,
             judged,
             (like[w], by_motion.get(w)),
-            (pulls.get(w), bool(mates[w]) or not _turned_by(w, found)),
+            (spans.get(w, []), bool(mates[w]) or not _turned_by(w, found)),
             width * dt,
         )
         for w in judged
@@ -161,7 +166,8 @@ def assess_response(
         delay, told = smallest_delay(j, width * dt)
         powers = powers._replace(rows=(*powers.rows, delay))
         parts[w] = replace(sensor, powers=powers, notes=(*sensor.notes, told, *remarks)), drive
-    return Judgement(parts, (*standstills(idle, dt), *(astray if lasts else ())))
+    gyro = wrong_gyro(judged, kept, turning, width * dt)
+    return Judgement(parts, (*standstills(idle, dt), *(astray if lasts else ())), gyro)
 
 
 def _turned_by(wheel: str, found: Mapping[str, Judged]) -> bool:
@@ -250,12 +256,12 @@ def _drives(
     wheel: str,
     judged: Mapping[str, Judged],
     known: tuple[Blocks | None, Beside | None],
-    pull: tuple[Array | None, bool],
+    pull: tuple[list[tuple[int, int]], bool],
     block_s: float,
 ) -> list[Finding]:
     """What is known to be a drive's fault, each time once.
 
-    `known`: its blocks with what is expected of it, and how the ground moves; `pull`: its share of the load, and whether it is dragged along.
+    `known`: its blocks with what is expected of it, and how the ground moves; `pull`: blocks in which it pulls nothing, and whether it is dragged along then.
     """
     idle = idle_drives(judged[wheel], *pull, block_s)  # it says why: without power
     more = unanswered(wheel, judged, known, block_s)

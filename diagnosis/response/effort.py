@@ -11,6 +11,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from diagnosis.response.inputs import FollowerData
 from diagnosis.response.machine import Judged
 from diagnosis.results.assessment import Finding
 from diagnosis.results.result import Epsilon, Hypothesis
@@ -22,13 +23,14 @@ Array = NDArray[np.float64]
 _LEAST_BLOCKS = 80
 _USUAL = 0.75  # quantile that is the usual size: a drive may pull nothing for half of the mission
 _PULLS = 0.4  # of the usual effort of the others: from there on something is to be pulled
-_NOTHING, _USUALLY, _SELDOM = (
-    0.15,
-    0.25,
-    0.05,
-)  # of its share of the load: nothing; and what it has but for a small share of the rest
-_AROUND = 4  # blocks to each side of one, of which the median counts
-_GAP_BLOCKS = 3
+_NOTHING, _OWN = 0.06, 0.9  # of that quantile of its own effort: next to nothing
+_NOISE, _MOST = 3.0, 0.12  # standard errors of the mean of a block; of its usual effort, however noisy it is
+_LEAST_PAIRS = 5  # blocks and the next, whose changes are compared
+_BRIEFLY, _BRIEF_BLOCKS = 2.0, 3  # times that much, in so many blocks, ends no run of nothing
+_NO_DRIVE = 1e-3  # of the largest usual effort on the machine: never more is no drive at all
+_OWN_RUNS, _OTHER_RUNS = 4, 2  # runs of next to nothing that may be faults: of the drive in question, and of each other
+_LONGER = 3  # times as long as what is left of such runs
+_AROUND = 1  # block to each side of one, of which the median counts: a drive that is needed for a moment answers
 _LEAST_S, _P = 3.0, 0.94
 _CHANGES = 0.25  # of the top speed
 _OFF, _PART = 2.0, 0.3  # usual misfits beside the command, and part of the time, of a wheel that leaves it
@@ -92,8 +94,138 @@ def _beside(e: Array, other: Array, driving: NDArray[np.bool_]) -> Array | None:
     return np.where(pulled, np.abs(e) / (ratio * np.maximum(load, 1e-12)), np.nan) if ratio > 0.0 else None
 
 
-def idle_drives(one: Judged, share: Array | None, dragged: bool, block_s: float) -> list[Finding]:
-    """Times in which a drive pulls nothing while those of its side do, and the speed was to change.
+def powered(efforts: Mapping[str, Array]) -> tuple[dict[str, Array], tuple[str, ...]]:
+    """Efforts of the wheels that have a drive, and the wheels that have none: their effort is nothing from end to end.
+
+    Parameters
+    ----------
+    efforts : Mapping[str, Array], each of shape (b,)
+        Mean effort of each block, in any unit.
+    """
+    usual = {w: float(np.nanquantile(np.abs(e), _USUAL)) if np.isfinite(e).any() else 0.0 for w, e in efforts.items()}
+    least = _NO_DRIVE * max(usual.values(), default=0.0)
+    none = tuple(w for w, e in efforts.items() if not np.nanmax(np.abs(e), initial=0.0) > least)
+    return {w: e for w, e in efforts.items() if w not in none}, none
+
+
+def idle_spans(
+    efforts: Mapping[str, Array], found: Mapping[str, Judged], sides: Mapping[str, tuple[str, ...]], block_s: float
+) -> dict[str, list[tuple[int, int]]]:
+    """Blocks [start, stop) in which the effort of a drive stays next to nothing while another one pulls, by wheel.
+
+    The effort of a healthy drive passes through nothing, and may stay there for a while: a span counts that lasts several times as long
+    as such times otherwise last on this machine. Drives that go to nothing together are switched off, by whatever switches them.
+
+    Parameters
+    ----------
+    efforts : Mapping[str, Array], each of shape (b,)
+        Of the wheels that have a drive.
+    found : Mapping[str, Judged]
+        All wheels.
+    sides : Mapping[str, tuple[str, ...]]
+        Wheels that share the load of each wheel.
+    block_s : float
+        Length of a block [s].
+    """
+    runs, silent = {}, {}
+    for w, e in efforts.items():
+        pulls = _any_pulls([efforts[o] for o in sides.get(w, ()) if o in efforts], found[w].driving)
+        least = _next_to_nothing(e, found[w].data)
+        size = np.abs(np.nan_to_num(_smooth(np.where(found[w].driving, e, np.nan)), nan=np.inf))
+        silent[w] = size < least
+        known = pulls & np.isfinite(e)
+        runs[w] = _runs(known, silent[w], size < _BRIEFLY * least)
+    lengths = {w: sorted((n for _, _, n in r), reverse=True) for w, r in runs.items()}
+    out = {}
+    for w, r in runs.items():
+        habit = max(
+            (x[k] for o, x in lengths.items() if len(x) > (k := _OWN_RUNS if o == w else _OTHER_RUNS)), default=0
+        )
+        long = [(a, b) for a, b, n in r if n * block_s >= _LEAST_S and n >= _LONGER * habit]
+        load = np.sum([np.nan_to_num(efforts[o]) for o in sides.get(w, ()) if o in efforts], axis=0)
+        grown = [_grown(a, b, silent[w]) for a, b in long]
+        out[w] = [s for s in grown if _unanswered(efforts[w], load, found[w].driving, s)]
+    return {
+        w: [s for s in spans if not any(_most_of(s, x) for o, others in out.items() if o != w for x in others)]
+        for w, spans in out.items()
+    }
+
+
+def _next_to_nothing(effort: Array, data: FollowerData) -> float:
+    """Mean effort of a block below which a drive pulls nothing: a small share of its usual effort, or what noise makes of nothing."""
+    usual = float(np.nanquantile(np.abs(effort), _OWN))
+    read = np.diff(np.nan_to_num(np.zeros(0) if data.effort is None else data.effort[data.fresh]))
+    noise = 1.05 * float(np.median(np.abs(read))) if read.size else 0.0
+    each = noise / np.sqrt(max(1.0, read.size / effort.size))
+    return float(np.clip(_NOISE * each, _NOTHING * usual, _MOST * usual))
+
+
+def _any_pulls(others: list[Array], driving: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Blocks in which any of some drives pulls a good part of what it usually does, shape (b,)."""
+    pulls = np.zeros(driving.size, bool)
+    for e in others:
+        load = np.abs(np.nan_to_num(e))
+        moving = load[driving & np.isfinite(e)]
+        if moving.size >= _LEAST_BLOCKS:
+            pulls |= load > _PULLS * float(np.quantile(moving, _USUAL))
+    return pulls & driving
+
+
+def _runs(
+    known: NDArray[np.bool_], nothing: NDArray[np.bool_], little: NDArray[np.bool_]
+) -> list[tuple[int, int, int]]:
+    """Runs of `nothing` among what is known: first block, block behind the last, and how many of it are known.
+
+    They go on over few blocks of `little`, as noise makes them.
+    """
+    places = np.flatnonzero(known)
+    flags, near = nothing[places], little[places]
+    edge = np.flatnonzero(np.diff(np.r_[False, flags, False].astype(np.int8)))
+    out: list[list[int]] = []
+    for a, b in zip(edge[::2].tolist(), edge[1::2].tolist(), strict=True):
+        if out and a - out[-1][1] <= _BRIEF_BLOCKS and near[out[-1][1] : a].all():
+            out[-1][1] = b
+        else:
+            out.append([a, b])
+    return [(int(places[a]), int(places[b - 1]) + 1, b - a) for a, b in out]
+
+
+def _grown(start: int, stop: int, silent: NDArray[np.bool_]) -> tuple[int, int]:
+    """A span with the silent blocks that it touches, whether anybody pulls in them or not."""
+    before, behind = np.flatnonzero(~silent[:start]), np.flatnonzero(~silent[stop:])
+    return int(before[-1]) + 1 if before.size else 0, stop + int(behind[0]) if behind.size else silent.size
+
+
+def _unanswered(effort: Array, load: Array, driving: NDArray[np.bool_], span: tuple[int, int]) -> bool:
+    """Whether an effort does not follow changes of the load in a span as it does elsewhere.
+
+    At one speed two loops may share the load in any way, and one of them have none of it; a change takes effort from each.
+    """
+    inside = np.zeros(effort.size, bool)
+    inside[span[0] : span[1]] = True
+    here, error = _followed(effort, load, driving & inside)
+    elsewhere, _ = _followed(effort, load, driving & ~inside)
+    return abs(here) + 2.0 * error < abs(elsewhere)
+
+
+def _followed(effort: Array, load: Array, use: NDArray[np.bool_]) -> tuple[float, float]:
+    """Change of an effort by that of the load from block to block, and its standard error [1]; infinite where nothing changes."""
+    pairs = use[1:] & use[:-1] & np.isfinite(np.diff(effort))
+    own, other = np.diff(effort)[pairs], np.diff(load)[pairs]
+    power = float(other @ other)
+    if own.size < _LEAST_PAIRS or power == 0.0:
+        return 0.0, np.inf
+    share = float(own @ other) / power
+    return share, float(np.sqrt(np.sum((own - share * other) ** 2) / (own.size - 1) / power))
+
+
+def _most_of(span: tuple[int, int], other: tuple[int, int]) -> bool:
+    """Whether a span is for half of its time together with another one."""
+    return min(span[1], other[1]) - max(span[0], other[0]) > 0.5 * (span[1] - span[0])
+
+
+def idle_drives(one: Judged, spans: list[tuple[int, int]], dragged: bool, block_s: float) -> list[Finding]:
+    """Times in which a drive pulls nothing while another one does, and the speed was to change.
 
     Where two wheels turn the machine by what they differ, nothing but its own drive holds the speed of each: without power it leaves its
     command, and one that pulls nothing and follows it is the inner wheel of a curve, or rolls downhill.
@@ -102,33 +234,16 @@ def idle_drives(one: Judged, share: Array | None, dragged: bool, block_s: float)
     ----------
     one : Judged
         The wheel.
-    share : Array or None, shape (b,)
-        From `shares_of`.
+    spans : list[tuple[int, int]]
+        From `idle_spans`.
     dragged : bool
         Whether others, or the steering, hold its wheel at nearly its speed while it has no power.
     block_s : float
         Length of a block [s].
     """
-    if share is None or not np.isfinite(share).any():
-        return []
-    share = _smooth(share)
-    nothing = np.nan_to_num(share, nan=1.0) < _NOTHING
-    spans: list[tuple[int, int]] = []
-    for k in np.flatnonzero(nothing).tolist():
-        if spans and not np.any(share[spans[-1][1] : k] >= _NOTHING) and k - spans[-1][1] <= _GAP_BLOCKS / block_s:
-            spans[-1] = spans[-1][0], k + 1
-        else:
-            spans.append((k, k + 1))
-    long = [(a, b) for a, b in spans if np.count_nonzero(nothing[a:b]) * block_s >= _LEAST_S]
-    outside = np.isfinite(share)
-    for a, b in long:
-        outside[a:b] = False
-    # a wheel whose effort often comes near nothing tells nothing by it
-    if not long or not outside.any() or np.quantile(share[outside], _SELDOM) < _USUALLY:
-        return []
     return [
         _finding(one, a, b, dragged, block_s)
-        for a, b in long
+        for a, b in spans
         if _sped_up(one, a, b) and (dragged or _astray(one, a, b))
     ]
 

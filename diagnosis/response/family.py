@@ -8,7 +8,7 @@ from diagnosis.response.body import body_speeds
 from diagnosis.response.inputs import followers
 from diagnosis.response.models import BLOCK_S
 from diagnosis.results.assessment import Assessment
-from diagnosis.results.machine_event import not_following
+from diagnosis.results.machine_event import not_following, other_yaw_rate
 from diagnosis.results.vocabulary import Tier
 
 
@@ -29,4 +29,5 @@ class ResponseEvidence:
         for wheel in mission.wheels:
             if wheel in judged.parts:
                 parts[wheel, SENSOR], parts[wheel, ACTUATOR] = judged.parts[wheel]
-        return Contribution(parts, events=tuple(not_following(e) for e in judged.events))
+        events = (*map(not_following, judged.events), *map(other_yaw_rate, judged.gyro))
+        return Contribution(parts, events=events)

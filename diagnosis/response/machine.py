@@ -48,6 +48,8 @@ class Judged(NamedTuple):
         Whether it is the only drive.
     across : Array or None, shape (b,)
         As in `models.Beside`.
+    rolls : bool
+        Whether its effort is nothing from end to end while others pull, as that of a wheel without a drive.
     """
 
     data: FollowerData
@@ -61,6 +63,7 @@ class Judged(NamedTuple):
     joint: Joint | None = None
     alone: bool = False
     across: Array | None = None
+    rolls: bool = False
 
 
 def standstills(idle: Sequence[tuple[int, int]], dt: float) -> tuple[str, ...]:

@@ -28,9 +28,11 @@ _LEAST_S = 1.0
 _STANDS_P = (
     0.7  # that an only drive, or its sensor, is at fault rather than the machine stopped, or its commands ignored
 )
+_ROLLS_P = 0.92  # that a wheel without a drive which reads nothing is read wrong, rather than held by a brake
 _DOUBT_S = 0.5  # around a spell that is judged no fault
 _AT_ONCE_S = 5e-3
 _HIDDEN = "a controller that holds the speed hides a weak drive, and their healthy effort is not known"
+_ROLLS = "its effort is nothing from end to end while others pull: no {valve} is seen there"
 _ALONE = "a controller that holds the speed hides a weak drive; name its current, duty or torque as its command (`wheel.{name}.u`) to have it judged"
 _UNSEEN = "without its command or another {wheel} of its side only a speed that is frozen, wild or noisy shows"
 
@@ -79,7 +81,7 @@ def sides_of(
         long = (spell.stop - spell.start) * width * dt >= _LEAST_S
         found = finding_of(spell, *_shown_by(one, spell)) if long and spell.p >= LEAST_P else None
         if found is not None:
-            findings.append(_by_itself(found) if one.alone else found)
+            findings.append(_by_itself(found) if one.alone else _undriven(found) if one.rolls else found)
         elif one.posterior[spell.start : spell.stop].argmax(axis=1).min() > NOISY and _entered_calmly(
             one, spell, width, dt
         ):
@@ -114,6 +116,17 @@ def _by_itself(found: Finding) -> Finding:
     rest = Hypothesis("none", State.HEALTHY.value, 1.0 - p)
     text = "With a single drive, an emergency stop, a machine that is disabled, or commands that are ignored look the same."
     return replace(found, probability=p, hypotheses=(replace(first, p=p), rest), evidence=(*found.evidence, text))
+
+
+def _undriven(found: Finding) -> Finding:
+    """A finding on a wheel of which no drive is seen: its sensor, unless the wheel itself is held."""
+    if found.side is not Side.SENSOR_OR_ACTUATOR:
+        return found
+    p = _ROLLS_P * found.probability
+    rest = Hypothesis(Side.ACTUATOR.value, FaultMode.STUCK.value, 1.0 - p)
+    text = "The effort of this {wheel} is nothing from end to end, so that it only rolls: a brake or a bearing that holds it looks the same."
+    hypotheses = (Hypothesis(Side.SENSOR.value, found.mode.value, p), rest)
+    return replace(found, side=Side.SENSOR, probability=p, hypotheses=hypotheses, evidence=(*found.evidence, text))
 
 
 def _met(spell: Spell, findings: Sequence[Finding], width: int) -> bool:
@@ -178,8 +191,9 @@ def _assessment(
 
 
 def _drive(one: Judged, states: NDArray[np.int8], findings: tuple[Finding, ...]) -> Assessment:
+    hidden = _ALONE.replace("{name}", one.data.name.split(".")[1]) if one.alone else _HIDDEN
     reasons = {
-        State.NOT_ASSESSED: _ALONE.replace("{name}", one.data.name.split(".")[1]) if one.alone else _HIDDEN,
+        State.NOT_ASSESSED: _ROLLS if one.rolls else hidden,
         State.NOT_EXCITED: "nothing is commanded",
         State.NO_DATA: "no samples",
         State.MASKED: "its {wheel.sensor} is faulty",

@@ -85,15 +85,13 @@ def turns_with(wheel: str, spell: Spell, judged: Mapping[str, Judged], turning: 
         )
     should = 0.5 * (b.low + b.high) if one.speed is None else one.speed
     share = turning.sides[wheel] / sum(s == turning.sides[wheel] for s in turning.sides.values())
-    apart = np.zeros(b.mean.size)
-    for w, side in turning.sides.items():
-        apart += side / sum(s == side for s in turning.sides.values()) * judged[w].wheel.blocks.mean
+    apart = difference(judged, turning)
     sound = np.isfinite(apart) & np.isfinite(turning.yaw) & one.driving
     for j in judged.values():
         for s in j.spells:
             sound[max(0, s.start - _AROUND) : s.stop + _AROUND] = False
     sound[max(0, spell.start - _AROUND) : spell.stop + _AROUND] = False
-    found = _fitted(apart, turning.yaw, sound)
+    found = fitted(apart, turning.yaw, sound)
     if found is None:
         return None
     gain, offset, noise = found
@@ -111,8 +109,18 @@ def turns_with(wheel: str, spell: Spell, judged: Mapping[str, Judged], turning: 
     return told > _MIDDLE
 
 
-def _fitted(apart: Array, yaw: Array, sound: NDArray[np.bool_]) -> tuple[float, float, float] | None:
-    """Yaw rate by the difference of the sides: gain, offset and usual misfit [rad/s]; None where the one does not make the other."""
+def difference(judged: Mapping[str, Judged], turning: Turning) -> Array:
+    """Mean speed of the wheels of the right less that of the left [m/s], shape (b,)."""
+    return np.asarray(
+        sum(
+            side / sum(s == side for s in turning.sides.values()) * judged[w].wheel.blocks.mean
+            for w, side in turning.sides.items()
+        )
+    )
+
+
+def fitted(apart: Array, yaw: Array, sound: NDArray[np.bool_], part: float = 0.8) -> tuple[float, float, float] | None:
+    """Yaw rate by the difference of the sides: gain, offset and usual misfit [rad/s], as they are in a part of what is sound; None where the one does not make the other."""
     if np.count_nonzero(sound) < _LEAST_BLOCKS:
         return None
     columns, kept = np.column_stack([apart, np.ones(apart.size)]), sound.copy()
@@ -120,8 +128,8 @@ def _fitted(apart: Array, yaw: Array, sound: NDArray[np.bool_]) -> tuple[float, 
     for _ in range(5):
         weights = np.asarray(np.linalg.lstsq(columns[kept], yaw[kept], rcond=None)[0], dtype=np.float64)
         off = np.abs(yaw - columns @ weights)
-        kept = sound & (off <= np.quantile(off[sound], 0.8))
-    noise = 1.48 * float(np.median(off[sound]))
+        kept = sound & (off <= np.quantile(off[sound], part))
+    noise = 1.48 * float(np.quantile(off[sound], min(0.5, 0.625 * part)))
     if noise > _FITS * float(np.std(weights[0] * apart[sound])):
         return None
     return float(weights[0]), float(weights[1]), noise

@@ -53,6 +53,13 @@ def swinging(text: str) -> MachineEvent:
     return MachineEvent("The {wheels} swing together", text, doubt, act)
 
 
+def other_yaw_rate(text: str) -> MachineEvent:
+    """The measured yaw rate alone contradicts the wheels, which follow their commands and each other."""
+    doubt = "the gyro contradicts the {wheels}"
+    act = "compare the gyro with turns of the machine that you count: its axis, its unit (rad/s or degrees), its plug"
+    return MachineEvent("The gyro contradicts the {wheels}", text, doubt, act)
+
+
 def foreign(text: str) -> MachineEvent:
     """Most wheels deviate now and then from a wheel model that does not fit the machine."""
     doubt = "most {wheels} deviate now and then from what the {wheel} model expects"

@@ -53,6 +53,16 @@ def test_healthy_time_between_makes_two_faults() -> None:
     assert len(joined(loss(1000, 1500), loss(3000, 3500), between=State.HEALTHY)) == 2
 
 
+def test_a_drive_of_which_nothing_healthy_is_said_joins_no_dropouts() -> None:
+    out = (Side.SENSOR_OR_ACTUATOR, FaultMode.NO_SIGNAL)
+    found = parts(finding(*out, 1000, 1500), finding(*out, 3000, 3500), between=State.HEALTHY)
+    drive = found["FR", "actuator"]
+    unknown = np.where(drive.states == CODE[State.HEALTHY], CODE[State.NOT_ASSESSED], drive.states)
+    found["FR", "actuator"] = replace(drive, states=unknown)
+    spans = [(f.start, f.stop) for f in with_episodes(found, DT)["FR", "sensor"].findings]
+    assert spans == [(1000, 1500), (3000, 3500)]
+
+
 def test_losses_of_another_size_are_another_fault() -> None:
     assert len(joined(loss(1000, 1500, 0.2), loss(3000, 3500, 0.6))) == 2
 

@@ -16,7 +16,7 @@ from diagnosis.response.common_cause import less_sure
 from diagnosis.response.inputs import FollowerData
 from diagnosis.response.spells import Spell
 from diagnosis.results.assessment import Finding
-from replay.faults import FaultMode, Side
+from replay.faults import FaultMode, Side, State
 from replay.machine.config import Limits
 from tests.diagnosis.response.robot import DT, WHEELS, followers_of, geometry, speeds
 
@@ -51,6 +51,17 @@ def spans(asked: Array) -> tuple[slice, slice]:
     return slice(int(same) - steps, int(same) + 2 * steps), slice(
         int(same) + steps // 2, int(same) + steps // 2 + steps
     )
+
+
+def test_wheels_without_a_drive_hide_no_idle_one_and_are_not_accused() -> None:
+    moved, _ = spans(speeds(6)[1]["RL"])
+    data = with_efforts(6, moved)
+    data |= {w: replace(data[w], effort=np.zeros(data[w].y.size)) for w in ("FL", "FR")}
+    parts = assess_response(data, geometry(), None, LIMITS, DT).parts
+    told = {w: [f for side in sides for f in side.findings] for w, sides in parts.items()}
+    assert [(f.side, f.mode) for f in told["RL"]] == [(Side.ACTUATOR, FaultMode.NO_SIGNAL)]
+    assert [w for w in WHEELS if told[w]] == ["RL"]
+    assert "nothing from end to end" in parts["FL"][1].reasons[State.NOT_ASSESSED]
 
 
 def test_a_drive_without_effort_is_told_where_its_speed_was_to_change() -> None:

@@ -1,0 +1,145 @@
+"""Whether the measured yaw rate is what fails: the wheels do what they are told and agree with each other, and it alone contradicts them.
+
+The difference of the sides makes the yaw rate but for a gain and a constant, which most of the mission shows. Where a yaw rate that
+deviates gives one value only, is another one by a constant, or a share, the gyro says something else than the wheels. A share may
+also be ground that lets the wheels slip, and the sentence says so. No wheel is named for it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from diagnosis.response.machine import Judged
+from diagnosis.response.spells import Spell
+from diagnosis.response.turning import Turning, difference, fitted
+
+Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+_OFF, _SHARE, _LEAST = 5.0, 0.25, 0.06  # usual misfits; of the yaw rate that the wheels make, and of the usual one
+_TURNS = 0.35  # of the usual yaw rate: from there on a gyro that gives nothing, or a share, shows
+_AROUND, _GAP = 4, 3  # blocks around a wheel's fault; sound blocks that a deviation may be interrupted by
+_LEAST_S, _MOST_OF, _TURNING_S = 3.0, 0.8, 2.0  # of a deviation; of its blocks that deviate; of turning in it
+_FITS = 0.3  # of a deviation: what a gain, or a constant, may leave of it
+_STILL = 0.05  # of the usual yaw rate: a spread below that is one value
+_NOTHING = 0.1  # of what the wheels make
+_SAME, _ASIDE = 0.2, 0.15  # of one: a gain that is as before; of the usual yaw rate: a constant that matters
+_SOUND = 0.55  # of the mission, in which the gyro is sound
+_NEVER, _TURNED_S = 0.2, 20.0  # of the wheels' yaw rate, over a mission that turns for so long
+
+
+class _Spread(NamedTuple):
+    """Yaw rate by the wheels, by the gyro, and what is usual [rad/s]."""
+
+    made: Array
+    measured: Array
+    usual: float
+    noise: float
+
+
+def wrong_gyro(
+    judged: Mapping[str, Judged],
+    faults: Mapping[str, Sequence[Spell]],
+    turning: Turning | None,
+    block_s: float,
+) -> tuple[str, ...]:
+    """A sentence for each time in which the gyro alone contradicts the wheels.
+
+    Parameters
+    ----------
+    judged : Mapping[str, Judged]
+        All wheels.
+    faults : Mapping[str, Sequence[Spell]]
+        What is known of the wheels: these times are left out.
+    turning : Turning or None
+        How the body is turned.
+    block_s : float
+        Length of a block [s].
+    """
+    if turning is None or not all(j.response.answered for j in judged.values()):
+        return ()
+    apart = difference(judged, turning)
+    sound = np.isfinite(apart) & np.isfinite(turning.yaw)
+    for w, j in judged.items():
+        b = j.wheel.blocks
+        far = np.abs(b.mean - np.clip(b.mean, b.low, b.high)) > _OFF * b.noise
+        sound &= ~far
+        for s in faults[w]:
+            sound[max(0, s.start - _AROUND) : s.stop + _AROUND] = False
+    found = fitted(apart, turning.yaw, sound, _SOUND)
+    if found is None:
+        return _never(apart, turning.yaw, sound, block_s)
+    gain, offset, noise = found
+    usual = float(np.quantile(np.abs(gain * apart[sound]), 0.9))
+    about = _Spread(gain * apart, turning.yaw - offset, usual, noise)
+    off = sound & (np.abs(about.measured - about.made) > np.maximum(_OFF * noise, _SHARE * np.abs(about.made)))
+    off &= np.abs(about.measured - about.made) > _LEAST * usual
+    shows = sound & (off | (np.abs(about.made) > _TURNS * usual))
+    out = []
+    for start, stop in _spans(off, shows):
+        long = (stop - start) * block_s >= _LEAST_S
+        if long and np.mean(off[start:stop][shows[start:stop]]) >= _MOST_OF:
+            what = _kind(about, slice(start, stop), sound[start:stop], block_s)
+            if what:
+                out.append(
+                    f"From {start * block_s:.1f} to {stop * block_s:.1f} s the gyro (imu.yaw_rate) {what}, by what the rest of the mission shows of the two."
+                )
+    return tuple(out)
+
+
+def _spans(off: Flags, shows: Flags) -> list[tuple[int, int]]:
+    """Blocks [start, stop) of deviations, interrupted by few blocks that would show one and do not."""
+    out: list[tuple[int, int]] = []
+    for k in np.flatnonzero(off).tolist():
+        if out and np.count_nonzero(shows[out[-1][1] : k]) <= _GAP:
+            out[-1] = out[-1][0], k + 1
+        else:
+            out.append((k, k + 1))
+    return out
+
+
+def _kind(about: _Spread, part: slice, sound: Flags, block_s: float) -> str:
+    """What the yaw rate does in a deviation; empty where no fault of a gyro does that."""
+    made, measured = about.made[part][sound], about.measured[part][sound]
+    turns = np.count_nonzero(np.abs(made) > _TURNS * about.usual) * block_s >= _TURNING_S
+    if np.std(measured) < max(2.0 * about.noise, _STILL * about.usual) and turns and np.ptp(made) > about.usual:
+        value = float(np.mean(measured))
+        said = "gives next to nothing" if abs(value) < _ASIDE * about.usual else f"stays at {value:.2g} rad/s"
+        return f"{said} while the {{wheels}} turn the machine at up to {np.max(np.abs(made)):.2g} rad/s"
+    size = float(np.sqrt(np.mean((measured - made) ** 2)))
+    constant = float(np.mean(measured - made))
+    gain = float(made @ measured) / max(float(made @ made), 1e-12)
+    by_constant, by_gain = float(np.std(measured - made)), float(np.sqrt(np.mean((measured - gain * made) ** 2)))
+    if min(by_constant, by_gain) > _FITS * size:
+        return ""
+    if by_constant < by_gain:
+        aside = abs(constant) > _ASIDE * about.usual
+        return f"reads {constant:+.2g} rad/s more than the {{wheels}} make" if aside else ""
+    if not turns or abs(gain - 1.0) < _SAME:
+        return ""
+    if abs(gain) < _NOTHING:
+        return f"gives next to nothing while the {{wheels}} turn the machine at up to {np.max(np.abs(made)):.2g} rad/s"
+    ground = ", unless the ground let them slip" if 0.0 < gain < 1.0 else ""
+    return f"reads {gain:.2f} × what the {{wheels}} make{ground}"
+
+
+def _never(apart: Array, yaw: Array, sound: Flags, block_s: float) -> tuple[str, ...]:
+    """A sentence where the yaw rate has hardly anything of what the wheels make, all through a mission that turns."""
+    made, measured = apart[sound], yaw[sound]
+    if not made.size:
+        return ()
+    usual = float(np.quantile(np.abs(made), 0.9))
+    turned = np.abs(made) > _TURNS * usual
+    if np.count_nonzero(turned) * block_s < _TURNED_S or not usual > 0.0:
+        return ()
+    alike = 0.0 if np.std(measured) == 0.0 else abs(float(np.corrcoef(made, measured)[0, 1]))
+    if alike > _NEVER:
+        return ()
+    return (
+        "All through the mission the gyro (imu.yaw_rate) has nothing of what the {wheels} make while they follow their commands: a dead "
+        "gyro, or another axis of it.",
+    )

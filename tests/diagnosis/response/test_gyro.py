@@ -1,0 +1,58 @@
+"""The gyro that alone contradicts the wheels is told; one that agrees, and a wheel that is wrong, are not its fault."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from diagnosis.response.assess import Judgement, assess_response
+from replay.machine.config import Limits
+from tests.diagnosis.response.robot import DT, TRACK, Array, followers_of, geometry, speeds
+
+FAULTY = slice(1000, 1600)
+
+
+def yaw_of(measured: dict[str, Array], seed: int) -> Array:
+    right, left = (np.mean([y for w, y in measured.items() if w.endswith(s)], axis=0) for s in "RL")
+    return np.asarray((right - left) / (1.4 * TRACK) + np.random.default_rng(seed).normal(0.0, 0.01, right.size))
+
+
+def judged(yaw: Array | None, seed: int = 3, wheel: str = "") -> Judgement:
+    measured, asked, body = speeds(seed)
+    if wheel:
+        measured[wheel][FAULTY] *= 0.5
+    return assess_response(followers_of(measured, asked, body), geometry(), yaw, Limits(), DT)
+
+
+@pytest.mark.parametrize(
+    ("gain", "constant", "said"),
+    [
+        (0.0, 0.0, "gives next to nothing"),
+        (2.0, 0.0, "× what the"),
+        (1.0, 0.5, "rad/s more than"),
+        (0.0, 0.9, "stays at 0.9"),
+    ],
+)
+def test_a_wrong_gyro_is_told_with_its_time_and_no_wheel_is_named(gain: float, constant: float, said: str) -> None:
+    measured, _, _ = speeds(3)
+    yaw = yaw_of(measured, 1)
+    yaw[FAULTY] = gain * yaw[FAULTY] + constant
+    found = judged(yaw)
+    assert any(said in text for text in found.gyro), found.gyro
+    (start, stop) = (float(found.gyro[0].split()[k]) for k in (1, 3))
+    assert start == pytest.approx(FAULTY.start * DT, abs=6.0)
+    assert stop == pytest.approx(FAULTY.stop * DT, abs=6.0)
+    assert not any(a.findings for sides in found.parts.values() for a in sides)
+
+
+def test_a_gyro_that_has_nothing_of_the_turns_is_told() -> None:
+    n = speeds(3)[0]["FR"].size
+    found = judged(np.random.default_rng(2).normal(0.0, 0.01, n))
+    assert "another axis" in found.gyro[0]
+
+
+def test_a_sound_gyro_is_not_told_whatever_a_wheel_does() -> None:
+    measured, _, _ = speeds(3)
+    assert judged(yaw_of(measured, 1)).gyro == ()
+    assert judged(yaw_of(measured, 1), wheel="FL").gyro == ()
+    assert judged(None).gyro == ()
