@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from replay.arrays.blocks import blocks
+from replay.arrays.sliding import mean_within
 from replay.signals.resolution import rounding_step as rounding_step
 from replay.signals.resolution import white_noise as white_noise
 from replay.signals.resolution import windows as _windows
@@ -231,16 +232,14 @@ def unresolved(
     share : float
         Share of the power of the white part that shows up; 0 where all is resolved.
     """
-    from scipy.ndimage import uniform_filter1d
-
     kept = use & np.isfinite(residual) & np.isfinite(x)
     white = np.where(kept, white_part(x), 0.0)
     width = max(3, round(0.3 / dt))
-    power = uniform_filter1d(white**2, width, mode="constant")
+    power = mean_within(white**2, width)
     lively = power > (3 * noise) ** 2
     share = _COARSE_SHARE if dt >= COARSE_STEP_S else 0.0
     if np.count_nonzero(lively) >= 10 * width:
-        seen = uniform_filter1d(np.where(kept, residual, 0.0) ** 2, width, mode="constant")
+        seen = mean_within(np.where(kept, residual, 0.0) ** 2, width)
         found = float(np.quantile(seen[lively] / power[lively], _SOUND_SHARE))
         share = max(share, found if found < _MOST_SHARE else 0.0)
     share = share if known is None else known

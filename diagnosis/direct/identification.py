@@ -25,6 +25,7 @@ from diagnosis.direct.inputs import Pair
 from diagnosis.direct.uncertainty import HealthyNoise, uncertainty_of
 from diagnosis.estimation.fault_models import ModeModel
 from diagnosis.estimation.samples import Samples
+from replay.arrays.sliding import largest_within
 from replay.faults import Side
 from replay.machine.config import Limits
 
@@ -41,7 +42,7 @@ _COARSE, _COARSE_COST = (
     0.2,
 )  # where a log is too slow for its commands, what is left of them looks like a fault's drift
 _AROUND = 11
-_SETTLED = 7
+_SETTLED = 3
 _SPARSE = 1.5  # steps between news, from which on a channel is slower than the timeline
 
 
@@ -265,9 +266,7 @@ def _relation(pair: Pair, x: Array, hold: Array, sensor: bool) -> Relation:
 
 def _unsettled(x: Array, noise: Array) -> NDArray[np.bool_]:
     """Within three samples of a jump of the reference that noise does not explain, shape (n,)."""
-    from scipy.ndimage import maximum_filter1d
-
-    return np.asarray(maximum_filter1d(np.abs(white_part(np.nan_to_num(x))), _SETTLED) > _JUMP * noise)
+    return largest_within(np.abs(white_part(np.nan_to_num(x))), _SETTLED, _SETTLED) > _JUMP * noise
 
 
 def _neighbours(x: Array) -> Array:

@@ -11,6 +11,7 @@ from diagnosis.channels.noise import white_part
 from diagnosis.direct.identification import IdentifiedPair
 from diagnosis.direct.isolation import run_samples
 from diagnosis.estimation.segments import Run
+from replay.arrays.sliding import largest_within, smallest_within
 from replay.faults import FaultMode, Side
 
 Array = NDArray[np.float64]
@@ -82,15 +83,11 @@ def _settles(found: IdentifiedPair, run: Run) -> bool:
     The relation is of first order. A healthy spool of second order overshoots by at most `_OVERSHOOT` of what its command
     moved within the last few lags, and rests when the command has rested for as long.
     """
-    from scipy.ndimage import maximum_filter1d, minimum_filter1d
-
     pair = found.pair
     reach = max(3, round(_SETTLING_LAGS * (found.relation.lag / pair.dt + max(0.0, found.relation.delay) + 1.0)))
     first = max(0, run.start - reach)
     x = np.nan_to_num(pair.x[first : run.stop])
-    moved = (maximum_filter1d(x, reach, origin=(reach - 1) // 2) - minimum_filter1d(x, reach, origin=(reach - 1) // 2))[
-        run.start - first :
-    ]
+    moved = (largest_within(x, reach - 1, 0) - smallest_within(x, reach - 1, 0))[run.start - first :]
     part = slice(run.start, run.stop)
     size = np.abs(pair.y[part] - found.samples.x[part])
     known = np.isfinite(size)

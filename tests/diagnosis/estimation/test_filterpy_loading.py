@@ -1,4 +1,4 @@
-"""filterpy's filter, loaded without `scipy.stats`."""
+"""filterpy's filter, loaded without what it does not need of SciPy."""
 
 from __future__ import annotations
 
@@ -33,3 +33,23 @@ def test_where_scipy_stats_is_there_already_it_stays() -> None:
     asked = f"{words}; print(sys.modules['scipy.stats'] is scipy.stats, hasattr(scipy.stats, 'norm'))"
     done = subprocess.run([sys.executable, "-c", asked], capture_output=True, text=True, check=True)
     assert done.stdout == "True True\n"
+
+
+_OTHERS = """
+import sys
+import numpy as np
+from diagnosis.estimation.filterpy_loading import kalman_filter
+
+kalman_filter()
+print([name for name in ("scipy.stats", "scipy.ndimage", "scipy.sparse", "scipy.sparse.linalg") if name in sys.modules])
+from filterpy.discrete_bayes import predict
+print(np.round(predict(np.array([0.0, 1.0, 0.0]), 1, np.array([0.1, 0.8, 0.1])), 6).tolist())
+import scipy.ndimage, scipy.sparse.linalg
+from scipy.ndimage import maximum_filter1d
+print(maximum_filter1d(np.array([0.0, 1.0, 0.0]), 3).tolist(), scipy.sparse.linalg.norm(scipy.sparse.eye(4)))
+"""
+
+
+def test_images_and_sparse_matrices_are_loaded_when_asked_for() -> None:
+    done = subprocess.run([sys.executable, "-c", _OTHERS], capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines() == ["[]", "[0.1, 0.1, 0.8]", "[1.0, 1.0, 1.0] 2.0"]

@@ -1,0 +1,35 @@
+"""Sliding windows against those of `scipy.ndimage`, to the last digit."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.testing import assert_array_equal
+from scipy.ndimage import maximum_filter1d, minimum_filter1d, uniform_filter1d
+
+from replay.arrays.sliding import largest_within, mean_within, smallest_within
+
+_SIZES = (1, 2, 7, 100, 5003)
+
+
+@pytest.mark.parametrize("size", _SIZES)
+@pytest.mark.parametrize("reach", [0, 1, 3, 8, 40])
+def test_centred_extremes(size: int, reach: int) -> None:
+    x = np.random.default_rng(size + reach).normal(size=size)
+    assert_array_equal(largest_within(x, reach, reach), maximum_filter1d(x, 2 * reach + 1))
+    assert_array_equal(smallest_within(x, reach, reach), minimum_filter1d(x, 2 * reach + 1))
+
+
+@pytest.mark.parametrize("size", _SIZES)
+@pytest.mark.parametrize("width", [1, 3, 4, 16, 61])
+def test_extremes_of_what_came_before(size: int, width: int) -> None:
+    x, origin = np.random.default_rng(size + width).normal(size=size), (width - 1) // 2
+    assert_array_equal(largest_within(x, width - 1, 0), maximum_filter1d(x, width, origin=origin))
+    assert_array_equal(smallest_within(x, width - 1, 0), minimum_filter1d(x, width, origin=origin))
+
+
+@pytest.mark.parametrize("size", _SIZES)
+@pytest.mark.parametrize("width", [1, 3, 4, 300])
+def test_means(size: int, width: int) -> None:
+    x = np.random.default_rng(size + width).normal(size=size) ** 2
+    assert_array_equal(mean_within(x, width), uniform_filter1d(x, width, mode="constant"))
