@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from diagnosis.channels.sample_status import PAIR
 from diagnosis.direct.fault_runs import fault_runs
 from diagnosis.direct.identification import IdentifiedPair
 from diagnosis.direct.isolation import Isolated, estimate_run, isolate
@@ -37,6 +38,7 @@ _LOST = 0.03  # of the span: as far from its command a healthy valve rests withi
 _ZERO = 0.01  # of the span: as far apart may two healthy instruments have their zero
 _ALIKE_P = 0.3  # probability of each of two rows that a constant cannot tell
 _ONE_GAIN, _SAME_P = 0.05, 0.95  # of a gain; that a share which is lost elsewhere too is one
+_SLOW = 0.1  # of its mean, by which a reference changes that hardly moves
 _GROWTH_S = 0.1  # a shorter time of growth is not worth a sentence
 
 
@@ -98,7 +100,7 @@ def find_faults(path: ModePath, found: IdentifiedPair, limits: Limits) -> Faults
                 run.row,
             )
             findings.append(_widened(finding, run, whole, dt, _detected(path, whole, dt, shortest, found.lag)))
-    return FaultsFound([_as_beside(f, findings, found.pair.span) for f in findings], timing, below)
+    return FaultsFound([_as_beside(f, findings, found) for f in findings], timing, below)
 
 
 def finding_of(run: Run, found: IdentifiedPair, limits: Limits) -> Finding | None:
@@ -143,10 +145,10 @@ def finding_of(run: Run, found: IdentifiedPair, limits: Limits) -> Finding | Non
     )
 
 
-def _as_beside(finding: Finding, all_of_them: Sequence[Finding], span: float) -> Finding:
+def _as_beside(finding: Finding, all_of_them: Sequence[Finding], found: IdentifiedPair) -> Finding:
     """A share of a constant, or one of which little else is left, as what it is where the channel moved: the same loss of gain.
 
-    A part that sticks does not stick at just that share of its command, and noise does not leave it. `span` in the channel's unit.
+    A part that sticks does not stick at just that share of its command, and noise does not leave it.
     """
     p = {h.mode: h.p for h in finding.hypotheses}
     size, likely = finding.epsilon, p.get(FaultMode.INEFFICIENT, 0.0)
@@ -158,12 +160,16 @@ def _as_beside(finding: Finding, all_of_them: Sequence[Finding], span: float) ->
         and likely == p.get(FaultMode.STUCK, 0.0)
         and likely >= _ALIKE_P
     )
-    calm = finding.mode.varying and finding.sat is not None and finding.sat.rms * lost <= _LOST * span
+    calm = finding.mode.varying and finding.sat is not None and finding.sat.rms * lost <= _LOST * found.pair.span
+    share = _share_of_slow(finding, found) if finding.mode is FaultMode.STUCK and not still else None
+    lost = lost if share is None else 1.0 - share
     beside = (f.epsilon for f in all_of_them if f.mode is FaultMode.INEFFICIENT and f.probability > 2 * _ALIKE_P)
-    if not (still or calm) or not any(e is not None and abs(e.value - lost) <= _ONE_GAIN for e in beside):
+    if not (still or calm or share is not None) or not any(
+        e is not None and abs(e.value - lost) <= _ONE_GAIN for e in beside
+    ):
         return finding
-    both = likely + p[finding.mode] if calm else 2 * likely
-    p |= {finding.mode if calm else FaultMode.STUCK: (1.0 - _SAME_P) * both, FaultMode.INEFFICIENT: _SAME_P * both}
+    both = 2 * likely if still else likely + p[finding.mode]
+    p |= {finding.mode: (1.0 - _SAME_P) * both, FaultMode.INEFFICIENT: _SAME_P * both}
     return replace(
         finding,
         mode=FaultMode.INEFFICIENT,
@@ -173,6 +179,17 @@ def _as_beside(finding: Finding, all_of_them: Sequence[Finding], span: float) ->
         sat=None,
         evidence=(*finding.evidence, "The same share is lost where it says more."),
     )
+
+
+def _share_of_slow(finding: Finding, found: IdentifiedPair) -> float | None:
+    """What a value is of a reference that moves by little meanwhile [1]; None where it is no share of it."""
+    y, x, status, *_ = found.samples.part(finding.start, finding.stop)
+    y, x = y[status == PAIR], x[status == PAIR]
+    middle = float(np.mean(x)) if x.size else 0.0
+    if middle == 0.0 or float(np.std(x)) > _SLOW * abs(middle):
+        return None
+    share = float(np.mean(y)) / middle
+    return share if 0.0 < share < 1.0 else None
 
 
 def _left_share(isolated: Isolated) -> float | None:

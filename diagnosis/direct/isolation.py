@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from diagnosis.channels.sample_status import BLIND, PAIR
 from diagnosis.direct.behind_play import gain_behind_play
+from diagnosis.direct.calm import calm_row
 from diagnosis.direct.fault_runs import inner
 from diagnosis.direct.identification import IdentifiedPair
 from diagnosis.estimation.fault_models import (
@@ -40,6 +41,7 @@ _BURST_S = 0.6  # at which half of the bursts of noise are what a motion leaves 
 _WILD, _WILD_S, _WILD_SAMPLES = 10.0, 0.04, 4.0  # times the noise; motion that a wrong time may be off by
 _RESTLESS, _RESTLESS_P = 0.1, 0.8  # share of changing news from which a channel is not stuck, and how probably so
 _OF_PLAY = 0.2  # of its width per rms opening: standard deviation of the gain that a play leaves in simulated valves
+_CALM_P = 0.95  # that a steady row which leaves hardly anything is the fault's
 _CLEARLY = 2.0  # times as probable as the path's row, from which on another one is stated
 _MAJORITY = 0.5  # of the probability: a fault is called by it
 
@@ -164,6 +166,12 @@ def isolate(run: Run, found: IdentifiedPair) -> Isolated | None:
         p[INEFFICIENT], p[run.row] = p[run.row], p[INEFFICIENT]
         run = replace(run, row=INEFFICIENT)
         estimate = _of_gain(delta, estimate_run(run, found)) or estimate
+    if run.row in VARYING_ROWS and (calm := _calm_row_of(seen, found.pair.span)) is not None:
+        other = estimate_run(replace(run, row=calm), found)
+        if other is not None:
+            both = p[run.row] + p[calm]
+            p[calm], p[run.row] = _CALM_P * both, (1.0 - _CALM_P) * both
+            run, estimate = replace(run, row=calm), other
     gain = float(evidence[run.row] - evidence[HEALTHY])
     seconds = run.size * found.pair.dt
     p = _with_lapses(p, run.row, model.side, seconds if found.coarse else None)
@@ -202,6 +210,10 @@ def _wild(seen: RunSamples, dt: float) -> bool:
     x = seen.x[seen.use]
     slope = float(np.sqrt(np.mean(np.gradient(x) ** 2))) / dt if x.size > 1 else 0.0
     return seen.deviation > max(_WILD * seen.noise, slope * max(_WILD_S, _WILD_SAMPLES * dt))
+
+
+def _calm_row_of(seen: RunSamples, span: float) -> int | None:
+    return None if seen.still else calm_row(seen.y[seen.use], seen.x[seen.use], span)
 
 
 def _changes(seen: RunSamples) -> float:
