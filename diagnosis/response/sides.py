@@ -30,7 +30,7 @@ _STANDS_P = (
 )
 _DOUBT_S = 0.5  # around a spell that is judged no fault
 _AT_ONCE_S = 5e-3
-_HIDDEN = "a controller that holds the speed hides a weak drive, and their healthy effort is not known"
+_HIDDEN = "a controller that holds the speed hides a weak drive, and the effort of a healthy one is not known"
 _ALONE = "a controller that holds the speed hides a weak drive; name its current, duty or torque as its command (`wheel.{name}.u`) to have it judged"
 _UNSEEN = "without its command or another {wheel} of its side only a speed that is frozen, wild or noisy shows"
 
