@@ -11,8 +11,8 @@ import numpy as np
 import orjson
 
 from diagnosis.pages import labels
-from diagnosis.report.compared_channels import by_effort
 from diagnosis.report.budget import Encodable, encode
+from diagnosis.report.compared_channels import by_effort
 from diagnosis.report.encode import Channel, Segment
 from diagnosis.report.plot_rows import fault_rows
 from diagnosis.report.rows import Columns, Group, Row, row_json

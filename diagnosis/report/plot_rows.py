@@ -191,7 +191,7 @@ def _side_rows(
             "1",
             (Trace(base + "epsilon", "of the fault as stated, 95 % band; 0 where healthy", "measured"),),
             band=(base + "epsilon_low", base + "epsilon_high"),
-            clip=(-1.0, 2.0),
+            clip=(_lowest(columns.get(base + "epsilon")), 2.0),
             unknown=unknown_stretches(base + "epsilon", columns),
         ),
         Row(
@@ -204,6 +204,12 @@ def _side_rows(
         ),
         *_mode_row(fault, side, base, of, columns),
     ]
+
+
+def _lowest(epsilon: NDArray[np.floating] | None) -> float:
+    """Where the axis of ε̂ ends: low enough for every loss that is stated; a part that gives more than it should has a negative one [1]."""
+    known = np.empty(0) if epsilon is None else epsilon[np.isfinite(epsilon)]
+    return min(-1.0, 1.1 * float(known.min(initial=0.0)))
 
 
 def _mode_row(fault: IntervalRow, side: Side, base: str, of: str, columns: Columns) -> list[Row]:
