@@ -101,9 +101,9 @@ def by_model(assessments: Mapping[Part, Assessment], shown: Sequence[Detectable]
             if (r.component, r.side.value) in judged and (r.kind, r.side, r.deviation, r.for_s) == about
         ]
         said += [f"of a {name} {_from_size([r.size for r in rows])}"] if rows else []
-    sizes = f"A loss of ten seconds shows in 95 of 100 places, {join_words(said)}. " if said else ""
+    sizes = f"A loss that lasts ten seconds shows in 95 of 100 places: {join_words(said)}. " if said else ""
     if said and all(x.endswith(_NEVER) for x in said):
-        sizes = "No loss of ten seconds, whatever its size, shows in 95 of 100 places. "
+        sizes = "No loss that lasts ten seconds, whatever its size, shows in 95 of 100 places. "
     return (
         words.fill(
             "Sensors and {valve}s without a second measurement were judged by a {wheel} model identified from this mission. "

@@ -233,13 +233,13 @@ def _with_faults(intervals: Sequence[FaultInterval], against: Reservations) -> D
     stop = [f for f in intervals if f.severity is Severity.HIGH]
     watch = [f for f in intervals if f.severity in (Severity.MEDIUM, Severity.LOW)]
     if stop:
-        return Decision(Verdict.STOP, count_faults(stop, watch), sentence_of(stop, against.words))
+        return Decision(Verdict.STOP, count_faults(stop, watch), sentence_of(intervals, against.words))
     if watch:
         doubt = doubt_of(watch, against)
         return Decision(
             Verdict.WATCH,
             count_faults((), watch),
-            sentence_of(watch, against.words),
+            sentence_of(intervals, against.words),
             cleared=not doubt,
             not_cleared=doubt,
         )

@@ -83,9 +83,9 @@ class Scale(NamedTuple):
             what = f"the wheel diameter ({self.diameter:g} m; {self.diameter * one.factor:.3g} m would fit)"
         others = f", or {one.lengths}" if one.lengths else ""
         return (
-            f"By {one.by} the machine is {one.factor:.2f} times as fast as by its wheels throughout: check {what}{others} in the "
-            "machine file; if that is right, the wheels slip, or that sensor's scale is wrong. All wheels share the factor: "
-            "it is no part's fault."
+            f"By {one.by} the machine is {one.factor:.2f} times as fast as by its wheels throughout, which is no part's fault, for all "
+            f"wheels share the factor: check {what}{others} in the machine file; if that is right, the wheels slip, or that sensor's "
+            "scale is wrong."
         )
 
     @property

@@ -93,9 +93,13 @@ def _said(asked: _Around, found: Second | None, dt: float) -> str:
     """The sentence."""
     start, first, stride, _ = asked
     if found is None:
-        return "filterpy, stepped over the readings around the onset, sees no onset there that stands out."
+        return (
+            "A second filter (filterpy), stepped over the readings around the onset, sees none there that stands out."
+        )
     off = (first + found.place * stride - start) * dt
-    when = f"filterpy, stepped over the readings around it, sees the onset at {start * dt + off:.3f} s"
+    when = (
+        f"A second filter (filterpy), stepped over the readings around it, sees the onset at {start * dt + off:.3f} s"
+    )
     if abs(off) < 0.5 * dt * stride:
         return f"{when}: the same {'sample' if stride == 1 else 'moment'}."
     size = f"{1e3 * abs(off):.0f} ms" if abs(off) < 1.0 else f"{abs(off):.1f} s"

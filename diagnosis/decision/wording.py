@@ -14,6 +14,7 @@ from diagnosis.results.vocabulary import Severity
 from replay.faults import FaultMode, Side
 
 _NAMED = 3  # parts in the verdict's sentence
+_KINDS = 2  # of faults of one part in it: more stand in the part's action
 
 
 def actions_of(intervals: Sequence[FaultInterval], words: MachineWords) -> tuple[ActionRow, ...]:
@@ -83,13 +84,26 @@ def fault_words(f: FaultInterval) -> str:
 
 def _course(faults: Sequence[FaultInterval]) -> str:
     """What one part was, kind by kind, and for how long; what is unclear with its candidates where they are the same ones."""
+    return join_words([_how_long(kind, same) for kind, same in _kinds(faults).items()])
+
+
+def _summary(faults: Sequence[FaultInterval]) -> str:
+    """The same for the verdict's sentence: for how long it was faulty at all, where that was in many ways."""
+    if len(_kinds(faults)) <= _KINDS:
+        return _course(faults)
+    total = seconds_words(sum(f.stop_s - f.start_s for f in faults))
+    return f"faulty for {total} in {len(faults)} faults"
+
+
+def _kinds(faults: Sequence[FaultInterval]) -> dict[str, list[FaultInterval]]:
+    """Faults of one part by what they are, in words."""
     said = [fault_words(f) for f in faults]
     if len({kind for kind in said if kind.startswith(UNCLEAR)}) > 1:
         said = [UNCLEAR if kind.startswith(UNCLEAR) else kind for kind in said]
     kinds: dict[str, list[FaultInterval]] = {}
     for kind, f in zip(said, faults, strict=True):
         kinds.setdefault(kind, []).append(f)
-    return join_words([_how_long(kind, same) for kind, same in kinds.items()])
+    return kinds
 
 
 def _how_long(words: str, faults: Sequence[FaultInterval]) -> str:
@@ -117,9 +131,11 @@ def _lost(faults: Sequence[FaultInterval]) -> str:
 
 
 def sentence_of(faults: Sequence[FaultInterval], words: MachineWords) -> str:
-    """The most urgent three parts in one sentence, in the order of the actions."""
+    """The most urgent three parts in one sentence, in the order of the actions; of a machine to stop those that it is stopped for."""
     parts = _by_part(faults)
-    said = [f"the {words.part_words(f[0].kind, f[0].component, f[0].side)} was {_course(f)}" for f in parts[:_NAMED]]
+    high = [f for f in parts if f[0].severity is Severity.HIGH]
+    parts = high or parts
+    said = [f"the {words.part_words(f[0].kind, f[0].component, f[0].side)} was {_summary(f)}" for f in parts[:_NAMED]]
     text = "; ".join(said) if any(len(f) > 1 for f in parts[:_NAMED]) else join_words(said)
     rest = len(parts) - _NAMED
     more = f"; {count_words(rest, 'more part')} {'is' if rest == 1 else 'are'} listed below" if rest > 0 else ""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -13,7 +14,7 @@ from diagnosis.direct.fault_runs import fault_runs
 from diagnosis.direct.identification import IdentifiedPair
 from diagnosis.direct.isolation import Isolated, estimate_run, isolate
 from diagnosis.direct.onset import refine
-from diagnosis.direct.sentences import alike_sentence, sentences
+from diagnosis.direct.sentences import BOUNDS, OF_SAT, alike_sentence, sentences
 from diagnosis.direct.timing import timing_explains
 from diagnosis.estimation.fault_models import HEALTHY, INEFFICIENT, STUCK, VARYING_ROWS
 from diagnosis.estimation.segments import Run, with_leads
@@ -39,6 +40,7 @@ _ZERO = 0.01  # of the span: as far apart may two healthy instruments have their
 _ALIKE_P = 0.3  # probability of each of two rows that a constant cannot tell
 _ONE_GAIN, _SAME_P = 0.05, 0.95  # of a gain; that a share which is lost elsewhere too is one
 _SLOW = 0.1  # of its mean, by which a reference changes that hardly moves
+_SAME_SHARE = "The same share is lost in another fault of this part that shows it better; the bounds are of both."
 _GROWTH_S = 0.1  # a shorter time of growth is not worth a sentence
 
 
@@ -170,6 +172,8 @@ def _as_beside(finding: Finding, all_of_them: Sequence[Finding], found: Identifi
         return finding
     both = 2 * likely if still else likely + p[finding.mode]
     p |= {finding.mode: (1.0 - _SAME_P) * both, FaultMode.INEFFICIENT: _SAME_P * both}
+    bounds = f"(95 %: {1 - lost - _ONE_GAIN:.3f} to {1 - lost + _ONE_GAIN:.3f})"
+    said = (e for e in finding.evidence if OF_SAT not in e)
     return replace(
         finding,
         mode=FaultMode.INEFFICIENT,
@@ -177,7 +181,7 @@ def _as_beside(finding: Finding, all_of_them: Sequence[Finding], found: Identifi
         hypotheses=tuple(sorted((replace(h, p=p[h.mode]) for h in finding.hypotheses), key=lambda h: -h.p)),
         epsilon=Epsilon(lost, lost - _ONE_GAIN, lost + _ONE_GAIN),
         sat=None,
-        evidence=(*finding.evidence, "The same share is lost where it says more."),
+        evidence=(*(re.sub(BOUNDS, bounds, e) for e in said), _SAME_SHARE),
     )
 
 

@@ -13,6 +13,9 @@ from diagnosis.results.result import Epsilon
 from diagnosis.results.sizes import amount, kept_to, times_as_probable
 from replay.faults import FaultMode
 
+#: Bounds in a sentence, and what tells that one is of the saturation term: a finding that is joined to another states both anew.
+BOUNDS, OF_SAT = r"\(95 %: \S+ to \S+\)", "which is ε̂ × sat"
+
 
 def sentences(isolated: Isolated, found: IdentifiedPair, mode: FaultMode, epsilon: Epsilon | None) -> tuple[str, ...]:
     """Evidence of one finding.
@@ -80,6 +83,6 @@ def _values(isolated: Isolated, found: IdentifiedPair, epsilon: Epsilon | None, 
     if sat is not None:
         out.append(
             f"The rest has a mean of {amount(sat.mean * epsilon.value, pair.unit)} and a root mean square of "
-            f"{amount(sat.rms * epsilon.value, pair.unit)}, which is ε̂ × sat; healthy noise is {amount(seen.noise, pair.unit, 2)}."
+            f"{amount(sat.rms * epsilon.value, pair.unit)}, {OF_SAT}; healthy noise is {amount(seen.noise, pair.unit, 2)}."
         )
     return out

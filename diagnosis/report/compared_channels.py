@@ -6,7 +6,7 @@ from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 
 from diagnosis.pages.labels import number
-from diagnosis.report.units import MOTION, motion_unit, on_page
+from diagnosis.report.units import EFFORT_UNIT, MOTION, motion_unit, on_page
 from diagnosis.results.document import IntervalRow
 from diagnosis.results.machine_words import MachineWords
 from diagnosis.results.vocabulary import Kind, Tier
@@ -90,6 +90,13 @@ def by_valve(fault: IntervalRow, columns: Collection[str]) -> bool:
     return fault["side"] == Side.ACTUATOR and fault["tier"] == Tier.DIRECT and applied in columns
 
 
+def by_effort(fault: IntervalRow, columns: Collection[str]) -> str:
+    """Column of the effort that a drive's fault was decided by; empty where it was decided otherwise."""
+    effort = f"{fault['kind']}.{fault['component']}.effort"
+    told = fault["side"] == Side.ACTUATOR and effort in columns and _place(effort, " ".join(fault["evidence"])) >= 0
+    return effort if told else ""
+
+
 def pair_of(fault: IntervalRow, columns: Collection[str], machine_words: MachineWords) -> Pair | None:
     """Channel of a fault and what it was compared with; None where the channel is not there.
 
@@ -117,6 +124,8 @@ def pair_of(fault: IntervalRow, columns: Collection[str], machine_words: Machine
             *on_page(OPENING, machine_words),
             base,
         )
+    if effort := by_effort(fault, columns):
+        return Pair("Effort", effort, None, "", False, EFFORT_UNIT, 1.0, base)
     motion = motion_of(component, kind, columns, machine_words)
     if motion.measured not in columns:
         return None

@@ -51,6 +51,7 @@ def sure_of(fault: IntervalRow, report: ReportDocument) -> str:
         for row in report["coverage"]
         if row["component"] == fault["component"] and row["side"] in side.sides and row["driving_s"]
     }
+    judged_words = ""
     if len(shares) > 1 and max(shares.values()) - min(shares.values()) > _UNLIKE:
         each = [
             f"its {machine_words.part_name(fault['kind'], s)} was "
@@ -61,10 +62,10 @@ def sure_of(fault: IntervalRow, report: ReportDocument) -> str:
             )
             for s in sorted(shares, key=lambda s: -shares[s])
         ]
-        words.append(" and ".join(each))
+        judged_words = " and ".join(each)
     elif shares:
-        words.append(_judged_words(min(shares.values()), machine_words.moving))
-    return ", ".join(words)
+        judged_words = _judged_words(min(shares.values()), machine_words.moving)
+    return "; ".join([", ".join(words), *([judged_words] if judged_words else [])])
 
 
 def _judged_words(share: float, moving: str) -> str:

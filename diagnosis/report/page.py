@@ -222,10 +222,15 @@ def _headed(rows: Markup, heads: Sequence[str]) -> Markup:
     return Markup("</tr>").join(Markup(row(part)) for part in str(rows).split("</tr>"))
 
 
+def _coded(text: str) -> Markup:
+    """A text whose commands and names, between backticks, are set as such."""
+    return Markup(re.sub(r"`([^`]+)`", r"<code>\1</code>", str(escape(text))))
+
+
 @lru_cache
 def _environment() -> jinja2.Environment:
     found = environment(_ASSETS)
     found.filters |= {"clock": labels.clock, "span": labels.span, "num": labels.number, "state": state_label}
-    found.filters["headed"] = _headed
+    found.filters |= {"headed": _headed, "coded": _coded}
     found.globals |= {"icon": icon, "title": labels.fault_title}
     return found

@@ -12,6 +12,7 @@ import orjson
 
 from diagnosis.pages import labels
 from diagnosis.report.budget import Encodable, encode
+from diagnosis.report.compared_channels import by_effort
 from diagnosis.report.encode import Channel, Segment
 from diagnosis.report.plot_rows import fault_rows
 from diagnosis.report.rows import Columns, Group, Row, row_json
@@ -103,7 +104,8 @@ def figures_of(
     known: dict[tuple[str, ...], tuple[Row, ...]] = {}
     out = {}
     for f in faults:
-        key = (f["component"], f["kind"], f["side"], f["tier"], f["sat"]["unit"] if f["sat"] else "")
+        shown = by_effort(f, columns), f["sat"]["unit"] if f["sat"] else ""
+        key = (f["component"], f["kind"], f["side"], f["tier"], *shown)
         if key not in known:
             peers = machine["axles"] if f["kind"] == Kind.STEER else machine["wheels"]
             known[key] = fault_rows(f, peers, columns, words_of(machine), limit)

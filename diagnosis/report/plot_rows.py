@@ -12,9 +12,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnosis.report.compared_channels import Pair, by_valve, motion_of
+from diagnosis.report.compared_channels import Pair, by_effort, by_valve, motion_of
 from diagnosis.report.rows import Columns, Group, Row, Trace
-from diagnosis.report.units import natural_unit, on_page
+from diagnosis.report.units import EFFORT_UNIT, natural_unit, on_page
 from diagnosis.results.document import IntervalRow
 from diagnosis.results.fault_rows import state_label
 from diagnosis.results.machine_words import MachineWords
@@ -67,16 +67,18 @@ def fault_rows(
         unit,
         (
             Trace(f"{kind}.{c}.u", "recorded", "measured", scale),
-            Trace(f"replay.{c}.u", "replayed", "replayed", scale),
+            *((Trace(f"replay.{c}.u", "replayed", "replayed", scale),) if f"{kind}.{c}.u" in columns else ()),
             Trace(f"{kind}.{c}.u_applied", "applied", "applied", scale),
             *((Trace(expected, "expected", "expected", scale),) if valve_read else ()),
         ),
     )
     residual_unit = (unit, scale) if valve_read else (motion.unit, motion.scale)
     rows = [speed_or_angle]
+    rows += _effort_row(c, peers, columns) if by_effort(fault, columns) else []
     rows += [valve] if side == Side.ACTUATOR else []
     rows += [row for s in side.sides for row in _side_rows(fault, s, columns, residual_unit, limit, words)]
-    rows += [psi_row(c, columns)] if kind == Kind.WHEEL and has_psi(c, columns) else []
+    commanded = f"{kind}.{c}.u" in columns  # else the law's own command and Ψ̂ are compared with nothing
+    rows += [psi_row(c, columns)] if kind == Kind.WHEEL and commanded and has_psi(c, columns) else []
     rows += [valve] if side != Side.ACTUATOR else []
     rows += _peer_row(c, kind, peers, columns, words)
     return tuple(r for row in rows for r in row.shown(columns))
@@ -189,7 +191,7 @@ def _side_rows(
             "1",
             (Trace(base + "epsilon", "of the fault as stated, 95 % band; 0 where healthy", "measured"),),
             band=(base + "epsilon_low", base + "epsilon_high"),
-            clip=(-1.0, 2.0),
+            clip=(_lowest(columns.get(base + "epsilon")), 2.0),
             unknown=unknown_stretches(base + "epsilon", columns),
         ),
         Row(
@@ -202,6 +204,12 @@ def _side_rows(
         ),
         *_mode_row(fault, side, base, of, columns),
     ]
+
+
+def _lowest(epsilon: NDArray[np.floating] | None) -> float:
+    """Where the axis of ε̂ ends: low enough for every loss that is stated; a part that gives more than it should has a negative one [1]."""
+    known = np.empty(0) if epsilon is None else epsilon[np.isfinite(epsilon)]
+    return min(-1.0, 1.1 * float(known.min(initial=0.0)))
 
 
 def _mode_row(fault: IntervalRow, side: Side, base: str, of: str, columns: Columns) -> list[Row]:
@@ -247,6 +255,12 @@ def psi_row(c: str, columns: Columns, component: str = "") -> Row:
         right=("ρ", "1/s") if f"replay.{c}.rho" in columns else None,
         component=component,
     )
+
+
+def _effort_row(c: str, peers: Sequence[str], columns: Columns) -> list[Row]:
+    """Effort of the drive and of the others."""
+    others = (Trace(f"wheel.{p}.effort", p, "peer") for p in peers if p != c)
+    return [Row("effort", "Effort", EFFORT_UNIT, (*others, Trace(f"wheel.{c}.effort", c, "measured")))]
 
 
 def _peer_row(c: str, kind: Kind, peers: Sequence[str], columns: Columns, words: MachineWords) -> list[Row]:

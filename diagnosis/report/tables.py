@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from diagnosis.pages.labels import UNDATED_NS, clock, mode_legend, number, sat_text, utc_mark
-from diagnosis.report.confidence import headline, judged, sure_of, sure_of_verdict
+from diagnosis.report.confidence import headline, judged, percent, sure_of, sure_of_verdict
 from diagnosis.report.data_tables import (
     check_rows,
     coverage_rows,
@@ -135,7 +135,7 @@ def _fault(fault: IntervalRow, words: MachineWords) -> Context:
         ),
         "figures": figures,
         "check": fault.get("check", ""),
-        "percent": f"{100 * fault['probability']:.1f} %",
+        "percent": percent(fault["probability"]),
     }
 
 

@@ -16,6 +16,8 @@ from replay.faults import Side
 from replay.machine.quantities import OPENING
 from replay.machine.signal_table import BY_KIND, find_signal
 
+#: Of the effort of joints, as ROS has it.
+EFFORT_UNIT = BY_KIND["wheel.effort"].shown_unit
 DEGREES = 180.0 / math.pi
 #: Leaf of the signal that tells what a component does.
 MOTION = {Kind.WHEEL: "v", Kind.STEER: "phi"}

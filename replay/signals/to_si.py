@@ -138,14 +138,20 @@ def _ordered(
     if back:
         order = np.argsort(stamps, kind="stable")
         stamps, values = stamps[order], values[order]
-        notes.append(f"stamps ran backwards {back} times and were sorted")
+        notes.append(f"stamps ran backwards {'once' if back == 1 else f'{back} times'} and were sorted")
     ticks = spread_ticks(stamps, values)
     if ticks is not None:
         stamps, tick = ticks
         notes.append(f"its clock ticks every {tick / 1e6:g} ms only; samples of one tick were spread evenly over it")
     last = np.append(stamps[1:] != stamps[:-1], True) if len(stamps) else np.ones(0, np.bool_)
     if not last.all():
-        notes.append(f"{(~last).sum()} samples share their stamp with a later one and were dropped")
+        n = int((~last).sum())
+        shared = (
+            "1 sample shares its stamp with a later one and was"
+            if n == 1
+            else f"{n} samples share their stamps with later ones and were"
+        )
+        notes.append(f"{shared} dropped")
         stamps, values = stamps[last], values[last]
     return stamps, values, tuple(notes)
 

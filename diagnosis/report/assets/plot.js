@@ -42,7 +42,7 @@ class Figure extends FigureLooks {
   // Height of the values: twice or half as tall about the middle of what is shown; `robust`: without a few outliers.
   stretch(by) { this.tall = by ? Math.min(64, Math.max(1, this.tall * by)) : 1; return this.redraw(); }
 
-  pixels() { return Math.max(200, this.element.clientWidth - 70); }
+  pixels() { return Math.max(200, (this.paper || this.element.clientWidth) - 70); }
 
   // Curves of all rows for the current range, in the order of `traces`.
   async fetch(range) {
@@ -133,7 +133,7 @@ class Figure extends FigureLooks {
     this.sheets = [];
     for (let i = 0; i < this.rows.length; i += most) {
       const part = new Figure(i ? document.createElement("div") : this.element);
-      Object.assign(part, { rows: this.rows.slice(i, i + most), curves: curves.slice(i, i + most).flat(), shades: this.shades, range: this.range });
+      Object.assign(part, { rows: this.rows.slice(i, i + most), curves: curves.slice(i, i + most).flat(), shades: this.shades, range: this.range, paper: width });
       if (i) {
         part.element.className = "sheet";
         (this.sheets.at(-1) || this.element).after(part.element);

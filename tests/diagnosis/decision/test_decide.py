@@ -268,9 +268,8 @@ def test_the_sentence_names_parts_in_the_order_of_the_actions_with_what_they_los
             ),
         )
     )
-    assert got.text == (
-        "The FL drive valve was without control signal for 4.0 s and stuck for 2.0 s; the FR speed sensor was stuck for 9.0 s."
-    )
+    assert got.text == ("The FL drive valve was faulty for 9.0 s in 3 faults; the FR speed sensor was stuck for 9.0 s.")
+    assert "without control signal for 4.0 s, stuck for 2.0 s" in str(got.actions[0]["text"])
     assert "inefficient (40 % lost, 95 % bounds 39 to 41 %) for 3.0 s" in str(got.actions[0]["text"])
 
 

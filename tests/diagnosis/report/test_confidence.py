@@ -47,7 +47,7 @@ def test_phrase_of_a_fault() -> None:
     report = samples.report_with(coverage=[row("actuator", 91.0), row("sensor", 100.0)])
     nothing = samples.report_with(coverage=[])
     assert sure_of(fault(0.995), report) == (
-        "Practically certain (99.5 %), measured against the valve position, 91 % of its driving was judged"
+        "Practically certain (99.5 %), measured against the valve position; 91 % of its driving was judged"
     )
     unlike = samples.report_with(coverage=[row("actuator", 10.0), row("sensor", 98.0)])
     assert sure_of(fault(0.995, side="sensor_or_actuator"), unlike).endswith(

@@ -37,6 +37,30 @@ def test_directly_measured_valve_is_compared_with_its_command() -> None:
     assert rows["residual"].unit == "% of opening"
 
 
+def test_a_drive_that_pulls_nothing_is_shown_by_its_effort_and_the_law_only_beside_a_recorded_command() -> None:
+    report, columns = samples.five_faults()
+    fault = {**report["intervals"][1], "tier": "response", "kind": "wheel", "component": "FR", "side": "actuator"}
+    fault["evidence"] = ["wheel.FR.effort is next to nothing for 12.2 s."]
+    size = len(columns["t"])
+    logged = {n: c for n, c in columns.items() if not n.endswith((".u", ".u_applied"))}
+    logged |= {f"wheel.{w}.effort": np.ones(size) for w in WHEELS} | {"replay.FR.u": np.ones(size)}
+    rows = {r.key: r for r in fault_rows(fault, WHEELS, logged, HYDRAULIC)}
+    assert [t.role for t in rows["effort"].traces] == ["peer"] * 3 + ["measured"]
+    assert not {"u", "psi"} & rows.keys()
+    pair = pair_of(fault, logged, HYDRAULIC)
+    assert pair is not None
+    assert (pair.measured, pair.reference) == ("wheel.FR.effort", None)
+
+
+def test_an_axis_of_losses_holds_a_part_that_gives_more_than_it_should() -> None:
+    report, columns = samples.five_faults()
+    fault = report["intervals"][0]
+    columns = {**columns, "evidence.FR.sensor.epsilon": np.full(len(columns["t"]), -2.34)}
+    (row,) = (r for r in fault_rows(fault, WHEELS, columns, HYDRAULIC) if r.key == "epsilon")
+    assert row.clip is not None
+    assert row.clip[0] < -2.34
+
+
 def test_only_existing_columns_make_rows() -> None:
     assert fault_rows(samples.fault(), ["FR"], {}, HYDRAULIC) == ()
     (group,) = loop_groups(["FR"], [], {"wheel.FR.u": np.zeros(3)}, HYDRAULIC)

@@ -293,8 +293,8 @@ def test_stamps_become_strictly_increasing_and_the_changes_are_counted() -> None
     found = mapped(channel("cmd.v", [0.1, 0.2, 0.3, 0.4], stamps=[10, 30, 30, 20]))
     assert found.items["cmd.v"].stamps.tolist() == [10, 20, 30]
     assert found.items["cmd.v"].values.tolist() == [0.1, 0.4, 0.3]
-    assert any("ran backwards 1 times" in n for n in found.notes)
-    assert any("1 samples share their stamp" in n for n in found.notes)
+    assert any("ran backwards once" in n for n in found.notes)
+    assert any("1 sample shares its stamp" in n for n in found.notes)
 
 
 def test_derivatives_of_integer_counters_are_exact() -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Iterator, Sequence
 
 from markupsafe import Markup, escape
@@ -147,9 +147,9 @@ def _row(m: ShownMission, machine_words: MachineWords) -> str:
         notes.append(m["reason"])
     note = f'<div class="small muted">{escape("; ".join(notes))}</div>' if notes else ""
     start, driving = m.get("start_ns"), m.get("driving_s")
-    words = "; ".join(fault_words(f, machine_words) for f in faults[:2]) + (
-        f" +{len(faults) - 2}" if len(faults) > 2 else ""
-    )
+    kinds = Counter(fault_words(f, machine_words) for f in faults)
+    words = "; ".join(kind if n == 1 else f"{kind}, {n} times" for kind, n in list(kinds.items())[:2])
+    words += f" +{len(faults) - sum(list(kinds.values())[:2])}" if len(kinds) > 2 else ""
     if verdict is Verdict.NOT_ASSESSED and not words:
         words = m.get("title", "")
     if verdict is None:

@@ -117,3 +117,10 @@ def test_a_trend_is_drawn_with_its_limit_its_change_and_its_outlier(tmp_path: Pa
 def test_hardly_anything_still_makes_a_page(tmp_path: Path, missions: list[Sample]) -> None:
     page = build_fleet_page(document(tmp_path, *missions))
     assert "nan" not in re.sub(r"<(script|style)>.*?</\1>", "", page, flags=re.DOTALL).lower()
+
+
+def test_faults_of_a_mission_that_read_alike_are_counted(tmp_path: Path) -> None:
+    alike = Fault(*VALVE, "stuck", "high")
+    page = build_fleet_page(document(tmp_path, Sample("a", verdict="stop", faults=(alike, alike, alike))))
+    assert "RL drive valve stuck, 3 times" in page
+    assert "RL drive valve stuck; RL drive valve stuck" not in page
