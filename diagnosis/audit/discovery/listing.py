@@ -66,6 +66,10 @@ class Place(Protocol):
         """File or folder by its name relative to a folder, unless it is outside of it or not there."""
         ...
 
+    def beside(self, folder: str, name: str) -> Entry | None:
+        """File by its name in a folder that need not be searched; None where it is not there, or the folder is for temporary files."""
+        ...
+
     def is_folder(self, entry: Entry) -> bool:
         """Whether it is a folder."""
         ...
@@ -141,6 +145,17 @@ class LocalPlace:
         except (OSError, ValueError):
             return None
         return found if found.real.startswith(folder.real.rstrip(os.sep) + os.sep) else None
+
+    def beside(self, folder: str, name: str) -> Entry | None:
+        """File in any folder but one that everybody puts files into, such as ``/tmp``."""
+        try:
+            mode = os.stat(folder).st_mode  # noqa: PTH116
+            if mode & stat.S_IWOTH and mode & stat.S_ISVTX:
+                return None
+            found = self.entry(os.path.join(folder, name))  # noqa: PTH118
+        except (OSError, ValueError):
+            return None
+        return found if self.is_file(found) else None
 
     def is_folder(self, entry: Entry) -> bool:
         """Whether it is a folder."""

@@ -50,8 +50,8 @@ _AUDIT_FILES = ("fleet.csv", "failures.txt")
 _REPORT = {"report.json", "report.parquet"}
 _REPORT_TABLES = ("report.parquet", "report.windows.parquet")
 _CLIPS = "clips"
-#: Files that may hold logs and cannot be read as they are: archives, and ROS 1 bags that were not closed.
-_PACKED = (".zip", ".7z", ".rar", ".tar", ".tgz", ".tar.gz", ".tar.xz", ".tar.zst", ".bag.active")
+#: Files that may hold logs and cannot be read as they are.
+_PACKED = (".zip", ".7z", ".rar", ".tar", ".tgz", ".tar.gz", ".tar.xz", ".tar.zst")
 MACHINE_FILE = "machine.toml"
 _URL = re.compile(r"([A-Za-z][A-Za-z0-9+.:-]*)://")
 

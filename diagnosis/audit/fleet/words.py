@@ -233,6 +233,12 @@ def new_words(missions: int, faults: Sequence[tuple[Machine, FleetFault]]) -> li
     return [f"The last audit run brought {count(missions, 'mission')}{';' if named else ','} {said}."]
 
 
+def as_sentence(note: str) -> str:
+    """A note with a capital and a full stop, unless it begins with a path."""
+    head = note.partition(" ")[0].rstrip(":,")
+    return f"{note[0].upper() + note[1:] if head.isalpha() else note}."
+
+
 def _often(f: FleetFault) -> str:
     """That a fault came in several missions of the last run at once, which is why it is called recurring."""
     return f", recurring in {f.missions} of them" if f.missions > 1 else ""
