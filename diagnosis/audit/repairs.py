@@ -167,6 +167,12 @@ def _closed(machine: Machine, repair: Repair, known: Sequence[Repair]) -> tuple[
     own = [repair, *(r for r in known if r.machine == repair.machine)]
     for f in machine.faults:
         start = f.last.result.start_ns
+        if (
+            f.status == "past"
+            and start is not None
+            and (f.component, start < repair.repaired_ns) == (repair.component, True)
+        ):
+            closes.append(f"{fault_words(f, machine.limits.words)}, which was not seen any more")
         if not f.standing or start is None or f.component != repair.component:
             continue
         if repair.side and repair.side not in Side(f.side).sides:

@@ -65,7 +65,7 @@ def place_doubts(line: Timeline, machine: Machine) -> tuple[str, ...]:
         return ()
     step = max(1, round(_STEP_S / line.dt), line.size // _MOST)
     seen = {n: np.asarray(v[::step], dtype=np.float64) for n, v in line.signals.items()}
-    if "cmd.vy" in seen and np.nanstd(seen["cmd.vy"]) > _STRAFES:
+    if "cmd.lateral" in seen and np.nanstd(seen["cmd.lateral"]) > _STRAFES:
         return ()
     dt = line.dt * step
     speed = _speed(seen, machine)

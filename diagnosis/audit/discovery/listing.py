@@ -14,6 +14,7 @@ from typing import Protocol
 from diagnosis.audit.discovery.apart import HELPER, Span
 from replay.errors import LogError
 from replay.readers.registry import readers
+from replay.signals.together import Extent
 
 _PAUSE_NS = 5_000_000_000
 _OVERLAP_NS = 2_000_000_000
@@ -88,6 +89,10 @@ class Place(Protocol):
 
     def continuous(self, parts: Sequence[Entry]) -> bool:
         """Whether each of some logs goes on where the one before ended, with the same topics."""
+        ...
+
+    def extent(self, table: Entry) -> Extent | None:
+        """When a table begins and ends, and its columns; None where that is not known."""
         ...
 
     def is_log(self, file: Entry) -> bool:
@@ -189,6 +194,14 @@ class LocalPlace:
             return continues(HELPER.span(part.path) for part in parts)
         except LogError:
             return False
+
+    def extent(self, table: Entry) -> Extent | None:
+        """When a table begins and ends, by its first and last rows."""
+        try:
+            span = HELPER.span(table.path)
+        except LogError:
+            return None
+        return Extent(span.start_ns, span.stop_ns, span.columns)
 
     def is_log(self, file: Entry) -> bool:
         """Whether a reader knows the content."""

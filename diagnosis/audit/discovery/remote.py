@@ -215,6 +215,9 @@ class RemotePlace:
         except LogError:
             return False
 
+    def extent(self, table: Entry) -> None:
+        """Nothing: the content is not read."""
+
     def is_log(self, file: Entry) -> bool:
         """Whether it may be a log; the content is not read."""
         return True
