@@ -45,10 +45,10 @@ def moment_of(option: str, text: str) -> datetime:
 
 def _split(text: str) -> tuple[str, str]:
     """A date with its time, and the zone behind it; empty where there is none."""
-    *date, last = text.split()
-    if date and not last[0].isdigit():
-        return " ".join(date), last
-    return " ".join((*date, last)), ""
+    words = text.split()
+    if len(words) > 1 and not words[-1][0].isdigit():
+        return " ".join(words[:-1]), words[-1]
+    return " ".join(words), ""
 
 
 def has_zone(text: str) -> bool:

@@ -224,7 +224,7 @@ def _axles(
     if len(y) * dt < 4 * _LEAST_S or min(np.std(x, axis=0)) < _LEAST_TURN:
         return ""
     first, second = (f"steer.{a}" for a, _, _ in ends)
-    if abs(float(np.corrcoef(x.T)[0, 1])) > _APART:
+    if abs(float(np.corrcoef(x[:, 0], x[:, 1])[0, 1])) > _APART:
         return ""  # both always steer alike: the sign of the steering as a whole is all that shows
     kept = np.ones(len(y), np.bool_)
     for _ in range(3):

@@ -182,14 +182,17 @@ def missions_of(place: Place, folder: str, files: Sequence[Entry], recordings: S
 
 def _of_tables(place: Place, folder: str, tables: Sequence[tuple[str, Entry]]) -> list[Unnamed]:
     """Missions of tables that are no part of a recording's: rules 5 and 6."""
-    out, taken = list[Unnamed](), set[int]()
+    out = []
     for ending in dict.fromkeys(split_ending(table.name)[1] for _, table in tables):
-        own = [k for k, (_, table) in enumerate(tables) if split_ending(table.name)[1] == ending]
-        for shared, group in tables_together(
-            [tables[k][0] for k in own], lambda i, own=own: place.extent(tables[own[i]][1])
-        ):  # type: ignore[misc]
-            out.append(Unnamed(folder, shared, tuple(tables[own[i]][1] for i in group)))
-            taken.update(own[i] for i in group)
+        own = [one for one in tables if split_ending(one[1].name)[1] == ending]
+        out += _of_one_ending(place, folder, own)
+    return out
+
+
+def _of_one_ending(place: Place, folder: str, tables: Sequence[tuple[str, Entry]]) -> list[Unnamed]:
+    groups = tables_together([stem for stem, _ in tables], lambda k: place.extent(tables[k][1]))
+    taken = {k for _, group in groups for k in group}
+    out = [Unnamed(folder, shared, tuple(tables[k][1] for k in group)) for shared, group in groups]
     return out + [Unnamed(folder, stem, (table,)) for k, (stem, table) in enumerate(tables) if k not in taken]
 
 

@@ -161,7 +161,7 @@ class _Parquet:
         found = find_time(self.path, shown, options, self.report)
         kind = self.numeric[found.name].type
         stated = pa.types.is_timestamp(kind) and kind.tz
-        return in_zone(self.path, found, options, self.report, "00Z" if stated else None)
+        return in_zone(self.path, found, options, self.report, ":00Z" if stated else None)
 
     def named(self, log: RawLog) -> RawLog:
         """Give the channels of a converted log their topics, fields, types and units again."""
