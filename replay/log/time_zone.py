@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 
 from replay.errors import ConfigError
 
+#: What a note says of dates without a zone.
+NO_ZONE = "its dates state no time zone"
 _OFFSET = re.compile(r"(?:UTC)?([+-])(\d\d):?(\d\d)")
 _HOUR = 3_600 * 1_000_000_000
 

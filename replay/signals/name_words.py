@@ -39,7 +39,7 @@ _PARTS = (
 _TOGETHER = re.compile(rf"(?:{'|'.join(_PARTS)})+")
 _PART = re.compile("|".join(sorted(_PARTS, key=len, reverse=True)))
 _MEANINGS = {
-    "ref": "soll sollwert vorgabe vorg consigne cons",
+    "ref": "soll sollwert vorgabe vorg consigne cons ohje gewenst",
     "cmd": "ansteuerung commande",
     "act": "ist istwert mess messwert gemessen rueckmeldung mesure mesuree mes reel reelle",
     "speed": "geschwindigkeit geschw vitesse vit spd speeds velocities velocidad velocidade velocita snelheid hastighet hastighed nopeus predkosc",

@@ -21,8 +21,8 @@ def with_machine_files(
 ) -> tuple[tuple[MissionSource, ...], tuple[str, ...]]:
     """Missions with the machine file that each is judged by, and one sentence for each kind of those that have none of their own.
 
-    A copy of a log, such as one in a folder of backups, has the machine file of the log that it is a copy of. Any other one has that
-    of its machine's logs, where these have one and the same.
+    A copy of a log, such as one in a folder of backups, has machine file and machine of the log that it is a copy of. Any other one has
+    the machine file of its machine's logs, where these have one and the same.
 
     Parameters
     ----------
@@ -38,13 +38,25 @@ def with_machine_files(
     of_machine: dict[str, set[str]] = defaultdict(set)
     for m in own:
         of_machine[machine_id or m.machine_id or fallback_id(m)].add(str(m.machine_file))
-    lent: dict[str, str] = dict(_copied(bare, own))
+    originals = dict(_copied(bare, own))
+    lent = {name: str(original.machine_file) for name, original in originals.items()}
     for m in bare:
         known = of_machine.get(machine_id or m.machine_id or fallback_id(m), set())
         if m.name not in lent and len(known) == 1:
             lent[m.name] = next(iter(known))
-    out = tuple(replace(m, machine_file=lent.get(m.name, m.machine_file)) for m in missions)
+    out = tuple(
+        _as_original(m, originals[m.name])
+        if m.name in originals
+        else replace(m, machine_file=lent.get(m.name, m.machine_file))
+        for m in missions
+    )
     return out, tuple(_sentences([m for m in out if m.machine_file is None and not m.problem], lent))
+
+
+def _as_original(copy: MissionSource, original: MissionSource) -> MissionSource:
+    """A copy with the machine file and the machine of its original."""
+    machine = copy.machine_id or original.machine_id
+    return replace(copy, machine_file=original.machine_file, machine_id=machine, folder=fallback_id(original))
 
 
 def _sentences(bare: Sequence[MissionSource], lent: dict[str, str]) -> Iterable[str]:
@@ -67,8 +79,8 @@ def _few(names: Sequence[str]) -> str:
     return ", ".join(names[:_SHOWN]) + more
 
 
-def _copied(bare: Sequence[MissionSource], own: Sequence[MissionSource]) -> Iterable[tuple[str, str]]:
-    """Names of missions that are byte for byte others, and the machine files of those; only files of the same sizes are read."""
+def _copied(bare: Sequence[MissionSource], own: Sequence[MissionSource]) -> Iterable[tuple[str, MissionSource]]:
+    """Names of missions that are byte for byte others, and these, where all of them have one machine file; only files of the same sizes are read."""
     sizes = {m.sizes for m in bare}
     alike: dict[tuple[int, ...], list[MissionSource]] = defaultdict(list)
     for m in own:
@@ -77,9 +89,9 @@ def _copied(bare: Sequence[MissionSource], own: Sequence[MissionSource]) -> Iter
     for m in bare:
         if not (others := alike.get(m.sizes)) or not (content := _content(m)):
             continue
-        files = {str(other.machine_file) for other in others if _content(other) == content}
-        if len(files) == 1:
-            yield m.name, next(iter(files))
+        same = [other for other in others if _content(other) == content]
+        if same and len({other.machine_file for other in same}) == 1:
+            yield m.name, same[0]
 
 
 def _content(mission: MissionSource) -> str:

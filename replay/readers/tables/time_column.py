@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from replay.errors import LogError
 from replay.log.reading_notes import Report
 from replay.log.source_options import SourceOptions
+from replay.log.time_zone import NO_ZONE
 from replay.readers.tables.columns import unit_of
 from replay.readers.tables.split_time import Part, split_times, with_part
 
@@ -164,7 +165,7 @@ def in_zone(path: Path, time: TimeColumn, options: SourceOptions, report: Report
         return time._replace(zone=options.time_zone)
     if options.epoch is None and (time.day_ns or cell is None or len(cell.strip()) > _OF_DAY):
         report.note(
-            f"{path.name}: its dates state no time zone and were taken as UTC; if its clock shows another time, give "
+            f"{path.name}: {NO_ZONE} and were taken as UTC; if its clock shows another time, give "
             'time_zone = "Europe/Berlin" or whichever it is in [sources]'
         )
     return time

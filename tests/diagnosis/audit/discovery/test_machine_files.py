@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from diagnosis.audit.discovery.discover import discover
+from diagnosis.audit.discovery.identity import fallback_id
 from diagnosis.audit.discovery.machine_files import with_machine_files
 
 HEAD = b"\x89MCAP0\r\n"
@@ -39,6 +40,13 @@ def test_a_copy_is_judged_as_what_it_is_a_copy_of(tmp_path: Path) -> None:
     assert second == (
         f"backup__x__m has no machine.toml in or above its folder and has that of the same machine: {tmp_path}/AX/machine.toml"
     )
+
+
+def test_a_copy_is_of_the_machine_of_its_original(tmp_path: Path) -> None:
+    put(tmp_path, AX=b"one", backup__old=b"one")
+    (tmp_path / "AX/machine.toml").write_text("")
+    missions, _ = with_machine_files(discover([str(tmp_path)]).missions)
+    assert [fallback_id(m) for m in missions] == ["AX", "AX"]
 
 
 def test_a_folder_called_as_a_machine_is_of_it(tmp_path: Path) -> None:
