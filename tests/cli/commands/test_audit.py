@@ -143,7 +143,7 @@ def test_a_missing_path_is_an_error_also_when_quiet(
     assert run(words) == 3
     assert capsys.readouterr().err == "error: nope: no such file\n"
     told = [json.loads(line) for line in events.read_text(encoding="utf-8").splitlines()]
-    assert [e["reason"] for e in told if e["event"] == "problem"][0] == "nope: no such file"
+    assert next(e["reason"] for e in told if e["event"] == "problem") == "nope: no such file"
     assert run([*words, "--json"]) == 3
     assert document(capsys)["problems"][0] == "nope: no such file"
     assert run([*words, "--dry-run"]) == 3
