@@ -5,12 +5,14 @@ from __future__ import annotations
 import re
 from datetime import UTC, datetime, timedelta, timezone, tzinfo
 from functools import lru_cache
+from typing import TYPE_CHECKING
 from zoneinfo import ZoneInfo, ZoneInfoNotFoundError
 
-import numpy as np
-from numpy.typing import NDArray
-
 from replay.errors import ConfigError
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
 
 #: What a note says of dates without a zone.
 NO_ZONE = "its dates state no time zone"
@@ -65,6 +67,8 @@ def from_zone(stamps: NDArray[np.int64], name: str) -> NDArray[np.int64]:
     ConfigError
         Where the zone is not known.
     """
+    import numpy as np  # the command line, which asks for zones of dates, does without it
+
     zone = zone_called(name)
     hours, place = np.unique(stamps // _HOUR, return_inverse=True)
     shown = (datetime(1970, 1, 1) + timedelta(hours=int(h)) for h in hours)
