@@ -200,7 +200,7 @@ def _without_contradicted(judged: Judged) -> Judged:
 def _with_what_stands_out(judged: Judged) -> Judged:
     """The same with parts named that the checks of the all-clear leave no doubt about, unless the whole machine explains them."""
     found = judged.found
-    if found.events or judged.hints:
+    if found.events or judged.hints or judged.places:
         return judged
     more = what_stands_out(judged.checks, judged.cells, found.words)
     if not more:

@@ -32,6 +32,7 @@ from replay.faults import State
 from replay.machine.config import Machine
 from replay.mission import Mission, MissionFile
 from replay.readers.machine_identity import stated_machine
+from replay.setup.places import place_doubts
 from replay.signals.timeline import Timeline
 from replay.version import __version__
 
@@ -86,6 +87,11 @@ class Judged:
     def hints(self) -> tuple[Hint, ...]:
         """Signals that the machine file may have wrong."""
         return mapping_hints(self.cells)
+
+    @cached_property
+    def places(self) -> tuple[str, ...]:
+        """What the turns contradict of the places of wheels and axles."""
+        return place_doubts(self.mission.timeline, self.machine)
 
     @cached_property
     def scale(self) -> Scale | None:
@@ -149,6 +155,7 @@ def report_of_mission(judged: Judged, identity: MachineRow) -> ReportDocument:
             found.words,
             [f.clock for f in mission.files if f.clock is not None],
             judged.scale,
+            judged.places,
         ),
         "limits": to_json(machine.limits),
     }
@@ -181,6 +188,7 @@ def _decision(
         scope=_scope(judged),
         events=judged.found.events,
         hints=(*(h.text for h in judged.hints), *([s.gross] if (s := judged.scale) is not None and s.gross else [])),
+        misplaced=judged.places,
         open_state=open_state,
         shown=judged.detectable.rows,
     )

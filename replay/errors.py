@@ -12,6 +12,8 @@ and what to do.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 
 class MfhcaError(Exception):
     """Base of every error that the command line prints as one line."""
@@ -40,7 +42,7 @@ class NotJudged(LogError):
 
 
 def check_range(
-    key: str, value: float, low: float, high: float, unit: str, *, mistaken: tuple[str, float] | None = None
+    key: str, value: float, low: float, high: float, unit: str, *, mistaken: Sequence[tuple[str, float]] = ()
 ) -> None:
     """Raise a `ConfigError` that names the key, the value, the unit and the range.
 
@@ -52,15 +54,16 @@ def check_range(
         What was given, and its range.
     unit : str
         Unit of all three.
-    mistaken : tuple[str, float] or None
-        A unit that the value may have been given in by mistake, and its factor to `unit`: where the converted value lies
+    mistaken : Sequence[tuple[str, float]]
+        Units that the value may have been given in by mistake, each with its factor to `unit`: where converted values lie
         in the range, the message says what to write.
     """
     if low <= value <= high:
         return
     hint = ""
-    if mistaken is not None and low <= value * mistaken[1] <= high:
+    fitting = [(words, value * factor) for words, factor in mistaken if low <= value * factor <= high]
+    if fitting:
         name, _, last = key.rpartition(".")
-        hint = f"; {value:g} looks like {mistaken[0]}: write {last} = {value * mistaken[1]:.5g}"
-        hint += f" in [{name}]" if name else ""
+        hint = f"; {value:g} looks like {' or '.join(words for words, _ in fitting)}: write {last} = "
+        hint += " or ".join(f"{converted:.5g}" for _, converted in fitting) + (f" in [{name}]" if name else "")
     raise ConfigError(f"{key} = {value:g} {unit} is out of range; expected {low:g} to {high:g} {unit}{hint}")

@@ -306,9 +306,15 @@ def load_mission(
 def check_units(signals: Signals) -> None:
     """Raise a `ConfigError` where values cannot be what their units make them, with the lines that would mend them."""
     if signals.questions:
-        first, rest = signals.questions[0], len(signals.questions) - 1
-        more = f" ({rest} more signal{'s' if rest > 1 else ''} likewise; `mfhca channels` lists them)" if rest else ""
-        raise ConfigError(f"values that cannot be, so nothing was judged: {first}{more}")
+        raise ConfigError(f"values that cannot be, so nothing was judged: {first_question(signals)}")
+
+
+def first_question(signals: Signals) -> str:
+    """The first of some signals' questions, and how many more there are."""
+    first, rest = signals.questions[0], len(signals.questions) - 1
+    return first + (
+        f" ({rest} more signal{'s' if rest > 1 else ''} likewise; `mfhca channels` lists them)" if rest else ""
+    )
 
 
 def _cause(files: Sequence[MissionFile]) -> str:

@@ -142,7 +142,7 @@ On = Annotated[
     typer.Option(
         "--on",
         metavar="DATE",
-        help="When it was repaired: 2026-10-05 or 2026-10-05T14:30, UTC without an offset.",
+        help="When it was repaired: 2026-10-05T14:30+02:00, '2026-10-05T14:30 Europe/Berlin' or '… local'; UTC without a zone.",
         show_default=False,
     ),
 ]

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from cli.terminal.console import Terminal
-from cli.terminal.dates import moment_of, nanoseconds, shown_moment
+from cli.terminal.dates import has_zone, moment_of, nanoseconds, shown_moment
 from replay.errors import ConfigError
 from replay.progress import Stage
 
@@ -70,10 +70,10 @@ def one_date(dates: Sequence[str] | None) -> str | None:
 
 def run_repairs(terminal: Terminal, request: RepairRequest) -> None:
     """Record repairs, or take them back, and show the machines as the fleet page has them afterwards."""
+    assert request.on is not None
     with terminal.progress(Stage.WRITING):
         from diagnosis.audit.repairs import record_repairs
 
-        assert request.on is not None
         withdrawn = bool(request.not_repaired)
         words = request.not_repaired or request.repaired
         recorded = record_repairs(request.output, words, _date(request.on), _unheard, withdrawn=withdrawn)
@@ -84,6 +84,10 @@ def run_repairs(terminal: Terminal, request: RepairRequest) -> None:
     from cli.tables.audit import machine_parts
     from cli.tables.layout import text
 
+    if not has_zone(request.on):
+        terminal.note(
+            f"--on {request.on}: taken as UTC; write an offset or a zone for another: '{request.on} local', or +02:00 behind it"
+        )
     for t in recorded.told:
         what = "taken back" if withdrawn else "recorded"
         terminal.show(text(f"Repair {what}: {t.machine} {t.part} on {shown_moment(t.repaired_ns)}"))

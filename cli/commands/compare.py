@@ -11,6 +11,7 @@ from cli.terminal.command import Quiet, Verbose, terminal_of
 from cli.terminal.options import Json
 from diagnosis.api.inputs import check_output
 from diagnosis.api.saved_results import result_file
+from replay.errors import ConfigError
 
 if TYPE_CHECKING:
     from diagnosis.comparison.compare import Comparison
@@ -31,6 +32,7 @@ Older = Annotated[
     Path, typer.Argument(metavar="A", help="Older result: folder of a report, or its report.json.", show_default=False)
 ]
 Newer = Annotated[Path, typer.Argument(metavar="B", help="Newer result of the same machine.", show_default=False)]
+More = Annotated[list[Path] | None, typer.Argument(metavar="", hidden=True)]
 Page = Annotated[
     Path | None,
     typer.Option("--html", "-o", metavar="FILE", help="Write the comparison as one page.", show_default=False),
@@ -42,6 +44,7 @@ def compare(
     context: typer.Context,
     older: Older,
     newer: Newer,
+    more: More = None,
     html: Page = None,
     force: Force = False,
     json: Json = False,
@@ -50,6 +53,11 @@ def compare(
 ) -> None:
     """Compare two missions: faults that are new, worse, better or resolved, and parts that were not assessed."""
     terminal = terminal_of(context, json=json)
+    if more:
+        raise ConfigError(
+            f"{2 + len(more)} results are given, and two are compared; `mfhca audit` on the folder of their logs shows what changes over many "
+            "missions"
+        )
     files = [result_file(path) for path in (older, newer)]
     if html is not None:
         check_output([html], files)

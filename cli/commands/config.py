@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -14,6 +14,10 @@ from diagnosis.api.inputs import machine_of, mission_paths
 from replay.errors import ConfigError
 from replay.progress import Stage
 from replay.setup.preset import Preset
+
+if TYPE_CHECKING:
+    from replay.machine.config import Machine
+    from replay.signals.signal import Signals
 
 app = typer.Typer(
     cls=App,
@@ -75,17 +79,24 @@ def check(
     terminal = terminal_of(context, json=json)
     machine, source = machine_of(file)
     lost: list[str] = []
-    asked: tuple[str, ...] = ()
+    asked, against, doubts = "", tuple[str, ...](), tuple[str, ...]()
     document: dict[str, object] = {"file": str(file), "ok": True, "given_signals": sorted(machine.signals)}
     if log:
         with terminal.progress(Stage.STARTING) as progress:
             from cli.tables.signals import signals_document, signals_parts
-            from replay.mission import read_signals
+            from replay.mission import first_question, read_signals
 
             files, signals = read_signals(mission_paths(log), machine, progress=progress)
         lost = [f"{name}: {signals.missing[name]}" for name in machine.signals if name in signals.missing]
-        asked = signals.questions
-        document |= {"ok": not (lost or asked), "signals": signals_document(files, signals, machine, source)}
+        asked = first_question(signals) if signals.questions else ""
+        if not asked:
+            against, doubts = _contradictions(signals, machine)
+        document |= {
+            "ok": not (lost or asked or against),
+            "signals": signals_document(files, signals, machine, source),
+            "contradicted": list(against),
+            "doubts": list(doubts),
+        }
         if not json:
             terminal.show(*signals_parts(signals, machine))
     if json:
@@ -93,11 +104,28 @@ def check(
     if lost:
         raise ConfigError(f"{file}: {len(lost)} of its signals are not in the log: {'; '.join(lost)}")
     if asked:
-        raise ConfigError(f"{file}: values of the log that cannot be with these units: {'; '.join(asked)}")
+        raise ConfigError(f"{file}: values of the log that cannot be with these units: {asked}")
+    if against:
+        raise ConfigError(f"{file}: the log contradicts it: {'; '.join(against)}")
+    for doubt in doubts:
+        terminal.note(f"to be checked: {doubt}")
     count = len(machine.signals)
     still = sum(line.startswith("# QUESTION: ") for line in file.read_text(encoding="utf-8").splitlines())
     open_ = f" {still} of its comments are questions; remove each when it is answered." if still else ""
     terminal.show(f"{file}: valid. {machine.name}, wheels {', '.join(machine.wheels)}, {count} signals given.{open_}")
+
+
+def _contradictions(signals: Signals, machine: Machine) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """What turns of the machine contradict of the places of its wheels and axles, and doubts about sizes and units."""
+    from replay.setup.body_scale import scale_doubts
+    from replay.setup.places import place_doubts
+    from replay.signals.timeline import align
+
+    wheels = {n: s for w in machine.wheels if (s := signals.items.get(n := f"wheel.{w}.v")) is not None}
+    if not any(len(s.stamps) > 1 for s in wheels.values()):
+        return (), ()
+    line = align(signals)
+    return place_doubts(line, machine), scale_doubts(line, machine, wheels)
 
 
 def show(context: typer.Context, machine: MachineFile = None, quiet: Quiet = False, verbose: Verbose = False) -> None:

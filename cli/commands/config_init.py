@@ -94,4 +94,8 @@ def _show(terminal: Terminal, draft: Draft, name: Path, logs: Sequence[Path]) ->
     if draft.questions:
         terminal.show(section("To be checked in the file"), bullets(draft.questions, "yellow"))
     terminal.show(section("Next"))
-    terminal.show_text(f"  mfhca diagnose {words} -m {shlex.quote(str(name))}\n")
+    file = shlex.quote(str(name))
+    if logs:
+        each = " ".join(f"--log {shlex.quote(str(log))}" for log in logs)
+        terminal.show_text(f"  mfhca config check {file} {each}\n")
+    terminal.show_text(f"  mfhca diagnose {words} -m {file}\n")

@@ -24,7 +24,9 @@ Examples:
 Missions = Annotated[
     list[str],
     typer.Argument(
-        metavar="LOG...", help="Healthy missions of one machine: one log each; folders, globs.", show_default=False
+        metavar="LOG...",
+        help="Healthy missions of one machine; folders, globs. Tables that begin and end together are one mission.",
+        show_default=False,
     ),
 ]
 Output = Annotated[
@@ -60,12 +62,17 @@ def fit(
             raise ConfigError(f"{output}: exists and was not changed; give another name, or --force to replace it")
     with terminal.progress(Stage.STARTING) as progress:
         from diagnosis.fitting.document import fit_document, fit_toml
+        from diagnosis.fitting.files import missions_of_files
         from diagnosis.fitting.missions import fit_missions
         from replay.atomic_write import atomic_path
         from replay.mission import load_mission
 
-        missions = [load_mission([path], the_machine, progress=progress) for path in found.paths]
+        groups = missions_of_files(found.paths)
+        missions = [load_mission(files, the_machine, progress=progress) for files in groups]
         result = fit_missions(missions, the_machine, progress=progress)
+    for files in groups:
+        if len(files) > 1:
+            terminal.note(f"one mission: {', '.join(str(f) for f in files)}")
     for error in result.unit_errors:
         terminal.note(f"unit error: {error.text}")
     if not json:

@@ -85,13 +85,17 @@ class AuditRequest:
     def found(self) -> tuple[Discovery, AuditOptions]:
         """Missions, and how each is to be diagnosed."""
         from diagnosis.audit.discovery.discover import discover
+        from diagnosis.audit.discovery.machine_files import with_machine_files
         from diagnosis.audit.isolation.limits import Limits, usual_memory_mb
         from diagnosis.audit.plan import AuditOptions, machine_notes
 
-        missions = discover(self.words, exclude=self.output)
+        found = discover(self.words, exclude=self.output)
         memory = self.memory_mb or (usual_memory_mb(self.at_once) if self.dask is None else Limits.memory_mb)
         limits = Limits(memory, self.timeout_s, self.cpu_s)
         asked = AuditOptions(
             self.output, self.machine, self.machine_id or "", limits, self.retries, self.resume, self.max_size_mb
         )
-        return replace(missions, notes=(*missions.notes, *machine_notes(missions.missions, asked))), asked
+        missions, told = found.missions, machine_notes(found.missions, asked)
+        if self.machine is None:
+            missions, told = with_machine_files(found.missions, asked.machine_id)
+        return replace(found, missions=missions, notes=(*told, *found.notes)), asked

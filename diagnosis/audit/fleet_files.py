@@ -17,7 +17,7 @@ from diagnosis.audit.fleet.first_seen import first_seen_times, newest_result_ns,
 from diagnosis.audit.fleet.fleet_types import FleetDocument
 from diagnosis.audit.fleet.gather import machines_of
 from diagnosis.audit.fleet.news import first_runs
-from diagnosis.audit.fleet.read import Mission, content_mark, fleet_repairs, read_missions, read_run
+from diagnosis.audit.fleet.read import Mission, content_mark, fleet_repairs, read_missions, read_notes, read_run
 from diagnosis.audit.fleet.runs import Limits
 from diagnosis.audit.fleet.table import fleet_csv
 from diagnosis.audit.fleet.trend_types import Axis
@@ -153,7 +153,8 @@ def load_fleet(store_path: Path, out: Path | None = None, axis: Axis = "hours") 
             fleet_repairs(store_path),
         )
         fleet = fleet_of(machines, missions, axis, unknown)
-        return replace(fleet, run=read_run(store_path), made_ns=newest_result_ns(place, missions), copies=copies)
+        made_ns, notes = newest_result_ns(place, missions), read_notes(store_path)
+        return replace(fleet, run=read_run(store_path), made_ns=made_ns, notes=notes, copies=copies)
 
 
 def fleet_json(fleet: Fleet, baseline: Path | None = None) -> FleetDocument:

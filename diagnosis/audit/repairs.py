@@ -121,8 +121,13 @@ def _meant(words: str, fleet: Fleet, repaired_ns: int) -> tuple[Machine, Repair]
     parts = (words if said is None else said.string[: said.start()]).split()
     if len(parts) < 2:
         raise ConfigError(f"--repaired {words!r}: {_EXPECTED}")
-    name, part = " ".join(parts[:-1]), parts[-1]
-    machines = [m for m in fleet.machines if name.casefold() in (m.id.casefold(), m.label.casefold())]
+    name, part, machines = " ".join(parts[:-1]), parts[-1], list[Machine]()
+    for k in range(len(parts) - 1, 0, -1):  # the rest is a part, known or not
+        called = " ".join(parts[:k])
+        machines = [m for m in fleet.machines if called.casefold() in (m.id.casefold(), m.label.casefold())]
+        if machines:
+            name, part = called, " ".join(parts[k:])
+            break
     if len(machines) != 1:
         known = ", ".join(m.label for m in fleet.machines[:_NAMED]) + (" …" if len(fleet.machines) > _NAMED else "")
         what = f"{len(machines)} machines are called so" if machines else "no such machine"
@@ -167,6 +172,12 @@ def _closed(machine: Machine, repair: Repair, known: Sequence[Repair]) -> tuple[
     own = [repair, *(r for r in known if r.machine == repair.machine)]
     for f in machine.faults:
         start = f.last.result.start_ns
+        if (
+            f.status == "past"
+            and start is not None
+            and (f.component, start < repair.repaired_ns) == (repair.component, True)
+        ):
+            closes.append(f"{fault_words(f, machine.limits.words)}, which was not seen any more")
         if not f.standing or start is None or f.component != repair.component:
             continue
         if repair.side and repair.side not in Side(f.side).sides:

@@ -129,7 +129,7 @@ def _begin(
 ) -> tuple[list[Planned], list[Planned], list[Planned]]:
     """Begin a run of the store: all missions, those that are done, and the rest."""
     sweep(options.output)
-    store.begin_run()
+    store.begin_run((*discovery.problems, *discovery.notes))
     taken = ingest(store)
     if taken.attempts or taken.links or taken.problems:
         emit("ingested", {"attempts": taken.attempts, "links": taken.links, "problems": list(taken.problems)})

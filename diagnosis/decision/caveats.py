@@ -54,6 +54,8 @@ class Reservations:
         What happened to the machine as a whole.
     hints : tuple[str, ...]
         Signals that fit another sign, unit or place better.
+    misplaced : tuple[str, ...]
+        Wheels and axles that are elsewhere than the machine file says; `hints` has them in words.
     words : MachineWords
         How to speak of the machine.
     open_state : Mapping[Part, State]
@@ -68,6 +70,7 @@ class Reservations:
     scope: tuple[str, ...] = ()
     events: tuple[MachineEvent, ...] = ()
     hints: tuple[str, ...] = ()
+    misplaced: tuple[str, ...] = ()
     words: MachineWords = HYDRAULIC
     open_state: Mapping[Part, State] = field(default_factory=dict)
 

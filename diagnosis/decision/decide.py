@@ -18,7 +18,7 @@ from diagnosis.decision.caveats import (
 )
 from diagnosis.decision.short import ToClear
 from diagnosis.decision.to_clear import to_clear
-from diagnosis.decision.wording import actions_of, count_faults, join_words, seconds_words, sentence_of
+from diagnosis.decision.wording import actions_of, count_faults, join_words, misplaced_words, seconds_words, sentence_of
 from diagnosis.results.assessed import needed_s
 from diagnosis.results.assessment import STATES, Assessment
 from diagnosis.results.clearing import Check, Checked
@@ -108,6 +108,7 @@ def decide(
     scope: Sequence[str] = (),
     events: Sequence[MachineEvent] = (),
     hints: Sequence[str] = (),
+    misplaced: Sequence[str] = (),
     open_state: Mapping[Part, State] | None = None,
     shown: Sequence[Detectable] = (),
 ) -> Decision:
@@ -147,6 +148,8 @@ def decide(
         What happened to the machine as a whole and is no part's fault.
     hints : Sequence[str]
         Signals that fit another sign, unit or place better over the whole mission.
+    misplaced : Sequence[str]
+        Wheels and axles that are elsewhere than the machine file says, or have the wrong sign.
     open_state : Mapping or None
         The commonest state of each part that is no judgement, while driving.
     shown : Sequence[Detectable]
@@ -162,7 +165,8 @@ def decide(
         open=tuple(c for c in checks if not c.passed),
         scope=tuple(scope),
         events=tuple(events),
-        hints=tuple(hints),
+        hints=(*(misplaced_words(m) for m in misplaced), *hints),
+        misplaced=tuple(misplaced),
         open_state=open_state or {},
     )
     open_points = to_clear(against, assessments, decided_s, driven, axles, limits, intervals)
@@ -232,14 +236,15 @@ def _with_faults(intervals: Sequence[FaultInterval], against: Reservations) -> D
     """The verdict where a fault is worth an action."""
     stop = [f for f in intervals if f.severity is Severity.HIGH]
     watch = [f for f in intervals if f.severity in (Severity.MEDIUM, Severity.LOW)]
+    first = "".join(f"{misplaced_words(m)} " for m in against.misplaced[:1])
     if stop:
-        return Decision(Verdict.STOP, count_faults(stop, watch), sentence_of(intervals, against.words))
+        return Decision(Verdict.STOP, count_faults(stop, watch), first + sentence_of(intervals, against.words))
     if watch:
         doubt = doubt_of(watch, against)
         return Decision(
             Verdict.WATCH,
             count_faults((), watch),
-            sentence_of(intervals, against.words),
+            first + sentence_of(intervals, against.words),
             cleared=not doubt,
             not_cleared=doubt,
         )

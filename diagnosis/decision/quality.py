@@ -112,6 +112,7 @@ def checks(
     words: MachineWords,
     clocks: Sequence[SourceClock] = (),
     scale: Scale | None = None,
+    misplaced: Sequence[str] = (),
 ) -> list[QualityRow]:
     """Checks of the data with their effect on the verdict."""
     return [
@@ -126,6 +127,7 @@ def checks(
         _gap_check(found.rows),
         *_guessed(signals),
         *([_row("Scale of speeds", *scale.result)] if scale is not None else []),
+        *(_row("Places of wheels", f"{text}.", "the wrong part may be blamed", False) for text in misplaced),
         *_wheel_model(model, words),
         *(_row("Clock", clock.sentence, *_effect_of(clock)) for clock in clocks if clock.sentence),
         *_notes((*signals.notes, *timeline.notes, *notes), clocks),

@@ -155,6 +155,11 @@ def count_words(n: int, word: str) -> str:
     return f"{n} {word}" + ("" if n == 1 else "s")
 
 
+def misplaced_words(doubt: str) -> str:
+    """What turns contradict of the machine file, in a sentence that comes before any fault: the wrong part may be named."""
+    return f"The log contradicts the machine file: {doubt}. Correct it before any part is looked at: another one may be meant."
+
+
 def join_words(words: Sequence[str]) -> str:
     """Words joined by commas and “and”; empty for none."""
     return words[0] if len(words) == 1 else ", ".join(words[:-1]) + " and " + words[-1] if words else ""

@@ -171,7 +171,7 @@ def _as_beside(finding: Finding, all_of_them: Sequence[Finding], found: Identifi
     ):
         return finding
     both = 2 * likely if still else likely + p[finding.mode]
-    p |= {finding.mode: (1.0 - _SAME_P) * both, FaultMode.INEFFICIENT: _SAME_P * both}
+    p |= {FaultMode.STUCK if still else finding.mode: (1.0 - _SAME_P) * both, FaultMode.INEFFICIENT: _SAME_P * both}
     bounds = f"(95 %: {1 - lost - _ONE_GAIN:.3f} to {1 - lost + _ONE_GAIN:.3f})"
     said = (e for e in finding.evidence if OF_SAT not in e)
     return replace(

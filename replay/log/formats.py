@@ -35,7 +35,7 @@ class LogFormatRow(NamedTuple):
 _TABLES = "replay.readers.tables"
 LOG_FORMATS = (
     LogFormatRow("mcap", "MCAP", "replay.readers.mcap.reader:McapReader", "messages", (".mcap",)),
-    LogFormatRow("bag", "ROS 1 bag", "replay.readers.rosbag1.reader:Ros1BagReader", "messages", (".bag",)),
+    LogFormatRow("bag", "ROS 1 bag", "replay.readers.rosbag1.reader:Ros1BagReader", "messages", (".bag", ".bag.active")),
     LogFormatRow(
         "rosbag2", "rosbag2 (folder, .db3)", "replay.readers.rosbag2.reader:Rosbag2Reader", "messages",
         (".db3", ".mcap.zstd", ".db3.zstd"),

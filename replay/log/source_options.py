@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from replay.errors import ConfigError, check_range
+from replay.log.time_zone import zone_called
 
 StampClock = Literal["header", "log", "publish"]
 
@@ -24,6 +25,8 @@ class SourceOptions:
         DATE_AND_TIME, whole seconds: the samples of one second are spread evenly over it).
     epoch : str or None
         ISO date and time of zero of the time column; None: 1970 (2000 for ``dc`` and ``dc32``).
+    time_zone : str or None
+        In which dates are meant that state no zone: ``Europe/Berlin``, ``UTC``, ``+02:00``; None: UTC.
     separator, decimal : str or None
         Of a text table; None: found from the file.
     scale : bool
@@ -40,6 +43,7 @@ class SourceOptions:
     time: str | None = None
     time_unit: str = "s"
     epoch: str | None = None
+    time_zone: str | None = None
     separator: str | None = None
     decimal: str | None = None
     scale: bool = False
@@ -55,6 +59,8 @@ class SourceOptions:
                 f"[sources] time_unit = {self.time_unit!r} is not known; expected s, ms, us, ns, filetime, iso, dc, dc32 "
                 "or dt"
             )
+        if self.time_zone is not None:
+            zone_called(self.time_zone)
         if self.stamp not in ("header", "log", "publish"):
             raise ConfigError(f"[sources] stamp = {self.stamp!r} is not known; expected header, log or publish")
         if self.clock not in ("estimate", "as recorded"):

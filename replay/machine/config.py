@@ -233,7 +233,7 @@ class Machine:
             object.__setattr__(self, "geometry", replace(self.geometry, wheels=places))
         check_range("geometry.gear_ratio", self.gear_ratio, 1e-3, 1e4, "")
         check_range("geometry.max_speed", self.max_speed, 1e-6, 1e6, self.speed_unit)
-        check_range("geometry.max_steer", self.max_steer, 0.0, 3.2, "rad", mistaken=DEGREES)
+        check_range("geometry.max_steer", self.max_steer, 0.0, 3.2, "rad", mistaken=(DEGREES,))
         self._check_drives()
         for section, names in (("signals", self.signals), ("noise", self.noise)):
             for name in names:

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from replay.errors import check_range
-from replay.machine.quantities import MILLIMETRES
+from replay.machine.quantities import LENGTHS
 
 
 @dataclass(frozen=True)
@@ -43,11 +43,11 @@ class Geometry:
 
     def __post_init__(self) -> None:
         """Check lengths."""
-        check_range("geometry.wheel_diameter", self.wheel_diameter, 0.02, 5.0, "m", mistaken=MILLIMETRES)
+        check_range("geometry.wheel_diameter", self.wheel_diameter, 0.02, 5.0, "m", mistaken=LENGTHS)
         for name, w in self.wheels.items():
             for key, value in (("x", w.x), ("y", w.y)):
-                check_range(f"geometry.{name}.{key}", value, -20.0, 20.0, "m", mistaken=MILLIMETRES)
-            check_range(f"geometry.{name}.offset", w.offset, -2.0, 2.0, "m", mistaken=MILLIMETRES)
+                check_range(f"geometry.{name}.{key}", value, -20.0, 20.0, "m", mistaken=LENGTHS)
+            check_range(f"geometry.{name}.offset", w.offset, -2.0, 2.0, "m", mistaken=LENGTHS)
 
     @property
     def axles(self) -> tuple[str, ...]:
@@ -76,8 +76,8 @@ class Geometry:
 
 def four_wheel_geometry(wheelbase: float, joint_spacing: float, wheel_diameter: float, wheel_offset: float) -> Geometry:
     """Four steered wheels FR, FL, RR, RL on a front and a rear axle; all lengths in m. Lengths [m]."""
-    check_range("geometry.wheelbase", wheelbase, 0.05, 40.0, "m", mistaken=MILLIMETRES)
-    check_range("geometry.joint_spacing", joint_spacing, 0.05, 20.0, "m", mistaken=MILLIMETRES)
+    check_range("geometry.wheelbase", wheelbase, 0.05, 40.0, "m", mistaken=LENGTHS)
+    check_range("geometry.joint_spacing", joint_spacing, 0.05, 20.0, "m", mistaken=LENGTHS)
     half, side = wheelbase / 2, joint_spacing / 2
     return Geometry(
         wheels={

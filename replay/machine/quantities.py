@@ -46,3 +46,5 @@ OPENING = "of full opening"
 #: Units that lengths and angles of a machine file are given in by mistake, with the factor to SI.
 DEGREES = ("degrees", math.pi / 180)
 MILLIMETRES = ("millimetres", 1e-3)
+CENTIMETRES = ("centimetres", 1e-2)
+LENGTHS = (MILLIMETRES, CENTIMETRES)

@@ -57,7 +57,7 @@ def radius_by_body(
         mean = np.mean([_forward(found.items[n], origins, at) for n in names], axis=0)
         if name == "gnss.speed":
             mean = np.abs(mean)
-        gain = _gain(mean, held(body, at))
+        gain = gain_of(mean, held(body, at))
         if gain is not None and gain > 0.0:
             return Measured(gain, by)
     return None
@@ -90,7 +90,7 @@ def track_by_yaw(
         return None
     at = _moments([yaw, *sides[0], *sides[1]])
     left, right = (np.mean([_forward(s, origins, at) for s in side], axis=0) for side in sides)
-    gain = _gain(held(yaw, at), radius * (right - left))
+    gain = gain_of(held(yaw, at), radius * (right - left))
     return Measured(abs(gain), "the yaw rate") if gain is not None else None
 
 
@@ -113,7 +113,7 @@ def base_by_yaw(found: Signals, base: float) -> Measured | None:
     if yaw is None or asked is None or not is_steering_command(asked):
         return None
     at = _moments([yaw, asked])
-    gain = _gain(held(yaw, at), base * held(asked, at))
+    gain = gain_of(held(yaw, at), base * held(asked, at))
     return Measured(gain, "the yaw rate beside commanded speed and steering angle") if gain is not None else None
 
 
@@ -129,16 +129,24 @@ def _moments(signals: Sequence[Signal]) -> NDArray[np.int64]:
     return np.arange(first, last, round(_STEP_S * 1e9), dtype=np.int64)
 
 
-def _gain(x: Array, y: Array) -> float | None:
-    """Share of x that y is, by least trimmed squares at the delay that fits best; None where y is no share of x."""
-    most = round(_MOST_S / _STEP_S)
+def gain_of(x: Array, y: Array, step_s: float = _STEP_S) -> float | None:
+    """Share of x that y is, by least trimmed squares at the delay that fits best; None where y is no share of x.
+
+    Parameters
+    ----------
+    x, y : NDArray[np.float64], shape (n,)
+        In one unit.
+    step_s : float
+        Between two samples [s].
+    """
+    most = round(_MOST_S / step_s)
     best: tuple[float, float] | None = None
     for late in range(-most, most + 1):
         a, b = (x[: x.size - late], y[late:]) if late >= 0 else (x[-late:], y[:late])
         known = np.isfinite(a) & np.isfinite(b)
         a, b = a[known], b[known]
         moving = np.abs(a) > _MOVES * float(np.quantile(np.abs(a), 0.95)) if a.size else np.zeros(0, np.bool_)
-        if np.count_nonzero(moving) * _STEP_S < _LEAST_S:
+        if np.count_nonzero(moving) * step_s < _LEAST_S:
             continue
         a, b = a[moving], b[moving]
         kept = np.ones(a.size, np.bool_)

@@ -9,10 +9,12 @@ from pathlib import PurePath
 
 from replay.log.raw_log import Channel, RawLog
 from replay.log.source_options import SignalSource, SourceOptions
+from replay.log.time_zone import NO_ZONE
 from replay.machine.geometry import own_axle
 from replay.setup.draft_notes import Draft
 from replay.setup.structure import ONE, Structure
 
+_DATED = 10**18  # ns; stamps before are of a clock without a date
 _JOINT_TYPES = ("JointState", "DynamicJointState")
 
 
@@ -86,11 +88,18 @@ def _command(channels: Mapping[str, Channel]) -> SignalSource | None:
 
 
 def table_sources(logs: Sequence[RawLog], draft: Draft) -> dict[str, SourceOptions]:
-    """Several tables with dated stamps are taken to come from one recorder."""
+    """Several tables with dated stamps are taken to come from one recorder; the zone of dates that state none is asked for."""
     tables = [log for log in logs if all(not c.topic for c in log.channels.values())]
-    if len(tables) < 2 or any(t.summary.start_ns < 10**18 for t in tables):
-        return {}
-    draft.ask(
-        "sources", "were all tables stamped by one computer? It is taken so; else remove clock, and it is estimated."
-    )
-    return {f"*{PurePath(tables[0].source).suffix}": SourceOptions(clock="as recorded")}
+    options = SourceOptions()
+    if len(tables) > 1 and all(t.summary.start_ns >= _DATED for t in tables):
+        draft.ask(
+            "sources",
+            "were all tables stamped by one computer? It is taken so; else remove clock, and it is estimated.",
+        )
+        options = replace(options, clock="as recorded")
+    if any(NO_ZONE in note for log in tables for note in log.summary.notes):
+        draft.ask(
+            "sources", "in which time zone are the dates? They state none; UTC is written, Europe/Berlin is another."
+        )
+        options = replace(options, time_zone="UTC")
+    return {} if options == SourceOptions() else {f"*{PurePath(tables[0].source).suffix}": options}

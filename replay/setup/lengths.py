@@ -89,6 +89,11 @@ def wheel_radius(
             "how large are the wheels? Nothing in the log tells it; 0.1 m radius stands in, and with it every speed. If the motors' "
             'turns were logged, add gear_ratio here, and at = "motor" to the speeds below.',
         )
+    elif not bare and any(f"wheel.{w}.v" in origins for w in structure.wheels):
+        draft.say(
+            "geometry",
+            f"wheel_diameter = {2 * _STANDS_IN_RADIUS:g} stands in: the log has speeds of the rim, and only rotations need it.",
+        )
     return _STANDS_IN_RADIUS
 
 

@@ -21,6 +21,11 @@ _LONG = {
     "izq": "left", "derecha": "right", "derecho": "right", "central": "middle", "centrale": "middle",
     "anteriore": "front", "posteriore": "rear", "sinistra": "left", "sinistro": "left", "sx": "left", "destra": "right",
     "destro": "right", "dx": "right", "dianteira": "front", "dianteiro": "front", "traseira": "rear", "traseiro": "rear",
+    "voor": "front", "achter": "rear", "fram": "front", "bak": "rear", "vanster": "left", "vaenster": "left", "hoger": "right",
+    "hoeger": "right", "foran": "front", "bagest": "rear", "venstre": "left", "hojre": "right", "hoejre": "right", "hoyre": "right",
+    "hoeyre": "right", "etu": "front", "taka": "rear", "vasen": "left", "oikea": "right", "przednie": "front", "przedni": "front",
+    "przednia": "front", "przod": "front", "tylne": "rear", "tylny": "rear", "tylna": "rear", "tyl": "rear", "lewe": "left",
+    "lewy": "left", "lewa": "left", "prawe": "right", "prawy": "right", "prawa": "right", "tras": "rear",
     "esquerda": "left", "esquerdo": "left", "direita": "right", "direito": "right", "meio": "middle", "milieu": "middle",
 }  # fmt: skip
 _PAIRS = {
@@ -36,7 +41,8 @@ _OF_STEERING = _ANGLES | {"valve", "vlv", "ventil"}  # beside which str is no te
 _FRENCH = frozenset(("av", "ar", "avant", "arriere"))
 _STEER = re.compile(r"steer|lenk|kingpin|azimuth|swivel|knuckle|braquage|sterz|direccion(?!al)")
 _DRIVE = re.compile(
-    r"wheel|drive|(?<![a-z])drv|motor|rad(?![a-z]|_?s(?![a-z])|/)|traction|hub|antrieb|roue|moteur|rueda|ruota|roda(?![a-z])"
+    r"wheel|drive|(?<![a-z])drv|motor|rad(?![a-z]|_?s(?![a-z])|/)|traction|hub|antrieb|roue|moteur|rueda|ruota|roda(?![a-z])|"
+    r"wiel|hjul|pyora|pyoera|(?<![a-z])kolo(?![a-z])"
 )
 _LOOSE = re.compile(r"(?<![A-Za-z0-9])[fblr](?![A-Za-z0-9])")
 _NO_DRIVE = re.compile(r"castor|caster|arm|grip|finger|flipper|head|neck|elbow|shoulder|wrist|hip|knee|lift|torso")

@@ -11,9 +11,24 @@ from functools import lru_cache
 _PREFIX = re.compile(r"(?<![A-Za-z])(?:lr|fb|st|ar|[abefgimnprstuwx])(?=[A-Z][a-z])")
 # Words of a place that are written as one.
 _JOINED = re.compile(
-    r"(?i)(front|rear|back|middle|mid|vorne|vorn|hinten|left|right|links|rechts)(?=left|right|links|rechts|front|rear|back|wheel|rad)"
+    r"(?i)(front|rear|back|middle|mid|vorne|vorn|hinten|left|right|links|rechts|voor|achter|etu|taka)"
+    r"(?=left|right|links|rechts|front|rear|back|wheel|rad|voor|achter|wiel|vasen|oikea|pyora|pyoera)"
 )
-_UMLAUTS = str.maketrans({"ä": "ae", "ö": "oe", "ü": "ue", "ß": "ss", "Ä": "Ae", "Ö": "Oe", "Ü": "Ue"})
+_UMLAUTS = str.maketrans(
+    {
+        "ä": "ae",
+        "ö": "oe",
+        "ü": "ue",
+        "ß": "ss",
+        "Ä": "Ae",
+        "Ö": "Oe",
+        "Ü": "Ue",
+        "ø": "oe",
+        "Ø": "Oe",
+        "ł": "l",
+        "Ł": "L",
+    }
+)
 # German words that are written together: Lenkwinkel, Istdrehzahl, Vorderachse.
 _PARTS = (
     "geschwindigkeit", "geschw", "drehzahl", "drehmoment", "drehrate", "gierrate", "gier", "winkel", "lenkung", "lenk",
@@ -24,11 +39,11 @@ _PARTS = (
 _TOGETHER = re.compile(rf"(?:{'|'.join(_PARTS)})+")
 _PART = re.compile("|".join(sorted(_PARTS, key=len, reverse=True)))
 _MEANINGS = {
-    "ref": "soll sollwert vorgabe vorg consigne cons",
+    "ref": "soll sollwert vorgabe vorg consigne cons ohje gewenst",
     "cmd": "ansteuerung commande",
     "act": "ist istwert mess messwert gemessen rueckmeldung mesure mesuree mes reel reelle",
-    "speed": "geschwindigkeit geschw vitesse vit spd speeds velocities velocidad velocidade velocita",
-    "rpm": "drehzahl regime",
+    "speed": "geschwindigkeit geschw vitesse vit spd speeds velocities velocidad velocidade velocita snelheid hastighet hastighed nopeus predkosc",
+    "rpm": "drehzahl regime toerental varvtal",
     "angle": "winkel ang",
     "steer": "lenk lenkung braquage strg sterzo",
     "valve": "ventil vanne distributeur vlv",
@@ -37,7 +52,7 @@ _MEANINGS = {
     "current": "strom courant curr",
     "voltage": "spannung tension",
     "press": "druck pression",
-    "wheel": "roue rueda ruota roda",
+    "wheel": "roue rueda ruota roda wiel hjul pyora pyoera kolo",
     "drive": "antrieb drv",
     "motor": "moteur motore",
     "axle": "achse achs essieu",

@@ -108,6 +108,9 @@ def _too_fast(signal: str, values: NDArray[np.float64], peak: float, origin: Sig
         motor = signal_line(signal, replace(origin, at="motor"))
         text += f'; it is probably measured at the motor (gear ratio {gear:g}): set at = "motor"'
         return Doubt(signal, text, motor, impossible)
+    if turns and origin.at == "motor" and gear == 1.0:
+        text += "; it is measured at the motor, and gear_ratio is 1: give turns of the motor per turn of the wheel"
+        return Doubt(signal, text, f"[geometry] gear_ratio = {times:.2g} or so", impossible)
     fitting = _fitting_speed(signal, peak, origin, machine) if impossible else ""
     other = f", or [geometry] max_speed = {_rounded_up(peak)} if the machine is that fast"
     line = f"{fitting}{other}" if fitting else f"[geometry] max_speed = {_rounded_up(peak)}"

@@ -28,6 +28,9 @@ _CALL = (
 )
 
 
+_Answer = tuple[int, int, list[str], bool, str, list[str]]
+
+
 class Span(NamedTuple):
     """What of a log's index tells whether another goes on where it ended.
 
@@ -41,6 +44,8 @@ class Span(NamedTuple):
         Whether its index accounts for the whole file.
     format : str
         Format of its reader.
+    columns : frozenset[str]
+        Names of a table's columns; none of a message log.
     """
 
     start_ns: int
@@ -48,12 +53,14 @@ class Span(NamedTuple):
     topics: frozenset[str]
     clean: bool = True
     format: str = ""
+    columns: frozenset[str] = frozenset()
 
 
 def span_of(summary: LogSummary) -> Span:
     """Span of a summarised log."""
     names = frozenset(t.name for t in summary.topics)
-    return Span(summary.start_ns, summary.stop_ns, names, not summary.damage, summary.format)
+    columns = frozenset(f for t in summary.topics if t.encoding == "table" for f in t.fields)
+    return Span(summary.start_ns, summary.stop_ns, names, not summary.damage, summary.format, columns)
 
 
 class Helper:
@@ -83,10 +90,10 @@ class Helper:
             answer = self._ask(path)
         if isinstance(answer, str):
             raise LogError(answer)
-        start, stop, topics, clean, kind = answer
-        return Span(start, stop, frozenset(topics), clean, kind)
+        start, stop, topics, clean, kind, columns = answer
+        return Span(start, stop, frozenset(topics), clean, kind, frozenset(columns))
 
-    def _ask(self, path: str) -> tuple[int, int, list[str], bool, str] | str:
+    def _ask(self, path: str) -> _Answer | str:
         if self._process is not None and self._process.poll() is not None:
             self.close()
         process = self._process = self._process or self._started()
@@ -98,7 +105,7 @@ class Helper:
         ready, _, _ = select.select([process.stdout], [], [], self._wait_s)
         line = process.stdout.readline() if ready else b""
         if line.endswith(b"\n"):
-            found: tuple[int, int, list[str], bool, str] | str = json.loads(line)
+            found: _Answer | str = json.loads(line)
             return found
         self.close()
         why = f"ended with code {process.returncode}" if ready else f"took longer than {self._wait_s:g} s"
@@ -148,7 +155,7 @@ def _answer(path: str, answers: IO[bytes]) -> None:
     found: object
     try:
         span = span_of(summarise_log(Path(path), SourceOptions()))
-        found = span.start_ns, span.stop_ns, sorted(span.topics), span.clean, span.format
+        found = span.start_ns, span.stop_ns, sorted(span.topics), span.clean, span.format, sorted(span.columns)
     except (LogError, MemoryError) as error:
         found = str(error) or "it needs more memory than there is for an index"
     answers.write(json.dumps(found).encode() + b"\n")

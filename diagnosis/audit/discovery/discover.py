@@ -11,7 +11,7 @@ from diagnosis.audit.discovery.finder import Finder
 from diagnosis.audit.discovery.missions import MissionSource, named_missions
 from replay.log.file_types import words_of
 
-_SHOWN = 3
+_SHOWN = 12
 
 
 @dataclass(frozen=True)
@@ -75,6 +75,4 @@ def _packed(files: Sequence[str]) -> list[str]:
     if not files:
         return []
     shown = ", ".join(files[:_SHOWN]) + (f" and {len(files) - _SHOWN} more" if len(files) > _SHOWN else "")
-    return [
-        f"not looked into: {shown}; unpack archives, and close a .bag.active with `rosbag reindex`, to have their logs audited"
-    ]
+    return [f"not looked into: {shown}; unpack what holds logs of machines, to have them audited"]

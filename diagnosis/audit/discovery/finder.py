@@ -41,6 +41,7 @@ class Finder:
         self.left_aside = 0
         self.packed: list[str] = []
         self._machines: dict[str, str] = {}
+        self._around: dict[str, str | None] = {}
         self._exclude = exclude
         self._found: list[Unnamed] = []
         self._links: list[Entry] = []
@@ -67,6 +68,7 @@ class Finder:
             hits, typed = [word], True
             if not os.path.lexists(word) and glob.has_magic(word):
                 hits, typed = sorted(glob.glob(word, recursive=True)), False  # noqa: PTH207 - absolute patterns too
+                self.bases += [os.path.realpath(_fixed(word))] if hits else []
             if not hits:
                 self.problems.append(f"{word}: matches no file")
             for hit in hits:
@@ -116,9 +118,25 @@ class Finder:
         for home, held in together.items():
             self.roots += [file.path for file in held.values()]
             self.bases.append(home)
-            beside = place.inside(Entry(home, "", home), MACHINE_FILE)
-            machine = None if beside is None or place.is_folder(beside) else beside.path
+            machine = self._machine_around(place, home)
             self._add(replace(one, machine=machine) for one in missions_of(place, home, list(held.values())))
+
+    def _machine_around(self, place: Place, folder: str) -> str | None:
+        """Path of the ``machine.toml`` in a folder or the closest one around it, searched or not; None where there is none."""
+        passed, found = list[str](), None
+        while folder:
+            if folder in self._around:
+                found = self._around[folder]
+                break
+            passed.append(folder)
+            beside = place.beside(folder, MACHINE_FILE)
+            if beside is not None:
+                found = beside.path
+                break
+            above = place.parent(folder)
+            folder = above if above != folder else ""
+        self._around.update(dict.fromkeys(passed, found))
+        return found
 
     def _follow(self, place: Place, roots: Sequence[str]) -> None:
         """Look through what links to folders lead to, within the given folders, and only what was not looked through."""
@@ -161,7 +179,8 @@ class Finder:
         self.notes += found.notes
         self.left_aside += found.left_aside
         self.packed += found.packed
-        machine = found.machine or self._machines.get(place.parent(folder.path))
+        above = self._machines.get(place.parent(folder.path)) or self._machine_around(place, place.parent(folder.real))
+        machine = found.machine or above
         if machine is not None:
             self._machines[folder.path] = machine
         self._unlisted += found.unread
@@ -175,6 +194,14 @@ class Finder:
         for one in missions:
             home = os.path.basename(os.path.dirname(one.files[0].path)) if self._linked else ""  # noqa: PTH119, PTH120
             self._found.append(replace(one, linked=home))
+
+
+def _fixed(pattern: str) -> str:
+    """The folder in front of the first part of a pattern that is one."""
+    folder = pattern
+    while glob.has_magic(folder):
+        folder = os.path.dirname(folder)  # noqa: PTH120
+    return folder or os.curdir
 
 
 def _below(path: str, folder: str) -> bool:

@@ -14,6 +14,7 @@ from typing import Protocol
 from diagnosis.audit.discovery.apart import HELPER, Span
 from replay.errors import LogError
 from replay.readers.registry import readers
+from replay.signals.together import Extent
 
 _PAUSE_NS = 5_000_000_000
 _OVERLAP_NS = 2_000_000_000
@@ -66,6 +67,10 @@ class Place(Protocol):
         """File or folder by its name relative to a folder, unless it is outside of it or not there."""
         ...
 
+    def beside(self, folder: str, name: str) -> Entry | None:
+        """File by its name in a folder that need not be searched; None where it is not there, or the folder is for temporary files."""
+        ...
+
     def is_folder(self, entry: Entry) -> bool:
         """Whether it is a folder."""
         ...
@@ -84,6 +89,10 @@ class Place(Protocol):
 
     def continuous(self, parts: Sequence[Entry]) -> bool:
         """Whether each of some logs goes on where the one before ended, with the same topics."""
+        ...
+
+    def extent(self, table: Entry) -> Extent | None:
+        """When a table begins and ends, and its columns; None where that is not known."""
         ...
 
     def is_log(self, file: Entry) -> bool:
@@ -142,6 +151,17 @@ class LocalPlace:
             return None
         return found if found.real.startswith(folder.real.rstrip(os.sep) + os.sep) else None
 
+    def beside(self, folder: str, name: str) -> Entry | None:
+        """File in any folder but one that everybody puts files into, such as ``/tmp``."""
+        try:
+            mode = os.stat(folder).st_mode  # noqa: PTH116
+            if mode & stat.S_IWOTH and mode & stat.S_ISVTX:
+                return None
+            found = self.entry(os.path.join(folder, name))  # noqa: PTH118
+        except (OSError, ValueError):
+            return None
+        return found if self.is_file(found) else None
+
     def is_folder(self, entry: Entry) -> bool:
         """Whether it is a folder."""
         return os.path.isdir(entry.path)  # noqa: PTH112
@@ -174,6 +194,14 @@ class LocalPlace:
             return continues(HELPER.span(part.path) for part in parts)
         except LogError:
             return False
+
+    def extent(self, table: Entry) -> Extent | None:
+        """When a table begins and ends, by its first and last rows."""
+        try:
+            span = HELPER.span(table.path)
+        except LogError:
+            return None
+        return Extent(span.start_ns, span.stop_ns, span.columns)
 
     def is_log(self, file: Entry) -> bool:
         """Whether a reader knows the content."""

@@ -8,7 +8,9 @@
    (`diagnosis.audit.discovery.bag_folders`);
 3. numbered parts (``drive_0.mcap``, ``drive_1.mcap``, …) are one recording where each goes on where the one before ended;
 4. tables (CSV, Parquet, …) are part of the mission of the recording with the same stem, where there is one such recording;
-5. any other log is a mission by itself.
+5. tables whose names differ in one word, which begin and end together and hold other columns, are one mission
+   (`replay.signals.together`);
+6. any other log is a mission by itself.
 
 Results of audits and reports, and what is hidden, are no logs.
 
@@ -42,6 +44,7 @@ from diagnosis.audit.discovery.numbered_parts import missing_parts, split_record
 from diagnosis.audit.discovery.safe_names import unique_names
 from replay.errors import ConfigError
 from replay.log.file_types import TABLE_ENDINGS, split_ending
+from replay.signals.together import tables_together
 
 _METADATA = "metadata.yaml"
 _STORE = "fleet.sqlite"
@@ -50,8 +53,8 @@ _AUDIT_FILES = ("fleet.csv", "failures.txt")
 _REPORT = {"report.json", "report.parquet"}
 _REPORT_TABLES = ("report.parquet", "report.windows.parquet")
 _CLIPS = "clips"
-#: Files that may hold logs and cannot be read as they are: archives, and ROS 1 bags that were not closed.
-_PACKED = (".zip", ".7z", ".rar", ".tar", ".tgz", ".tar.gz", ".tar.xz", ".tar.zst", ".bag.active")
+#: Files that may hold logs and cannot be read as they are.
+_PACKED = (".zip", ".7z", ".rar", ".tar", ".tgz", ".tar.gz", ".tar.xz", ".tar.zst")
 MACHINE_FILE = "machine.toml"
 _URL = re.compile(r"([A-Za-z][A-Za-z0-9+.:-]*)://")
 
@@ -148,7 +151,7 @@ def missions_in(
 
 
 def missions_of(place: Place, folder: str, files: Sequence[Entry], recordings: Sequence[Entry] = ()) -> list[Unnamed]:
-    """Missions of the logs of one folder: rules 3 to 5.
+    """Missions of the logs of one folder: rules 3 to 6.
 
     Parameters
     ----------
@@ -174,7 +177,23 @@ def missions_of(place: Place, folder: str, files: Sequence[Entry], recordings: S
     for stem, group in recorded:
         beside = tables.pop(stem, []) if count[stem] == 1 else []
         out.append(Unnamed(folder, stem, (*group, *beside)))
-    return out + [Unnamed(folder, stem, (table,)) for stem, alone in tables.items() for table in alone]
+    return out + _of_tables(place, folder, [(stem, table) for stem, alone in tables.items() for table in alone])
+
+
+def _of_tables(place: Place, folder: str, tables: Sequence[tuple[str, Entry]]) -> list[Unnamed]:
+    """Missions of tables that are no part of a recording's: rules 5 and 6."""
+    out = []
+    for ending in dict.fromkeys(split_ending(table.name)[1] for _, table in tables):
+        own = [one for one in tables if split_ending(one[1].name)[1] == ending]
+        out += _of_one_ending(place, folder, own)
+    return out
+
+
+def _of_one_ending(place: Place, folder: str, tables: Sequence[tuple[str, Entry]]) -> list[Unnamed]:
+    groups = tables_together([stem for stem, _ in tables], lambda k: place.extent(tables[k][1]))
+    taken = {k for _, group in groups for k in group}
+    out = [Unnamed(folder, shared, tuple(tables[k][1] for k in group)) for shared, group in groups]
+    return out + [Unnamed(folder, stem, (table,)) for k, (stem, table) in enumerate(tables) if k not in taken]
 
 
 def _stated(

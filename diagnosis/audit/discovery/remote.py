@@ -173,6 +173,18 @@ class RemotePlace:
         above, last = self.parent(url), url.rpartition("/")[2]
         return self._files.get(above, {}).get(last) or self._folders.get(above, {}).get(last)
 
+    def beside(self, folder: str, name: str) -> Entry | None:
+        """Object below any URL, listed or asked for."""
+        known = self._files.get(folder, {}).get(name)
+        if known is not None or folder in self._folders or not folder.partition("://")[2]:
+            return known
+        url = f"{folder}/{name}"
+        try:
+            info = self._system.info(self._system._strip_protocol(url))
+        except Exception:  # each package raises its own kinds; what cannot be asked for is not there
+            return None
+        return None if info["type"] == "directory" else self._entry(self._system._strip_protocol(url), info)
+
     def is_folder(self, entry: Entry) -> bool:
         """Whether it is a listed folder."""
         return entry.path in self._folders
@@ -202,6 +214,9 @@ class RemotePlace:
             return continues(span_behind(self._system, self._path(part), part.size) for part in parts)
         except LogError:
             return False
+
+    def extent(self, table: Entry) -> None:
+        """Nothing: the content is not read."""
 
     def is_log(self, file: Entry) -> bool:
         """Whether it may be a log; the content is not read."""

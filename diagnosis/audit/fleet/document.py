@@ -44,6 +44,8 @@ class Fleet:
         Number of the audit run; 0: not known.
     made_ns : int or None
         When its newest result was made.
+    notes : tuple[str, ...]
+        What that run noted of the files it was given.
     first_runs : Mapping[str, int]
         Run in which each mission was first judged, as far as that is known.
     copies : Mapping[str, str]
@@ -57,6 +59,7 @@ class Fleet:
     unknown: tuple[Mission, ...] = ()
     run: int = 0
     made_ns: int | None = None
+    notes: tuple[str, ...] = ()
     first_runs: Mapping[str, int] = field(default_factory=dict)
     copies: Mapping[str, str] = field(default_factory=dict)
 
@@ -104,7 +107,7 @@ def fleet_document(fleet: Fleet, baseline: BaselineRow | None = None) -> FleetDo
         "schema": SCHEMA,
         "version": __version__,
         "axis": fleet.axis,
-        "audit": {"run": fleet.run or None, "made_ns": fleet.made_ns},
+        "audit": {"run": fleet.run or None, "made_ns": fleet.made_ns, "notes": list(fleet.notes)},
         "verdict": {
             "status": status,
             "tag": tag,
@@ -116,7 +119,8 @@ def fleet_document(fleet: Fleet, baseline: BaselineRow | None = None) -> FleetDo
                 (unread, counts["not_assessed"], counts["pending"]),
                 fleet.axis,
                 len(fleet.unknown),
-            ),
+            )
+            + [words.as_sentence(note) for note in fleet.notes],
         },
         "counts": counts,
         "machines": [_machine(m, at) for m in fleet.machines],

@@ -20,10 +20,11 @@ SCHEMA = "mfhca-fleet/1"
 
 
 class AuditRow(TypedDict):
-    """The audit run: its number in this store, and when its newest result was made."""
+    """The audit run: its number in this store, when its newest result was made, and what it noted of the files it was given."""
 
     run: int | None
     made_ns: int | None
+    notes: list[str]
 
 
 class FleetVerdictRow(TypedDict):

@@ -102,8 +102,10 @@ def _why(
         if m["unjudged"] and missions[place]["verdict"] in (None, Verdict.NOT_ASSESSED):
             more = f" ({count(m['unjudged'], 'mission')} not judged)" if m["unjudged"] > 1 else ""
             lost = _lost(missions[place]) if place in m["failed"] and missions[place]["gone"] else ""
-            return place, f"{_said(missions[place])}{lost}{more}"
-    return last, _said(missions[last]) if last is not None and m["verdict"] == Verdict.NOT_ASSESSED else m["standing"]
+            return place, f"{named + '; ' if named else ''}{_said(missions[place])}{lost}{more}"
+    if last is not None and m["verdict"] == missions[last]["verdict"] == Verdict.NOT_ASSESSED:
+        return last, _said(missions[last])
+    return last, f"{named}: {m['standing'][0].lower()}{m['standing'][1:]}" if named else m["standing"]
 
 
 def _lost(mission: MissionRow) -> str:

@@ -182,11 +182,17 @@ class Machine:
         return max(known, key=lambda verdict: verdict.rank, default=Verdict.NOT_ASSESSED)
 
     def _now(self, run: Run) -> Verdict | None:
-        """Verdict of a mission without the faults that were repaired since."""
+        """Verdict of a mission without the faults that were repaired since, or refuted by enough later missions."""
         verdict = run.result.verdict
         if verdict not in (Verdict.STOP, Verdict.WATCH):
             return verdict
-        left = [f for f in run.faults if (run.result.id, f.component, f.side, f.mode) not in self.repaired]
+        past = {(f.component, f.side, f.mode) for f in self.faults if f.status == "past"}
+        left = [
+            f
+            for f in run.faults
+            if (run.result.id, f.component, f.side, f.mode) not in self.repaired
+            and (f.component, f.side, f.mode) not in past
+        ]
         if len(left) == len(run.faults):
             return verdict
         if not left:
@@ -212,7 +218,10 @@ class Machine:
         out = []
         trailing = list(itertools.takewhile(lambda r: r.result.verdict is Verdict.NOT_ASSESSED, reversed(self.dated)))
         if trailing and len(trailing) < len(self.dated):
-            out.append(f"its last {_count(len(trailing), 'mission')} could not be assessed")
+            last = range(len(self.dated) - len(trailing), len(self.dated))
+            seen = any(column[k] for column in self._assessed.values() for k in last)
+            how = "showed no fault, but not all parts were judged" if seen else "could not be assessed"
+            out.append(f"its last {_count(len(trailing), 'mission')} {how}")
         if self.undated:
             out.append(f"{_count(len(self.undated), 'mission')} of unknown order")
         failed = self.failed_once

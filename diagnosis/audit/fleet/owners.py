@@ -39,6 +39,8 @@ class Owners:
         self._entered: set[tuple[str, Owner, bool]] = set()
         self._names: dict[str, tuple[str, ...]] = {}
         self._found: dict[str, tuple[Owner | None, bool]] = {}
+        missions = list(missions)
+        self._by_copy = {m.result.id for m in missions if m.result is not None and self._by_folder(m)}
         sure, doubtful, others = list[Mission](), list[Mission](), list[Mission]()
         for m in missions:
             if m.result is None or not m.result.judged:
@@ -75,7 +77,7 @@ class Owners:
         owner, _ = self._found[m.name]
         if owner is None or m.result is None or not m.result.judged:
             return
-        named = owner == owner_of(m.result) and self._by_folder(m)
+        named = owner == owner_of(m.result) and (self._by_folder(m) or m.result.id in self._by_copy)
         told = next(_folders(m), ""), owner, named
         if told in self._entered:
             return

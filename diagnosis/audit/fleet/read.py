@@ -107,7 +107,12 @@ _FAULTS = (
 _STATES = {state.value: state for state in MissionState}
 _VERDICTS: dict[str | None, Verdict | None] = {None: None, **{verdict.value: verdict for verdict in Verdict}}
 _MISSIONS = "SELECT name, files, bytes, result, gone IS NOT NULL FROM mission ORDER BY name"
-_CONTENT = ("SELECT id, attempts, state, reason, machine_id, verdict, report FROM result ORDER BY id", _MISSIONS)
+_NOTES = "SELECT value FROM meta WHERE name = 'notes'"
+_CONTENT = (
+    _NOTES,
+    "SELECT id, attempts, state, reason, machine_id, verdict, report FROM result ORDER BY id",
+    _MISSIONS,
+)
 
 
 def read_missions(store: Path) -> list[Mission]:
@@ -173,6 +178,19 @@ def read_run(store: Path) -> int:
         rows = db.rows("SELECT value FROM meta WHERE name = 'run'")
         with db.decoding():
             return int(rows[0][0]) if rows else 0
+
+
+def read_notes(store: Path) -> tuple[str, ...]:
+    """What the last audit run of a store noted of the files it was given: what it could not look into, and whose machine file is missing.
+
+    Raises
+    ------
+    OutputError
+        As `read_missions`.
+    """
+    with closing(_opened(store)) as db, db.decoding():
+        rows = db.rows(_NOTES)
+        return tuple(map(str, json.loads(rows[0][0]))) if rows else ()
 
 
 def fleet_repairs(store: Path) -> list[Repair]:

@@ -76,7 +76,7 @@ def standing(m: Machine) -> str:
     if m.verdict is Verdict.READY:
         return words
     if m.waiting_ns is not None:
-        return f"{words} since the repair on {utc(m.waiting_ns)[:10]}"
+        return _since_repair(m, m.waiting_ns)
     if m.verdict is Verdict.NOT_ASSESSED:
         if m.last_verdict is Verdict.NOT_ASSESSED:
             return words
@@ -95,6 +95,17 @@ def standing(m: Machine) -> str:
         elif lasting and m.cleared and not m.unjudged:
             words = "Ready, with faults to watch"
     return words + (", and what may be later was not judged" if m.unjudged else "")
+
+
+def _since_repair(m: Machine, repaired_ns: int) -> str:
+    """What is known of a machine since its last repair, where no mission after it was judged as a whole."""
+    day = utc(repaired_ns)[:10]
+    clean = [f for f in m.faults if f.status == "repaired" and f.since]
+    if not clean:
+        return f"{Verdict.NOT_ASSESSED.short} since the repair on {day}"
+    parts = dict.fromkeys(m.limits.words.part_words(f.kind, f.component, f.side) for f in clean)
+    seen = count(min(f.since for f in clean), "mission")
+    return f"{join_words(list(parts))} clean in {seen} since the repair on {day}, other parts not judged"
 
 
 def _is_open(m: Machine) -> bool:
@@ -231,6 +242,12 @@ def new_words(missions: int, faults: Sequence[tuple[Machine, FleetFault]]) -> li
     known = "without a fault that was not known"
     said = f"first seen in {'it' if missions == 1 else 'them'}: {'; '.join(named) + more}" if named else known
     return [f"The last audit run brought {count(missions, 'mission')}{';' if named else ','} {said}."]
+
+
+def as_sentence(note: str) -> str:
+    """A note with a capital and a full stop, unless it begins with a path."""
+    head = note.partition(" ")[0].rstrip(":,")
+    return f"{note[0].upper() + note[1:] if head.isalpha() else note}."
 
 
 def _often(f: FleetFault) -> str:

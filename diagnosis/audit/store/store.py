@@ -77,9 +77,11 @@ class Store:
         """Close the file."""
         self.database.close()
 
-    def begin_run(self) -> int:
-        """Count this audit; its number marks the missions that it sees."""
+    def begin_run(self, notes: Sequence[str] = ()) -> int:
+        """Count this audit; its number marks the missions that it sees, and its notes replace those of the one before."""
+        shown = [n.encode("utf-8", "surrogateescape").decode("utf-8", "backslashreplace") for n in notes]
         with self.database.transaction() as connection:
+            connection.execute("INSERT OR REPLACE INTO meta VALUES ('notes', ?)", (json.dumps(shown),))
             connection.execute("UPDATE meta SET value = CAST(value AS INTEGER) + 1 WHERE name = 'run'")
             with self.database.decoding():
                 self.run = int(connection.execute("SELECT value FROM meta WHERE name = 'run'").fetchone()[0])

@@ -31,7 +31,7 @@ from replay.readers.tables.text_table import (
     span,
 )
 from replay.readers.tables.time_cells import TimeBase, epoch_ns
-from replay.readers.tables.time_column import Sample, TimeColumn, find_time
+from replay.readers.tables.time_column import Sample, TimeColumn, find_time, in_zone
 
 _SAMPLES = (HEAD, 16 << 20)
 _NAMED = (".csv", ".tsv")
@@ -65,12 +65,14 @@ class CsvReader:
         report = Report()
         table = open_text(path, options, report)
         sample, time = _time(table, options, report)
-        name, unit, part, day_ns = time
+        name, unit, part, day_ns, zone = time
         last = table.file.tail(table.skip) if unit != "dc32" else b""
         tail = table.sample(last) if last else {}
         count, exact = row_count(table.file, table.skip)
         dated = sample[name].dtype.kind == "M"
-        base = TimeBase("iso" if dated else unit, epoch_ns(options, str(path), unit, day_ns), path.name, Report(), part)
+        base = TimeBase(
+            "iso" if dated else unit, epoch_ns(options, str(path), unit, day_ns), path.name, Report(), part, zone
+        )
         start, stop = span(base, _cells(sample, time), _cells(tail, time), count)
         fields = tuple(n for n in table.names if n not in time.names and (n in sample or n in tail))
         note = "" if exact else "rows and end are estimated from the first rows; reading the file counts them"
@@ -128,6 +130,7 @@ def _time(table: TextTable, options: SourceOptions, report: Report) -> tuple[Sam
             said = Report()
             columns = sample if options.time is None else {n: sample.get(n, np.empty(0)) for n in table.names}
             time = find_time(table.file.path, columns, options, said, table.texts(head, columns))
+            time = in_zone(table.file.path, time, options, said, table.texts(head, ()).get(time.name, ""))
         except LogError:
             if whole or size == _SAMPLES[-1]:
                 raise

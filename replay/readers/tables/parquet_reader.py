@@ -25,7 +25,7 @@ from replay.readers.tables.row_kernel import MISSING
 from replay.readers.tables.table_log import Finished, RowTimes, table_log
 from replay.readers.tables.text_cells import TextColumn
 from replay.readers.tables.time_cells import TimeBase, epoch_ns
-from replay.readers.tables.time_column import TimeColumn, find_time
+from replay.readers.tables.time_column import TimeColumn, find_time, in_zone
 
 _CELLS = 1 << 21
 _SAMPLE = 20_000
@@ -60,7 +60,9 @@ class ParquetReader:
             table = _Parquet(path, file, report)
             time = table.time(options)
             unit = "iso" if table.dated(time.name) else time.unit
-            base = TimeBase(unit, epoch_ns(options, str(path), time.unit, time.day_ns), path.name, Report(), time.part)
+            base = TimeBase(
+                unit, epoch_ns(options, str(path), time.unit, time.day_ns), path.name, Report(), time.part, time.zone
+            )
             ends = [base.stamps(*cells) for cells in table.ends(time.names)]
             given = np.concatenate(ends) if ends else np.empty(0, np.int64)
             given = given[given != MISSING]
@@ -156,7 +158,10 @@ class _Parquet:
         first = next(self.blocks(labels, [0], _SAMPLE), None)
         sample = first if first is not None else {n: np.empty(0) for n in labels}
         shown = {n: c.view("M8[ns]") if self.dated(n) and c.dtype == np.int64 else c for n, c in sample.items()}
-        return find_time(self.path, shown, options, self.report)
+        found = find_time(self.path, shown, options, self.report)
+        kind = self.numeric[found.name].type
+        stated = pa.types.is_timestamp(kind) and kind.tz
+        return in_zone(self.path, found, options, self.report, ":00Z" if stated else None)
 
     def named(self, log: RawLog) -> RawLog:
         """Give the channels of a converted log their topics, fields, types and units again."""
@@ -179,7 +184,7 @@ class _Parquet:
 
     def groups(self, time: TimeColumn, epoch: int, window: Window | None) -> list[int]:
         """Row groups whose stamps may lie in the window, by the statistics of the time column."""
-        name, unit, part, _ = time
+        name, unit, part, _, zone = time
         every = list(range(self.file.metadata.num_row_groups))
         if window is None or unit in ("dc32", "dt"):
             return every
@@ -195,7 +200,7 @@ class _Parquet:
                 kept.append(group)
                 continue
             ends = pa.array([statistics.min, statistics.max]).cast(self.numeric[name].type)
-            low, high = TimeBase(unit, epoch, "", Report()).stamps(_cells(ends)).tolist()
+            low, high = TimeBase(unit, epoch, "", Report(), None, zone).stamps(_cells(ends)).tolist()
             if MISSING in (low, high) or (low - slack < window[1] and high + slack >= window[0]):
                 kept.append(group)
         return kept

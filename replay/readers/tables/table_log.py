@@ -59,7 +59,7 @@ class RowTimes:
         self.unit = unit = column.unit
         self.base = TimeBase(
             "iso" if dated else unit, epoch_ns(options, str(path), unit, column.day_ns), f"{path.name}, column {name!r}", report,
-            column.part,
+            column.part, column.zone,
         )  # fmt: skip
         self._early = None if unit == "dt" else window
         self._late = window if unit == "dt" else None

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from replay.errors import LogError
 from replay.log.reading_notes import Report
 from replay.log.source_options import SourceOptions
+from replay.log.time_zone import from_zone
 from replay.readers.tables.row_kernel import MISSING
 from replay.readers.tables.split_time import Part, with_part
 
@@ -77,9 +78,14 @@ class TimeBase:
         Takes notes and losses when all blocks are through.
     part : Part or None
         Column with the parts of whole seconds, where the clock stands in two columns.
+    zone : str
+        Time zone in which the cells are meant; empty: UTC.
     """
 
-    def __init__(self, unit: str, epoch: int, label: str, report: Report, part: Part | None = None) -> None:
+    def __init__(
+        self, unit: str, epoch: int, label: str, report: Report, part: Part | None = None, zone: str = ""
+    ) -> None:
+        self.zone = zone
         self.unit, self.epoch, self.label, self.report, self.part = unit, epoch, label, report, part
         self.rows = self.missing = 0
         self._inexact = self._dated = False
@@ -101,6 +107,8 @@ class TimeBase:
         ns = self._of_reals(cells) if cells.dtype.kind == "f" else self._of_integers(cells)
         if parts is not None and self.part is not None:
             ns = with_part(ns, parts, self.part.unit_ns)
+        if self.zone:
+            ns = np.where(ns == MISSING, MISSING, from_zone(np.where(ns == MISSING, 0, ns), self.zone))
         self.missing += int(np.count_nonzero(ns == MISSING))
         return ns
 

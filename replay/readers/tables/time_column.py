@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from replay.errors import LogError
 from replay.log.reading_notes import Report
 from replay.log.source_options import SourceOptions
+from replay.log.time_zone import NO_ZONE
 from replay.readers.tables.columns import unit_of
 from replay.readers.tables.split_time import Part, split_times, with_part
 
@@ -24,6 +25,8 @@ _TIME = re.compile(
 _LIKE_TIME = re.compile(r".*(time|date|zeit|datum|stamp|uhr|clock|heure|temps).*|t|dt|ts")
 _DATE = re.compile(r"date|datum|tag|day|jour")
 _DAY = 86_400_000_000_000  # ns
+_ZONED = re.compile(r":\d\d([.,]\d+)? *(Z|z|[+-]\d\d(:?\d\d)?)$")
+_OF_DAY = 15  # characters of a time of day
 _SUFFIX = re.compile(r"[ _.](s|sec|ms|us|ns|nsec)$")
 _TURN = 1 << 32
 _FAR_S = 4e9  # seconds that nanoseconds since 1970 still count
@@ -53,12 +56,15 @@ class TimeColumn(NamedTuple):
         Column with the parts of its whole seconds, where the clock stands in two columns.
     day_ns : int
         Midnight of the first row [ns since 1970], where a second column holds the dates of times of day.
+    zone : str
+        Time zone in which its dates are meant; empty: UTC, or the one that each states.
     """
 
     name: str
     unit: str
     part: Part | None = None
     day_ns: int = 0
+    zone: str = ""
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -127,6 +133,42 @@ def find_time(
     raise LogError(
         f"{path} has no time column (none rises); give [sources] time; its columns are {_some([*texts, *names])}"
     )
+
+
+def in_zone(path: Path, time: TimeColumn, options: SourceOptions, report: Report, cell: str | None) -> TimeColumn:
+    """A column of dates with the time zone that they are meant in, and a note on what was taken.
+
+    Parameters
+    ----------
+    path : Path
+        File, for messages.
+    time : TimeColumn
+        Its time column.
+    options : SourceOptions
+        With the zone, where one is given.
+    report : Report
+        Takes the note.
+    cell : str or None
+        Its first cell; None where dates are no text.
+    """
+    if time.unit != "iso":
+        if options.time_zone is not None:
+            report.note(
+                f"{path.name}: [sources] time_zone is of no use: its time is no date, but a count in {time.unit}"
+            )
+        return time
+    if cell is not None and _ZONED.search(cell.strip()):
+        if options.time_zone is not None:
+            report.note(f"{path.name}: [sources] time_zone is not used, as its dates state their zone")
+        return time
+    if options.time_zone is not None:
+        return time._replace(zone=options.time_zone)
+    if options.epoch is None and (time.day_ns or cell is None or len(cell.strip()) > _OF_DAY):
+        report.note(
+            f"{path.name}: {NO_ZONE} and were taken as UTC; if its clock shows another time, give "
+            'time_zone = "Europe/Berlin" or whichever it is in [sources]'
+        )
+    return time
 
 
 def _split(path: Path, sample: Sample, options: SourceOptions, report: Report) -> TimeColumn | None:

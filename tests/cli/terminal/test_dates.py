@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 
 import pytest
 
-from cli.terminal.dates import moment_of, nanoseconds, shown_moment
+from cli.terminal.dates import has_zone, moment_of, nanoseconds, shown_moment
 from replay.errors import ConfigError
 
 
@@ -33,10 +33,34 @@ def zone(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[[str], None]]:
         (" 2026-10-05 14:30:00.25 ", 1_791_210_600_250_000_000),
         ("2026-10-05T14:30+02:00", 1_791_203_400 * 10**9),
         ("2026-10-05T14:30Z", 1_791_210_600 * 10**9),
+        ("2026-10-05T14:30 Europe/Berlin", 1_791_203_400 * 10**9),
+        ("2026-10-05 14:30 +02:00", 1_791_203_400 * 10**9),
+        ("2026-12-05T14:30 Europe/Berlin", 1_796_477_400 * 10**9),
     ],
 )
 def test_moments(text: str, ns: int) -> None:
     assert nanoseconds(moment_of("--start", text)) == ns
+
+
+def test_the_time_of_this_computer(zone: Callable[[str], None]) -> None:
+    zone("Europe/Berlin")
+    assert moment_of("--on", "2026-10-05T14:30 local") == moment_of("--on", "2026-10-05T12:30")
+
+
+@pytest.mark.parametrize(
+    ("text", "stated"), [("2026-10-05T14:30", False), ("2026-10-05T14:30Z", True), ("2026-10-05 local", True)]
+)
+def test_which_dates_state_their_zone(text: str, stated: bool) -> None:
+    assert has_zone(text) == stated
+
+
+def test_a_zone_that_is_not_known_and_one_too_many() -> None:
+    with pytest.raises(
+        ConfigError, match="time zone 'Europe/Nowhere' is not known; expected one such as Europe/Berlin"
+    ):
+        moment_of("--on", "2026-10-05T14:30 Europe/Nowhere")
+    with pytest.raises(ConfigError, match="has an offset and the zone local; give one of them"):
+        moment_of("--on", "2026-10-05T14:30Z local")
 
 
 @pytest.mark.parametrize("text", ["monday", "", "05.10.2026", "2026-02-30", "14:30", "1791158400"])

@@ -115,6 +115,11 @@ def found(channel: Channel) -> list[tuple[str, str]]:
         ("velocidad_rueda_delantera_izquierda [rad/s]", "wheel.FL.v"),
         ("velocita_ruota_posteriore_destra [rad/s]", "wheel.RR.v"),
         ("velocidade_roda_traseira_esquerda [rad/s]", "wheel.RL.v"),
+        ("snelheid_wiel_rechtsachter [rad/s]", "wheel.RR.v"),
+        ("hastighet_hjul_fram_vänster [rad/s]", "wheel.FL.v"),
+        ("hastighed_hjul_bagest_højre [rad/s]", "wheel.RR.v"),
+        ("pyörä_etu_vasen_nopeus [rad/s]", "wheel.FL.v"),
+        ("predkosc_koło_tylne_prawe [rad/s]", "wheel.RR.v"),
     ],
 )
 def test_columns(name: str, signal: str | None) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 from pathlib import Path
 
 import pytest
@@ -63,11 +64,41 @@ def test_the_closest_machine_file_counts(tmp_path: Path) -> None:
     assert [m.machine_file for m in single] == [str(tmp_path / "BX/machine.toml")]
 
 
-def test_archives_and_open_bags_are_named(tmp_path: Path) -> None:
+def test_archives_are_named_and_open_bags_are_logs(tmp_path: Path) -> None:
     put(tmp_path, "m.mcap", "old.zip", "x/run.bag.active", "notes.md")
     found = discover([str(tmp_path)])
-    assert len(found.missions) == 1
+    assert [m.name for m in found.missions] == ["m", "x__run"]
     (note,) = found.notes
-    assert "old.zip" in note
-    assert "run.bag.active" in note
-    assert "notes.md" not in note
+    assert note == f"not looked into: {tmp_path}/old.zip; unpack what holds logs of machines, to have them audited"
+
+
+def by_machine_file(*words: str) -> dict[str, str | None]:
+    return {m.name: m.machine_file for m in discover(words).missions}
+
+
+def test_a_machine_file_is_found_however_logs_are_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    put(tmp_path, "logs/AX/run_1/a.mcap", "logs/AX/run_2/b.mcap", "logs/BX/c.mcap")
+    for machine in ("AX", "BX"):
+        (tmp_path / f"logs/{machine}/machine.toml").write_text("")
+    logs = tmp_path / "logs"
+    whole = by_machine_file(str(logs))
+    assert whole == {
+        "AX__run_1__a": str(logs / "AX/machine.toml"),
+        "AX__run_2__b": str(logs / "AX/machine.toml"),
+        "BX__c": str(logs / "BX/machine.toml"),
+    }
+    assert by_machine_file(f"{logs}/**/*.mcap") == whole
+    assert by_machine_file(f"{logs}/AX/run_*/a.mcap", f"{logs}/*/*.mcap") == {
+        k: whole[k] for k in ("AX__run_1__a", "BX__c")
+    }
+    listed = "\n".join(str(p) for p in sorted(logs.rglob("*.mcap")))
+    monkeypatch.setattr("sys.stdin", io.StringIO(listed))
+    assert by_machine_file("-") == whole
+    assert by_machine_file(str(logs / "AX/run_1")) == {"a": whole["AX__run_1__a"]}
+
+
+def test_a_folder_for_temporary_files_has_no_machine_file(tmp_path: Path) -> None:
+    put(tmp_path, "x/m.mcap")
+    (tmp_path / "machine.toml").write_text("")
+    tmp_path.chmod(0o1777)
+    assert by_machine_file(str(tmp_path / "x")) == {"m": None}

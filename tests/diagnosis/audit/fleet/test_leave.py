@@ -25,7 +25,10 @@ def test_every_machine_of_a_fleet_stands_in_one_list(tmp_path: Path) -> None:
     assert found["HX4-07"].name == "HX4-07/2026-11-14"
     assert found["HX4-02"].leave is Leave.MAY
     assert found["HX4-08"].leave is Leave.NOT_KNOWN
-    assert (found["HX4-08"].name, found["HX4-08"].reason) == ("HX4-08/broken", "ends after 12 bytes")
+    assert (found["HX4-08"].name, found["HX4-08"].reason) == (
+        "HX4-08/broken",
+        "FL speed sensor noisy; ends after 12 bytes",
+    )
 
 
 def test_a_fault_that_was_not_seen_again_is_said_of_an_earlier_mission(tmp_path: Path) -> None:

@@ -78,7 +78,7 @@ def test_the_page_says_of_when_its_logs_and_results_are(tmp_path: Path) -> None:
     made = json.dumps({"made_ns": samples.START_NS + 3 * samples.DAY_NS, "mission": {"name": "d1"}})
     place.with_name(f"{place.name}-cccccccc-1.0-1.json").write_text(made, encoding="utf-8")
     d = written(tmp_path, 4, OLD)
-    assert d["audit"] == {"run": 4, "made_ns": samples.START_NS + 3 * samples.DAY_NS}
+    assert d["audit"] == {"run": 4, "made_ns": samples.START_NS + 3 * samples.DAY_NS, "notes": []}
     page = (tmp_path / "fleet.html").read_text("utf-8")
     span = "logs from 2026-10-26 to 2026-10-27"
     assert (

@@ -80,3 +80,10 @@ def test_a_log_among_those_of_two_machines_may_be_of_either(tmp_path: Path) -> N
     assert {m["label"]: m["verdict"] for m in d["machines"]} == {"HX-1": "ready", "logs": "not_assessed"}
     assert d["counts"]["unknown"] == 1
     assert "1 log was not judged and may be of a machine that is shown as ready." in d["verdict"]["text"]
+
+
+def test_a_copy_in_another_folder_makes_no_folder_doubtful(tmp_path: Path) -> None:
+    one = Sample("HX-1/a", "HX-1", copies=("backup/old/a",))
+    two = Sample("HX-2/b", "", verdict="not_assessed", day=1.0)
+    d = document(tmp_path, one, two)
+    assert {m["label"]: m["verdict"] for m in d["machines"]} == {"HX-1": "ready", "HX-2": "not_assessed"}
