@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from diagnosis.channels.sample_status import PAIR
 from diagnosis.direct.fault_runs import fault_runs
@@ -25,6 +26,8 @@ from diagnosis.results.result import Epsilon, Hypothesis
 from diagnosis.results.vocabulary import Tier
 from replay.faults import FaultMode, Side
 from replay.machine.config import Limits
+
+Flags = NDArray[np.bool_]
 
 _SHORTEST_S = 0.01
 _HOLD_S = 0.1
@@ -221,13 +224,21 @@ def _mode_of(isolated: Isolated, found: IdentifiedPair, limits: Limits) -> Fault
         # a relation found in the mission is no truer than half a saturation term
         least = max(_CLEAR * noise, _LOST * found.pair.span, limits.min_sat / 2)
         return None if seen.deviation < least or away < returns else mode
-    if np.isfinite(seen.y).any() and away < min(_LEFT_S, 0.5 * isolated.run.size * found.pair.dt):
+    # what leaves its place for a sample now and then, as a noisy reference does at rest, moves nothing
+    lasts = _longest(np.abs(seen.y - seen.x)[seen.use] > _CLEAR * noise) * found.pair.dt
+    if np.isfinite(seen.y).any() and lasts < min(_LEFT_S, 0.5 * isolated.run.size * found.pair.dt):
         return None
     known = seen.x[seen.use]
     if seen.deviation < _AS_TRUE * (float(np.sqrt(np.mean(known**2))) if known.size else 0.0):
         return None
     at_rest = known.size and max(seen.deviation, float(np.max(np.abs(known)))) < limits.min_sat / 2
     return None if at_rest else mode  # it repeats what it had, which is true
+
+
+def _longest(there: Flags) -> int:
+    """Length of the longest stretch."""
+    edge = np.flatnonzero(np.diff(np.r_[False, there, False].astype(np.int8)))
+    return int(np.max(edge[1::2] - edge[::2], initial=0))
 
 
 def _mode_of_gain(isolated: Isolated, noise: float, found: IdentifiedPair, limits: Limits) -> FaultMode | None:
