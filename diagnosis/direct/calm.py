@@ -9,28 +9,27 @@ from diagnosis.estimation.fault_models import INEFFICIENT, STUCK
 
 Array = NDArray[np.float64]
 
-_OF_DEVIATION, _OF_SPAN = 0.15, 0.03  # what a steady row may leave, root mean square
+_OF_DEVIATION = 0.15  # what a steady row may leave, root mean square
 
 
-def calm_row(y: Array, x: Array, span: float) -> int | None:
+def calm_row(y: Array, x: Array, min_sat: float) -> int | None:
     """The steady row that leaves hardly anything of a deviation: a share of the reference, or one value; None where none does.
 
-    Where dynamics are lost with the gain, what is left is more than a healthy channel's noise; noise that is a fault's own is much of
-    the deviation, or of the `span`.
+    Where dynamics are lost with the gain, what is left is more than a healthy channel's noise, and yet no saturation term that counts.
 
     Parameters
     ----------
     y, x : Array, shape (n,)
         Channel and reference at the same times [unit of y].
-    span : float
-        Largest plausible magnitude [unit of y].
+    min_sat : float
+        Smallest saturation term that counts [unit of y].
     """
     power = float(x @ x)
     if power == 0.0:
         return None
-    most = min(_OF_DEVIATION * float(np.sqrt(np.mean((y - x) ** 2))), _OF_SPAN * span)
+    most = _OF_DEVIATION * float(np.sqrt(np.mean((y - x) ** 2)))
     spread, share = float(np.std(y)), float(x @ y) / power
     left = float(np.sqrt(np.mean((y - share * x) ** 2)))
-    if spread <= min(most, left, _OF_DEVIATION * float(np.std(x))):
+    if spread <= min(most, left, min_sat, _OF_DEVIATION * float(np.std(x))):
         return STUCK
-    return INEFFICIENT if left <= most and 0.0 <= share <= 1.0 else None
+    return INEFFICIENT if left <= min(most, (1.0 - share) * min_sat) and share >= 0.0 else None

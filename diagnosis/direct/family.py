@@ -20,11 +20,13 @@ from diagnosis.results.assessment import Assessment, unassessed
 from diagnosis.results.vocabulary import Tier
 from replay.arrays.numeric import without_nan
 from replay.arrays.processors import each
+from replay.arrays.sliding import mean_within
 from replay.faults import Side, State
 from replay.machine.config import Limits
 from replay.progress import Progress, Stage
 
 _QUIET = 0.4  # of the driving speed
+_EVEN_S = 0.05  # over which the speed is evened
 _IDLE = 0.02  # of full opening
 _LAGS_S = (0.1, 0.3)
 
@@ -121,14 +123,16 @@ class _WheelPairs:
         )
 
     def _quiet(self) -> Flags:
-        """Neither commanded nor moving by the second sensor."""
+        """Neither commanded nor moving by the second sensor, whose noise moves nothing."""
         limit = _QUIET * self.mission.machine.limits.driving_speed
+        width = max(1, round(_EVEN_S / self.mission.timeline.dt))
 
         def low(command: Array, speed: Array) -> Flags:
             return np.asarray((np.abs(without_nan(command)) < limit) & (np.abs(without_nan(speed)) < limit))
 
         true = self.mission.values(self.name("v_true"))
-        return self.mission.timeline.map(low, self.mission.command(self.wheel), true)
+        even = self.mission.timeline.store.keep(mean_within(np.nan_to_num(true), width))
+        return self.mission.timeline.map(low, self.mission.command(self.wheel), even)
 
     @cached_property
     def _instruments(self) -> Array | None:

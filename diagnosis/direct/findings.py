@@ -110,7 +110,7 @@ def find_faults(path: ModePath, found: IdentifiedPair, limits: Limits) -> Faults
 
 def finding_of(run: Run, found: IdentifiedPair, limits: Limits) -> Finding | None:
     """A run as a finding; None where it lies below the limits or the evidence is thin."""
-    isolated = isolate(run, found)
+    isolated = isolate(run, found, limits.min_sat)
     if isolated is None:
         return None
     mode = _mode_of(isolated, found, limits)

@@ -138,7 +138,7 @@ def _gain_std(x: Array, found: IdentifiedPair, delta: float, run: Run) -> float:
     return float(np.hypot(found.gain_spread(run.start, run.stop), min(played, 1.0)))
 
 
-def isolate(run: Run, found: IdentifiedPair) -> Isolated | None:
+def isolate(run: Run, found: IdentifiedPair, min_sat: float) -> Isolated | None:
     """Row of a run, its probability and its estimates; None where the evidence against healthy is thin.
 
     Parameters
@@ -147,6 +147,8 @@ def isolate(run: Run, found: IdentifiedPair) -> Isolated | None:
         Samples, and the row of the path.
     found : IdentifiedPair
         The pair.
+    min_sat : float
+        Smallest saturation term that counts [unit of y].
     """
     estimate = estimate_run(run, found)
     if estimate is None:
@@ -166,7 +168,7 @@ def isolate(run: Run, found: IdentifiedPair) -> Isolated | None:
         p[INEFFICIENT], p[run.row] = p[run.row], p[INEFFICIENT]
         run = replace(run, row=INEFFICIENT)
         estimate = _of_gain(delta, estimate_run(run, found)) or estimate
-    if run.row in VARYING_ROWS and (calm := _calm_row_of(seen, found.pair.span)) is not None:
+    if run.row in VARYING_ROWS and (calm := _calm_row_of(seen, min_sat)) is not None:
         other = estimate_run(replace(run, row=calm), found)
         if other is not None:
             both = p[run.row] + p[calm]
@@ -212,8 +214,8 @@ def _wild(seen: RunSamples, dt: float) -> bool:
     return seen.deviation > max(_WILD * seen.noise, slope * max(_WILD_S, _WILD_SAMPLES * dt))
 
 
-def _calm_row_of(seen: RunSamples, span: float) -> int | None:
-    return None if seen.still else calm_row(seen.y[seen.use], seen.x[seen.use], span)
+def _calm_row_of(seen: RunSamples, min_sat: float) -> int | None:
+    return None if seen.still else calm_row(seen.y[seen.use], seen.x[seen.use], min_sat)
 
 
 def _changes(seen: RunSamples) -> float:
