@@ -203,7 +203,8 @@ def _angle(check: Checked, cells: Cells) -> Finding:
         if constant
         else f"by {amount(float(np.sqrt(np.nanmean(apart**2))), 'rad', 2)} (root mean square)."
     )
-    return _finding((start, stop), FaultMode.OUTSIDE_TABLE, None, (text, _NO_ROW), side=Side.SENSOR)
+    found = _finding((start, stop), FaultMode.OUTSIDE_TABLE, None, (text, _NO_ROW), side=Side.SENSOR)
+    return replace(found, tier=Tier.DIRECT)
 
 
 _NO_ROW = "No row of the tables explains that: an offset, a wrong scale, or both."
