@@ -11,6 +11,7 @@ from diagnosis.clearing.checks import checks_of
 from diagnosis.clearing.standing_out import what_stands_out, with_findings
 from diagnosis.results.assessment import CODE, Assessment, Finding
 from diagnosis.results.machine_words import HYDRAULIC
+from diagnosis.results.vocabulary import Tier
 from replay.faults import FaultMode, FaultSpec, Side, State
 from tests.diagnosis.clearing.missions import LENGTH, in_cells, simulated
 
