@@ -89,7 +89,15 @@ def test_an_angle_that_is_off_its_second_measurement_all_the_time_is_its_sensors
     assert (fault.side, fault.mode) == (Side.SENSOR, FaultMode.OUTSIDE_TABLE)
     assert "reads 11° less" in fault.evidence[0]
     states = np.full(round(100 * LENGTH) + 1, CODE[State.HEALTHY])
-    loss = replace(fault, side=Side.ACTUATOR, mode=FaultMode.INEFFICIENT, probability=0.99, hypotheses=(), evidence=())
+    loss = replace(
+        fault,
+        side=Side.ACTUATOR,
+        mode=FaultMode.INEFFICIENT,
+        probability=0.99,
+        hypotheses=(),
+        evidence=(),
+        tier=Tier.MODEL,
+    )
     before = {("rear", "sensor"): Assessment(states), ("rear", "actuator"): Assessment(states, findings=(loss,))}
     after = with_findings(before, found)
     assert [f.mode for f in after["rear", "sensor"].findings] == [FaultMode.OUTSIDE_TABLE]
