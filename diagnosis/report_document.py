@@ -19,6 +19,7 @@ from diagnosis.decision.caveats import more_caveats
 from diagnosis.decision.decide import Decision, decide
 from diagnosis.decision.intervals import intervals_of, spans_of
 from diagnosis.decision.scale import Scale, scale_of
+from diagnosis.results.assessment import CODE
 from diagnosis.results.clearing import Checked, clearing_rows
 from diagnosis.results.detectability import Detectability, detectability_table
 from diagnosis.results.document import SCHEMA, CoverageRow, FileRow, LogRow, MachineRow, ReportDocument, WheelPlace
@@ -37,6 +38,7 @@ from replay.signals.timeline import Timeline
 from replay.version import __version__
 
 _CUT_S = 0.5  # of a log, not judged
+_MISSING = 0.2  # of a mission, in which a part of the steering may have no data
 
 
 @dataclass(frozen=True)
@@ -207,6 +209,11 @@ def _scope(judged: Judged) -> tuple[str, ...]:
         for axle in machine.axles
         if _unjudged(judged.found, axle)
     ]
+    out += [
+        f"for {missing * line.dt:.1f} s of {line.size * line.dt:.1f} s, without data, the {axle.removesuffix('_steer')} steering was not judged"
+        for axle in machine.axles
+        if not _unjudged(judged.found, axle) and (missing := _without_data(judged.found, axle)) > _MISSING * line.size
+    ]
     cut = (line.start_ns - judged.recorded.first_ns) * 1e-9
     rest = (judged.recorded.last_ns - line.start_ns) * 1e-9 - line.size * line.dt
     if max(cut, rest) > _CUT_S:
@@ -219,6 +226,12 @@ def _scope(judged: Judged) -> tuple[str, ...]:
 def _unjudged(found: ComponentResult, component: str) -> bool:
     """Whether neither side of a component was judged by anything."""
     return all(a.tier is Tier.NONE for (who, _), a in found.assessments.items() if who == component)
+
+
+def _without_data(found: ComponentResult, component: str) -> int:
+    """In how many samples a side of a component that was judged had no data, at most."""
+    sides = [a for (who, _), a in found.assessments.items() if who == component and a.tier is not Tier.NONE]
+    return max((int(np.count_nonzero(a.states == CODE[State.NO_DATA])) for a in sides), default=0)
 
 
 def _log(mission: Mission, moving: NDArray[np.bool_], machine: Machine) -> LogRow:

@@ -342,7 +342,6 @@ def _report(
             "min_sat": 0.02,
             "min_assessed": 10.0,
             "clear_at": 0.25,
-            "clear_offset": 0.04,
             "driving_speed": 0.02,
         },
     }

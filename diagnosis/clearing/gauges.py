@@ -172,9 +172,11 @@ def _axles(cells: Cells) -> Iterator[Gauges]:
     used, share = np.where(np.isfinite(opening), opening, command), -np.log1p(-clear_at)
     followed = as_followed(cells, opening, command, axles.OPENING)
     rates, limit = axles.rates_of(cells, axles.rate_of(angle, cells.dt), used), axles.answered(cells)
-    path, offset = yaw.off_straight(cells), cells.machine.limits.clear_offset
-    straight = None if path is None else Straight(cells.frame, path, yaw.OFF * offset / yaw.ANSWERED)
-    turned = {} if path is None else {Deviation.OFFSET: (offset + abs(float(np.nanmedian(path)))) / yaw.ANSWERED}
+    path = yaw.off_straight(cells)
+    straight = None if path is None else Straight(cells.frame, path, yaw.OFF / yaw.ANSWERED)
+    turned = (
+        {} if path is None else {Deviation.OFFSET: (yaw.LASTING_OFF + abs(float(np.nanmedian(path)))) / yaw.ANSWERED}
+    )
     for j, name in enumerate(cells.machine.axles):
         phi, x, u, a = (z[:, j] for z in (angle, second, command, opening))
         if not _known(phi):

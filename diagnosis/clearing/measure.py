@@ -200,7 +200,7 @@ def alone(
 
 
 def times(check: Checked) -> float:
-    """A check's value as a multiple of its limit; less than any where it is not known."""
+    """A check's value as a multiple of its limit [1]; less than any where it is not known."""
     return -1.0 if check.worst is None else check.worst / check.limit
 
 

@@ -125,7 +125,7 @@ def responses_of(cells: Cells, speed: Array, opening: Array, reference: Array) -
 
 
 def largest_change(log: Array, ways: Sequence[NDArray[np.bool_]]) -> float:
-    """Largest difference between the medians before and after any moment, of each of some sorts of windows alone [ln].
+    """Largest difference between the medians before and after any moment, of each of some sorts of windows alone [ln]; shape (windows,).
 
     A loss that lasts about half of the mission is half of what is usual.
     """

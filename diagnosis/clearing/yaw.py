@@ -13,35 +13,31 @@ from diagnosis.clearing.measure import lasts, worst
 from diagnosis.results.clearing import Check, Checked
 from diagnosis.results.vocabulary import Kind
 from replay.faults import Side
+from replay.machine.config import Machine
 
 _FIXED = "fixed"  # axle of wheels that are not steered
 _STILL, _STILL_S = 0.01, 1.0  # m/s; at rest for this long, a gyro shows its bias
 _MOVING = 0.25  # of the top speed
-OFF = 1.5  # times the offset that counts, for three seconds
-_ASKED = np.pi / 2  # rad: from here on no offset is asked for
+OFF, LASTING_OFF = 0.06, 0.04  # rad
 _STRAIGHT, _SHORTEST = 0.08, 0.1  # rad, m
 _LEAST_S = 6.0  # of driving straight
 ANSWERED = 0.7  # of an angle by which one axle alone is off: tyres give way sideways
 
 
 def yaw_checks(cells: Cells) -> Iterator[Checked]:
-    """Checks of both ends of a machine together, which take a yaw rate, two axles of which one is steered at least, and some driving straight.
+    """Checks of both ends of a machine together; none without a yaw rate, two axles of which one is steered at least, and some driving straight.
 
-    In turns tyres and the wheels' offsets make the angles an approximation. Without all that, an axle whose angle is not measured
-    twice stays open.
+    In turns tyres and the wheels' offsets make the angles an approximation.
     """
-    straight, part, limit = off_straight(cells), Side.SENSOR_OR_ACTUATOR, cells.machine.limits.clear_offset
+    straight, part = off_straight(cells), Side.SENSOR_OR_ACTUATOR
     if straight is None:
-        known, second = (np.atleast_1d(np.isfinite(cells.axles(leaf)).any(axis=0)) for leaf in ("phi", "phi_true"))
-        for axle, once in zip(cells.machine.axles, known & ~second, strict=True):
-            if once and limit < _ASKED:
-                yield Checked(Kind.STEER, axle, Side.SENSOR, Check.LASTING_YAW, None, limit)
         return
     windows, lasting = np.abs(cells.frame.mean(straight)), abs(float(np.nanmedian(straight)))
-    for axle in cells.machine.axles:
-        if np.isfinite(windows).any():
-            yield worst(cells, (Kind.STEER, axle, part, Check.YAW), windows, OFF * limit)
-        yield lasts(cells, (Kind.STEER, axle, part, Check.LASTING_YAW), lasting, limit)
+    for end in _ends(cells.machine).values():
+        for axle in (name for name in end if name != _FIXED):  # one wheel's angle is a share of the mean of its end
+            if np.isfinite(windows).any():
+                yield worst(cells, (Kind.STEER, axle, part, Check.YAW), len(end) * windows, OFF)
+            yield lasts(cells, (Kind.STEER, axle, part, Check.LASTING_YAW), len(end) * lasting, LASTING_OFF)
 
 
 def off_straight(cells: Cells) -> Array | None:
@@ -51,6 +47,16 @@ def off_straight(cells: Cells) -> Array | None:
         return None
     straight = np.where(off.straight, off.angle, np.nan)
     return straight if np.count_nonzero(np.isfinite(straight)) * cells.dt >= _LEAST_S else None
+
+
+def _ends(machine: Machine) -> dict[float, list[str]]:
+    """Axles by their place [m]: wheels that are steered one by one are one where they stand side by side."""
+    ends: dict[float, list[str]] = {}
+    wheels = machine.geometry.wheels.values() if machine.geometry is not None else ()
+    for axle in (*machine.axles, *dict.fromkeys(w.axle for w in wheels if w.axle == _FIXED)):
+        x = float(np.mean([w.x for w in wheels if w.axle == axle]))
+        ends.setdefault(next((e for e in ends if abs(e - x) < _SHORTEST), x), []).append(axle)
+    return ends
 
 
 class _Off(NamedTuple):
@@ -66,15 +72,15 @@ def _off_angles(cells: Cells) -> _Off | None:
     yaw = cells.means("imu.yaw_rate")
     if geometry is None or not np.isfinite(yaw).any():
         return None
-    fixed = [_FIXED] if any(w.axle == _FIXED for w in geometry.wheels.values()) else []
-    if not axles or len(axles) + len(fixed) != 2:
+    ends = _ends(cells.machine)
+    if not axles or len(ends) != 2:
         return None
-    places = [float(np.mean([w.x for w in geometry.wheels.values() if w.axle == axle])) for axle in (*axles, *fixed)]
-    length, angle, speeds = places[0] - places[1], cells.axles("phi"), cells.wheels("v")
-    if fixed:
-        angle = np.column_stack((angle, np.zeros(len(angle))))
-    if abs(length) < _SHORTEST or not np.isfinite(angle).any(axis=0).all():
+    (first, one), (last, other) = ends.items()
+    length, angles, speeds = first - last, cells.axles("phi"), cells.wheels("v")
+    by_name = {**dict(zip(axles, angles.T, strict=True)), _FIXED: np.zeros(len(angles))}
+    if any(not np.isfinite(by_name[name]).any() for name in (*one, *other)):
         return None
+    angle = np.column_stack([np.mean([by_name[name] for name in end], axis=0) for end in (one, other)])
     known = np.asarray(np.isfinite(speeds).any(axis=1))
     speed = np.nanmedian(np.where(known[:, np.newaxis], speeds, 0.0), axis=1)
     rest = known & (np.abs(speed) < _STILL) & np.isfinite(yaw)

@@ -201,7 +201,6 @@ def limits_of(limits: Limits) -> tuple[str, ...]:
         "min_probability": limits.min_probability > usual.min_probability,
         "min_assessed": limits.min_assessed < usual.min_assessed,
         "clear_at": limits.clear_at > usual.clear_at,
-        "clear_offset": limits.clear_offset > usual.clear_offset,
         "brief": limits.brief > usual.brief,
     }
     named = [

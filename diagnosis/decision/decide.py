@@ -39,6 +39,7 @@ Part = tuple[str, str]
 _COMPARED_WHEELS = 3
 _UNEXPLAINED_S = 0.5
 _MOSTLY = 0.5
+_UNSEEN_OFFSET = "An offset of a steering sensor would not have shown."
 _NO_YAW = "An offset of a steering sensor that is there from start to end does not show in this log. A yaw rate (imu.yaw_rate) would show it."
 
 _SENSORS_ALONE = "No sensor fault seen, drives not judged"
@@ -181,6 +182,8 @@ def decide(
     caveats += limits_of(limits)
     if any(_offset_hidden(checks, axle) for axle in axles):
         caveats += (_NO_YAW,)
+        if found.status is Verdict.READY:
+            found = replace(found, text=f"{found.text} {_UNSEEN_OFFSET}")
     caveats = tuple(c for c in caveats if c != found.text)
     actions = actions_of(intervals, words)
     return replace(

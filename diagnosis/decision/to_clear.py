@@ -183,11 +183,6 @@ def _some(texts: Sequence[str]) -> str:
 def _act(check: Checked, twice: Collection[str]) -> str:
     """What shows whether a part is sound that a check does not clear."""
     words: MachineWords = check.words
-    if check.check in _TURNED and check.worst is None:
-        return (
-            "log imu.yaw_rate (a yaw rate) and drive ten seconds straight ahead, or log steer.<part>.phi_true (a second "
-            "angle); where a machine can have neither, clear_offset = 3.2 in the machine file's [limits] says so"
-        )
     if check.check in _TURNED:
         return "set the axles straight, compare their angles with the marks on the machine, and drive ten seconds straight ahead"
     if check.check is Check.PLANT_RATE and check.worst is None:

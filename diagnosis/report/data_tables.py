@@ -125,7 +125,6 @@ _LIMIT_UNITS = {
     "brief": "s",
     "min_assessed": "s",
     "driving_speed": "{speed}",
-    "clear_offset": "rad",
     "min_sat": "{speed}{angles}, of commands as a share",
 }
 _SHARES = ("min_probability", "clear_at")

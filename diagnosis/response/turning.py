@@ -120,7 +120,10 @@ def difference(judged: Mapping[str, Judged], turning: Turning) -> Array:
 
 
 def fitted(apart: Array, yaw: Array, sound: NDArray[np.bool_], part: float = 0.8) -> tuple[float, float, float] | None:
-    """Yaw rate by the difference of the sides: gain, offset and usual misfit [rad/s], as they are in a part of what is sound; None where the one does not make the other."""
+    """Yaw rate by the difference of the sides: gain, offset and usual misfit [rad/s], as they are in a part of what is sound.
+
+    None where the one does not make the other. Arrays of shape (blocks,).
+    """
     if np.count_nonzero(sound) < _LEAST_BLOCKS:
         return None
     columns, kept = np.column_stack([apart, np.ones(apart.size)]), sound.copy()

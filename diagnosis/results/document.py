@@ -260,7 +260,6 @@ class LimitsRow(TypedDict):
     min_assessed: float
     driving_speed: float
     clear_at: float
-    clear_offset: float
 
 
 class ReportDocument(TypedDict):

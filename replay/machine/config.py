@@ -123,9 +123,6 @@ class Limits:
         |v_c,i| above which a wheel drives [m/s].
     clear_at : float
         Loss, or what deviates as much, that a mission must have shown to clear a machine [1].
-    clear_offset : float
-        Offset of a steering sensor that a mission must have shown, by a yaw rate or a second angle, to clear it [rad]; a right angle or
-        more: none is asked for.
     """
 
     brief: float = 1.0
@@ -135,7 +132,6 @@ class Limits:
     min_assessed: float = 10.0
     driving_speed: float = 0.05
     clear_at: float = 0.25
-    clear_offset: float = 0.04
 
     def __post_init__(self) -> None:
         """Check values."""
@@ -146,7 +142,6 @@ class Limits:
         check_range("limits.min_assessed", self.min_assessed, 0.0, 1e6, "s")
         check_range("limits.driving_speed", self.driving_speed, 0.0, 1e6, "m/s")
         check_range("limits.clear_at", self.clear_at, 0.05, 0.9, "")
-        check_range("limits.clear_offset", self.clear_offset, 0.005, 10.0, "rad")
 
 
 @dataclass(frozen=True)

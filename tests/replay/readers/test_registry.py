@@ -65,7 +65,7 @@ def test_an_ending_belongs_to_one_format() -> None:
     endings = [ending for row in LOG_FORMATS for ending in row.endings]
     assert len(set(endings)) == len(endings)
     assert LOG_ENDINGS == (
-        ".mcap", ".bag", ".db3", ".mcap.zstd", ".db3.zstd", ".csv", ".csv.gz", ".csv.zst", ".txt", ".parquet", ".svdx",
+        ".mcap", ".bag", ".bag.active", ".db3", ".mcap.zstd", ".db3.zstd", ".csv", ".csv.gz", ".csv.zst", ".txt", ".parquet", ".svdx",
         ".tdms",
     )  # fmt: skip
 
