@@ -6,6 +6,7 @@ import hashlib
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from fnmatch import fnmatch
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -64,7 +65,9 @@ def unhashed_log(mission: MissionSource) -> str:
 
 
 def file_roles(names: Sequence[str], machine: Machine) -> tuple[str, ...]:
-    """Names of a mission's files where the machine file tells them apart by name, else empty texts.
+    """What the machine file tells a mission's files apart by: the patterns that their names match, one in a line.
+
+    A copy under another name that matches the same ones is the same log.
 
     Parameters
     ----------
@@ -73,8 +76,9 @@ def file_roles(names: Sequence[str], machine: Machine) -> tuple[str, ...]:
     machine : Machine
         Its [sources] name patterns, and its [signals] may name a source.
     """
-    named = bool(machine.sources) or any(s.source is not None for s in machine.signals.values())
-    return tuple(name if named else "" for name in names)
+    patterns = dict.fromkeys([*machine.sources, *(s.source for s in machine.signals.values() if s.source is not None)])
+    by_path = any("/" in pattern for pattern in patterns)  # which a name alone does not tell
+    return tuple(name if by_path else "\n".join(p for p in patterns if fnmatch(name, p)) for name in names)
 
 
 def config_hash(machine_document: bytes | Mapping[str, object], options: Mapping[str, object], machine_id: str) -> str:

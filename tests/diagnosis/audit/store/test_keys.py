@@ -22,7 +22,9 @@ def test_log_hash_depends_on_content_and_order_alone() -> None:
 def test_names_count_where_the_machine_file_tells_files_apart_by_name() -> None:
     plain = haulotte()
     assert file_roles(["a.csv"], plain) == ("",)
-    assert file_roles(["a.csv"], replace(plain, sources={"*.csv": SourceOptions()})) == ("a.csv",)
+    told = replace(plain, sources={"*.csv": SourceOptions(), "plc*": SourceOptions()})
+    assert file_roles(["a.csv", "a - copy.csv", "plc.csv"], told) == ("*.csv", "*.csv", "*.csv\nplc*")
+    assert file_roles(["a.csv"], replace(plain, sources={"logs/*.csv": SourceOptions()})) == ("a.csv",)
 
 
 def test_config_hash_depends_on_machine_options_and_identity() -> None:
