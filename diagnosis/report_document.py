@@ -229,9 +229,10 @@ def _unjudged(found: ComponentResult, component: str) -> bool:
 
 
 def _without_data(found: ComponentResult, component: str) -> int:
-    """In how many samples a side of a component that was judged had no data, at most."""
-    sides = [a for (who, _), a in found.assessments.items() if who == component and a.tier is not Tier.NONE]
-    return max((int(np.count_nonzero(a.states == CODE[State.NO_DATA])) for a in sides), default=0)
+    """In how many samples a side of a component that was judged had no data while another component had some, at most."""
+    none = {part: a.states == CODE[State.NO_DATA] for part, a in found.assessments.items() if a.tier is not Tier.NONE}
+    gap = np.logical_and.reduce([x for (who, _), x in none.items() if who != component] or [np.zeros(1, np.bool_)])
+    return max((int(np.count_nonzero(x & ~gap)) for (who, _), x in none.items() if who == component), default=0)
 
 
 def _log(mission: Mission, moving: NDArray[np.bool_], machine: Machine) -> LogRow:

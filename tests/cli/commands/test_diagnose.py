@@ -277,6 +277,16 @@ def test_odd_tables_are_judged_or_refused_without_a_crash(tmp_path: Path, name: 
     assert report["intervals"] == []
 
 
+def test_steering_that_ends_early_gives_no_all_clear(tmp_path: Path) -> None:
+    table = small_table(tmp_path)
+    table.loc[len(table) // 2 :, [name for name in table.columns if name.startswith("steer.")]] = np.nan
+    table.to_csv(tmp_path / "half.csv", index=False)
+    assert run(["diagnose", str(tmp_path / "half.csv"), "-o", str(tmp_path / "out")]) == 3
+    report = json.loads((tmp_path / "out" / "report.json").read_text(encoding="utf-8"))
+    assert not report["verdict"]["cleared"]
+    assert any("without data, the front steering was not judged" in text for text in report["verdict"]["scope"])
+
+
 def test_a_second_file_that_gives_nothing_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     table = small_table(tmp_path)
     table["time_ns"] += 600 * 10**9
