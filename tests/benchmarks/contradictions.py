@@ -44,19 +44,18 @@ from replay.simulation.run import simulate_mission
 from replay.simulation.structures import STRUCTURE_NAMES, StructureOptions
 from tests.contradictions import contradictions
 
-FIRST = 2000
 TIERS = ("base", "spool", "direct")
 Named = tuple[str, MissionResult]
 
 
-def simulated(count: int) -> Iterator[Named]:
+def simulated(count: int, first: int) -> Iterator[Named]:
     """The simulator's scenarios and machines of other structures."""
     for structure in ("", *STRUCTURE_NAMES):
         for k in range(count if structure else 2 * count):
             scenario = ("random", "paper")[k % 2] if not structure else "random"
             options = SimulationOptions(
                 scenario=scenario,  # type: ignore[arg-type]
-                seed=FIRST + k,
+                seed=first + k,
                 duration_s=40.0,
                 rate_hz=(200.0, 100.0)[k % 2],
                 steering_faults=True,
@@ -65,7 +64,7 @@ def simulated(count: int) -> Iterator[Named]:
             made = simulate_mission(options)
             for tier in TIERS:
                 signals = recorded_signals(made, tier)
-                name = f"{structure or scenario} {FIRST + k} {tier}"
+                name = f"{structure or scenario} {first + k} {tier}"
                 try:
                     mission = Mission(files=(), signals=signals, timeline=align(signals))
                     yield name, diagnose_mission(mission, haulotte())
@@ -73,13 +72,13 @@ def simulated(count: int) -> Iterator[Named]:
                     print(f"{name}: {error}")
 
 
-def other_physics(count: int) -> Iterator[Named]:
+def other_physics(count: int, first: int) -> Iterator[Named]:
     """Machines of other physics with every so many-th sort of trouble, and sound."""
     kinds = troubles(75.0)
     for place, physics in enumerate((hydrostatic, electrohydraulic)):
         for k in range(2 * count):
             trouble = None if k % 6 == 5 else kinds[(17 * k + 7 * place) % len(kinds)]
-            seed = FIRST + 300 + k
+            seed = first + 300 + k
             for tier in TIERS:
                 signals = physics.signals(seed, trouble.faults if trouble else (), 75.0, tier)
                 if trouble is not None and trouble.edit is not None:
@@ -91,21 +90,21 @@ def other_physics(count: int) -> Iterator[Named]:
                     print(f"{name}: {error}")
 
 
-def ordinary_robots(count: int) -> Iterator[Named]:
+def ordinary_robots(count: int, first: int) -> Iterator[Named]:
     """Ordinary robots with one fault each, every sixth sound."""
     for k in range(3 * count):
         kind, fault = KINDS[k % len(KINDS)], "" if k % 6 == 5 else FAULTS[(5 * k) % len(FAULTS)]
         with tempfile.TemporaryDirectory() as folder:
-            made = ordinary.case(kind, fault, FIRST + 900 + k, Path(folder))
-            yield f"{kind} {FIRST + 900 + k} {fault or 'healthy'}", made.result
+            made = ordinary.case(kind, fault, first + 900 + k, Path(folder))
+            yield f"{kind} {first + 900 + k} {fault or 'healthy'}", made.result
 
 
-def foreign(count: int) -> Iterator[Named]:
+def foreign(count: int, first: int) -> Iterator[Named]:
     """The reference data's foreign plant, with faults."""
     make = foreign_machine.maker()
     for k in range(count):
-        drive = foreign_machine.scenario(make, 7200 + k, ("forced", "printed")[k % 2], 60.0)
-        rng = np.random.default_rng(k)
+        drive = foreign_machine.scenario(make, 5200 + first + k, ("forced", "printed")[k % 2], 60.0)
+        rng = np.random.default_rng(first - 2000 + k)
         modes = ("stuck", "no_signal", "inefficient", "noisy")
         faults = [
             make.Fault(
@@ -121,17 +120,17 @@ def foreign(count: int) -> Iterator[Named]:
         ]
         drive = replace(drive, faults=faults)
         for tier, mission, machine in foreign_machine.missions(make, drive, TIERS):
-            yield f"foreign {7200 + k} {tier}", diagnose_mission(mission, machine)
+            yield f"foreign {5200 + first + k} {tier}", diagnose_mission(mission, machine)
 
 
-def real(count: int) -> Iterator[Named]:
+def real(count: int, first: int) -> Iterator[Named]:
     """Robots as they are and with faults, the disabled one, and arms."""
     folder = robots.data_folder()
     for name in ("husky_bag", "warthog_bag"):
         machine = load_machine(folder / f"robots/{name}.toml")
         mission = load_mission([folder / "robots" / name], machine)
         yield name, diagnose_mission(mission, machine)
-        rng, t = np.random.default_rng(FIRST), mission.timeline
+        rng, t = np.random.default_rng(first), mission.timeline
         for k in range(2 * count):
             wheel, kind = machine.wheels[rng.integers(len(machine.wheels))], robots.KINDS[k % len(robots.KINDS)]
             start = rng.uniform(15.0, t.size * t.dt - 20.0)
@@ -150,18 +149,19 @@ def main() -> None:
     """Diagnose, check, print."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--count", type=int, default=6)
+    parser.add_argument("--first", type=int, default=2000, help="first seed, to run many results in parts")
     parser.add_argument(
         "--only", nargs="*", help="kinds of data: simulated, other physics, ordinary robots, foreign plant, real"
     )
     asked = parser.parse_args()
     count = asked.count
     sources = {
-        "simulated": simulated(count),
-        "other physics": other_physics(count),
-        "ordinary robots": ordinary_robots(count),
+        "simulated": simulated(count, asked.first),
+        "other physics": other_physics(count, asked.first),
+        "ordinary robots": ordinary_robots(count, asked.first),
     }
     if (Path(os.environ.get("MFHCA_REFERENCE_DATA", "../shared")) / "fault_data").is_dir():
-        sources |= {"foreign plant": foreign(count), "real": real(count)}
+        sources |= {"foreign plant": foreign(count, asked.first), "real": real(count, asked.first)}
     results: Counter[str] = Counter()
     wrong: Counter[str] = Counter()
     for kind, reports in sources.items():
