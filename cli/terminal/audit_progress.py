@@ -1,4 +1,4 @@
-"""How far an audit is: a bar on a terminal, a line now and then with ``--verbose`` where stderr is none."""
+"""How far an audit is: a bar on a terminal; where stderr is none a line now and then, and with ``--verbose`` what happened to missions."""
 
 from __future__ import annotations
 
@@ -15,7 +15,12 @@ from cli.terminal.streams import clean, console_of
 from diagnosis.audit.events import Emit, EventFacts
 from diagnosis.audit.store.outcome import MissionState
 
-_LINE_S = 10.0
+_LINE_S = 10.0  # between two lines, with --verbose
+_FIRST_S, _LONGER, _LAST_S = (
+    20.0,
+    1.5,
+    600.0,
+)  # otherwise: the first after, each so much later than the one before, and at most
 
 
 class Counted:
@@ -53,7 +58,7 @@ def shown_progress(terminal: Terminal) -> Iterator[Emit]:
     """Give a function that shows events."""
     counted = Counted()
     if terminal.quiet or not sys.stderr.isatty():
-        yield _lines(terminal, counted) if terminal.verbose and not terminal.quiet else lambda event, facts: None
+        yield (lambda event, facts: None) if terminal.quiet else _lines(terminal, counted)
         return
     columns = (TextColumn("auditing"), BarColumn(24), MofNCompleteColumn(), TextColumn("{task.description}"))
     with Progress(*columns, console=console_of(sys.stderr), transient=True) as bar:
@@ -67,27 +72,33 @@ def shown_progress(terminal: Terminal) -> Iterator[Emit]:
 
 
 def _lines(terminal: Terminal, counted: Counted) -> Emit:
-    last = time.monotonic()
+    last, every = time.monotonic(), _LINE_S if terminal.verbose else _FIRST_S
 
     def show(event: str, facts: EventFacts) -> None:
-        nonlocal last
+        nonlocal last, every
         counted.take(event, facts)
-        if event == "ingested":
-            for problem in facts["problems"]:
-                terminal.note(problem)
-        if event == "waiting":
-            terminal.note(f"{facts['name']}: another audit is working on it in this output folder")
-        if event == "retry":
-            terminal.note(f"{facts['name']}: {facts['reason']}; trying again")
-        if event == "mission" and facts["reason"]:
-            terminal.note(f"{facts['name']}: {MissionState(facts['state']).words}: {facts['reason']}")
+        if terminal.verbose:
+            _note(terminal, event, facts)
         now = time.monotonic()
-        if now - last > _LINE_S or event in ("planned", "page"):
-            last = now
+        if now - last > every or (terminal.verbose and event in ("planned", "page")):
+            last, every = now, _LINE_S if terminal.verbose else min(every * _LONGER, _LAST_S)
             parts = (f"{sum(counted.states.values())} of {counted.total}", clean(counted.text()))
             terminal.plain(" · ".join(part for part in parts if part))
 
     return show
+
+
+def _note(terminal: Terminal, event: str, facts: EventFacts) -> None:
+    """Say what an event says of single missions."""
+    if event == "ingested":
+        for problem in facts["problems"]:
+            terminal.note(problem)
+    if event == "waiting":
+        terminal.note(f"{facts['name']}: another audit is working on it in this output folder")
+    if event == "retry":
+        terminal.note(f"{facts['name']}: {facts['reason']}; trying again")
+    if event == "mission" and facts["reason"]:
+        terminal.note(f"{facts['name']}: {MissionState(facts['state']).words}: {facts['reason']}")
 
 
 def _clock(seconds: float) -> str:

@@ -131,7 +131,7 @@ def compare_reports(
     if difference and not force:
         raise ConfigError(f"{difference}; compare two missions of one machine, or add --force")
     had, has = sides_of(older), sides_of(newer)
-    faults = tuple(match_faults(found_faults(older["intervals"], had), found_faults(newer["intervals"], has), had, has))
+    faults = tuple(match_faults(found_faults(older, had), found_faults(newer, has), had, has))
     axles = {*older["machine"]["axles"], *newer["machine"]["axles"]}
     outcomes: list[str] = [c.trend or c.status for c in faults]
     return Comparison(

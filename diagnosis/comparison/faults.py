@@ -8,12 +8,12 @@ from dataclasses import dataclass
 from diagnosis.comparison.coverage import SideCoverage
 from diagnosis.decision.wording import join_words
 from diagnosis.results.comparison_document import Change, Status, Trend
-from diagnosis.results.document import IntervalRow
+from diagnosis.results.document import IntervalRow, ReportDocument, StateRow
 from diagnosis.results.fault_rows import mode_words
 from diagnosis.results.size_rows import EpsilonRow
 from diagnosis.results.vocabulary import Kind, Severity, Tier
 from diagnosis.results.wheel_model import RESOLUTION
-from replay.faults import FaultMode, Side
+from replay.faults import FaultMode, Side, State
 
 _LONGER, _LEAST_S = 2.0, 1.0
 _LEAST_EPSILON = 0.05  # bounds are those of one mission; the same fault differs more from mission to mission
@@ -43,6 +43,8 @@ class FoundFault:
         Of the same one.
     tier : Tier
         Strongest evidence.
+    recovered : bool
+        Whether the part was healthy again in the same mission, for a second or more behind the end of one of them.
     """
 
     component: str
@@ -56,6 +58,7 @@ class FoundFault:
     epsilon: EpsilonRow | None
     probability: float
     tier: Tier
+    recovered: bool = False
 
 
 @dataclass(frozen=True)
@@ -66,7 +69,7 @@ class FaultChange:
     ----------
     status : Status
         ``new``, ``changed``, ``unchanged``, ``resolved``, or ``not_seen_again``: gone while nothing shows that it is
-        repaired, because the side was not assessed.
+        repaired, because the side was not assessed, or because the fault came and went in the older mission as well.
     trend : Trend
         Of a changed fault: ``worse``, ``better``, or ``other``; else empty.
     component, kind, side, mode : str, Kind, Side, FaultMode
@@ -101,16 +104,18 @@ def is_worse(change: FaultChange) -> bool:
     )
 
 
-def found_faults(intervals: Sequence[IntervalRow], sides: Sides) -> list[FoundFault]:
-    """Gather a report's faults by component, side and row, worst first."""
+def found_faults(report: ReportDocument, sides: Sides) -> list[FoundFault]:
+    """Gather a report's faults by component, side and row, worst first; `sides` from `sides_of`."""
     groups: dict[tuple[str, Side, FaultMode], list[IntervalRow]] = {}
-    for i in intervals:
+    for i in report["intervals"]:
         groups.setdefault((i["component"], i["side"], i["mode"]), []).append(i)
-    out = [_found(key, faults, sides) for key, faults in groups.items()]
+    out = [_found(key, faults, sides, report["states"]) for key, faults in groups.items()]
     return sorted(out, key=lambda f: (-f.severity.rank, -f.seconds, f.component, f.side, f.mode))
 
 
-def _found(key: tuple[str, Side, FaultMode], faults: Sequence[IntervalRow], sides: Sides) -> FoundFault:
+def _found(
+    key: tuple[str, Side, FaultMode], faults: Sequence[IntervalRow], sides: Sides, states: Sequence[StateRow]
+) -> FoundFault:
     component, side, mode = key
     first = max(faults, key=lambda f: (f["severity"].rank, f["stop_s"] - f["start_s"]))
     seconds = float(sum(f["stop_s"] - f["start_s"] for f in faults))
@@ -128,7 +133,17 @@ def _found(key: tuple[str, Side, FaultMode], faults: Sequence[IntervalRow], side
         epsilon=epsilon,
         probability=first["probability"],
         tier=max((f["tier"] for f in faults), key=lambda tier: tier.strength),
+        recovered=_recovered(key, min(f["stop_s"] for f in faults), states),
     )
+
+
+def _recovered(key: tuple[str, Side, FaultMode], after_s: float, states: Sequence[StateRow]) -> bool:
+    """Whether every side of a part was healthy for a second or more of the same mission behind a time [s]."""
+    healthy = {k: 0.0 for k in _keys(*key[:2])}
+    for row in states:
+        if (row["component"], row["side"]) in healthy and row["state"] == State.HEALTHY:
+            healthy[row["component"], Side(row["side"])] += max(0.0, row["stop_s"] - max(after_s, row["start_s"]))
+    return min(healthy.values()) >= _LEAST_S
 
 
 def _keys(component: str, side: Side) -> list[tuple[str, Side]]:
@@ -291,4 +306,6 @@ def _why_not_assessed(a: FoundFault, sides: Sides) -> str:
                 f"In the newer mission the {key[1]} was judged by weaker evidence ({side.tier}, not {a.tier}), which "
                 f"mostly does not name a loss below about {100 * RESOLUTION[key[1]]:.0f} % there."
             )
+    if a.recovered and a.severity is not Severity.INFO:
+        return "In the older mission it went away by itself as well, so that its absence shows no repair."
     return ""

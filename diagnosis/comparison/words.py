@@ -12,7 +12,7 @@ OUTCOMES: dict[str, str] = {
     "worse": "worse",
     "other": "changed",
     "better": "better",
-    "not_seen_again": "not seen again, but not assessed",
+    "not_seen_again": "not seen again, no repair shown",
     "resolved": "resolved",
     "unchanged": "unchanged",
 }

@@ -16,7 +16,7 @@ from diagnosis.decision.caveats import (
     open_words,
     smallest_loads,
 )
-from diagnosis.decision.short import ToClear
+from diagnosis.decision.short import ToClear, exempt_axles
 from diagnosis.decision.to_clear import to_clear
 from diagnosis.decision.wording import actions_of, count_faults, join_words, misplaced_words, seconds_words, sentence_of
 from diagnosis.results.assessed import needed_s
@@ -39,8 +39,7 @@ Part = tuple[str, str]
 _COMPARED_WHEELS = 3
 _UNEXPLAINED_S = 0.5
 _MOSTLY = 0.5
-_UNSEEN_OFFSET = "An offset of a steering sensor would not have shown."
-_NO_YAW = "An offset of a steering sensor that is there from start to end does not show in this log. A yaw rate (imu.yaw_rate) would show it."
+_NO_YAW = "An offset of a steering sensor that is there from start to end does not show in this log; a yaw rate (imu.yaw_rate) would show it."
 
 _SENSORS_ALONE = "No sensor fault seen, drives not judged"
 
@@ -180,10 +179,12 @@ def decide(
         caveats += (by_model(assessments, shown, words),)
     caveats += smallest_loads(assessments, words)
     caveats += limits_of(limits)
-    if any(_offset_hidden(checks, axle) for axle in axles):
-        caveats += (_NO_YAW,)
-        if found.status is Verdict.READY:
-            found = replace(found, text=f"{found.text} {_UNSEEN_OFFSET}")
+    hidden = (_NO_YAW,) if any(_offset_hidden(checks, axle) for axle in axles) else ()
+    if found.status is Verdict.READY:
+        exempt = exempt_axles(assessments, decided_s, driven, axles, limits, words, open_state=against.open_state)
+        found = replace(found, text=" ".join((found.text, *exempt, *hidden)))
+    else:
+        caveats += hidden
     caveats = tuple(c for c in caveats if c != found.text)
     actions = actions_of(intervals, words)
     return replace(

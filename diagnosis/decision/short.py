@@ -109,6 +109,55 @@ def unjudged_axles(axles: Sequence[Part], assessments: Mapping[Part, Assessment]
     return ToClear(f"Not assessed: {who} ({main_reason(first, main_state(first))}).", act)
 
 
+def exempt_axles(
+    assessments: Mapping[Part, Assessment],
+    decided_s: Mapping[Part, float],
+    driven: Mapping[Part, float],
+    axles: Sequence[str],
+    limits: Limits,
+    words: MachineWords,
+    *,
+    open_state: Mapping[Part, State] | None = None,
+) -> tuple[str, ...]:
+    """Sentence on parts of the steering that were judged for less of the driving than a wheel's must be; none where all were.
+
+    Such a part keeps no machine from being cleared, for an axle at rest shows nothing of its valve: its checks must pass instead.
+
+    Parameters
+    ----------
+    assessments : Mapping[Part, Assessment]
+        Of all parts.
+    decided_s, driven : Mapping[Part, float]
+        Driving that was decided, and all of it [s].
+    axles : Sequence[str]
+        Steering axles.
+    limits : Limits
+        What counts.
+    words : MachineWords
+        How to speak of the machine.
+    open_state : Mapping[Part, State] or None
+        The commonest state that is no judgement, while driving.
+    """
+    part = [
+        p
+        for p in assessments
+        if p[0] in axles and p in driven and decided_s.get(p, 0.0) < needed_s(driven[p], limits.min_assessed)
+    ]
+    if not part:
+        return ()
+    why = list(
+        dict.fromkeys(
+            main_reason(assessments[p], (open_state or {}).get(p) or main_state(assessments[p])) for p in part
+        )
+    )
+    reason = f" ({'; '.join(w for w in why if w)})" if any(why) else ""
+    judged, whole = _span([decided_s.get(p, 0.0) for p in part], ".0f"), _span([driven[p] for p in part], ".0f")
+    return (
+        f"The {words.listed(Kind.STEER, part)} {'was' if len(part) == 1 else 'were'} judged for {judged} of {whole} s only{reason}, "
+        f"and the checks of {'its axle' if len({c for c, _ in part}) == 1 else 'the axles'} over the whole mission passed.",
+    )
+
+
 def _why_short(assessment: Assessment, driven: float | None, limits: Limits, state: State | None) -> str:
     """Why a part was not judged long enough."""
     if driven is not None and driven < limits.min_assessed and assessment.tier is not Tier.NONE:

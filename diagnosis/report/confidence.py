@@ -82,17 +82,31 @@ def _likely(p: float) -> str:
 
 
 def judged(report: ReportDocument) -> str:
-    """How many parts were judged as far as a verdict of *ready* takes, and which were not; empty where there are none."""
+    """How many parts were judged as far as a verdict of *ready* takes of a wheel, which for less and which not; empty where there are none."""
     sides, words, axles = sides_of(report), words_of(report["machine"]), report["machine"]["axles"]
     short = [part for part, s in sides.items() if not s.long_enough]
     if not sides or not short:
         return f"all {len(sides)} parts" if sides else ""
-    named = [
-        words.listed(kind, mine)
-        for kind in (Kind.WHEEL, Kind.STEER)
-        if (mine := [part for part in short if (part[0] in axles) is (kind is Kind.STEER)])
-    ]
-    return f"{len(sides) - len(short)} of {len(sides)} parts; not {'; '.join(named)}"
+    out = [f"{len(sides) - len(short)} of {len(sides)} parts"]
+    for how, some in (("in part", True), ("not", False)):
+        told = [
+            words.listed(kind, mine)
+            for kind in (Kind.WHEEL, Kind.STEER)
+            if (
+                mine := [
+                    part
+                    for part in short
+                    if (part[0] in axles) is (kind is Kind.STEER) and _partly(sides[part]) is some
+                ]
+            )
+        ]
+        out += [f"{how} {'; '.join(told)}"] if told else []
+    return "; ".join(out)
+
+
+def _partly(side: SideCoverage) -> bool:
+    """Whether a part that was not judged long enough was judged at all."""
+    return side.tier is not Tier.NONE and side.decided_s > _NOTHING * side.driving_s
 
 
 def sure_of_verdict(report: ReportDocument) -> str:

@@ -42,7 +42,8 @@ _FRENCH = frozenset(("av", "ar", "avant", "arriere"))
 _STEER = re.compile(r"steer|lenk|kingpin|azimuth|swivel|knuckle|braquage|sterz|direccion(?!al)")
 _DRIVE = re.compile(
     r"wheel|drive|(?<![a-z])drv|motor|rad(?![a-z]|_?s(?![a-z])|/)|traction|hub|antrieb|roue|moteur|rueda|ruota|roda(?![a-z])|"
-    r"wiel|hjul|pyora|pyoera|(?<![a-z])kolo(?![a-z])"
+    r"wiel|hjul|pyora|pyoera|(?<![a-z])kolo(?![a-z])|"
+    r"(?<![a-z0-9])[wm]\d(?![a-z0-9])"  # w0_rpm, m1_speed
 )
 _LOOSE = re.compile(r"(?<![A-Za-z0-9])[fblr](?![A-Za-z0-9])")
 _NO_DRIVE = re.compile(r"castor|caster|arm|grip|finger|flipper|head|neck|elbow|shoulder|wrist|hip|knee|lift|torso")

@@ -56,7 +56,7 @@ def test_the_page_says_what_became_of_each_fault() -> None:
         assert sentence in seen
     assert "no longer long enough" in seen
     gone = words(page(report("FR", "M", fault("FR")), report("FR", "M", decided=50.0)))
-    assert "Not seen again, but not assessed (1)" in gone
+    assert "Not seen again, no repair shown (1)" in gone
     assert "In the newer mission the sensor was judged for 50.0 s of 100.0 s driving, which is too little." in gone
     assert "Resolved (" not in gone
 

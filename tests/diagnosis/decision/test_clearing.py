@@ -65,8 +65,28 @@ def test_limits_that_clear_more_are_named() -> None:
 def test_an_offset_that_nothing_would_show_is_said() -> None:
     rate = replace(_UNSHOWN, worst=0.1)
     yaw = replace(rate, check=Check.LASTING_YAW, worst=0.01, limit=0.04)
-    assert any("yaw rate" in c for c in verdict(machine(), checks=(rate,)).caveats)
-    assert not verdict(machine(), checks=(rate, yaw)).caveats
+    hidden = verdict(machine(), checks=(rate,))
+    assert "a yaw rate (imu.yaw_rate) would show it" in hidden.text
+    assert not hidden.caveats
+    assert any("yaw rate" in c for c in verdict(machine(), checks=(rate, _BEYOND)).caveats)
+    shown = verdict(machine(), checks=(rate, yaw))
+    assert "yaw rate" not in shown.text
+    assert not shown.caveats
+
+
+def test_steering_that_was_judged_for_part_of_the_driving_is_said_beside_ready() -> None:
+    parts = machine()
+    decided = {part: 20.0 if part != ("front", "actuator") else 11.0 for part in parts}
+    got = decide(
+        (), parts, decided, AXLES, LIMITS, (), HYDRAULIC, driving_s=dict.fromkeys(parts, 20.0), checks=(_WITHIN,)
+    )
+    assert got.status == "ready"
+    assert "The front steering valve was judged for 11 of 20 s only" in got.text
+    assert "the checks of its axle over the whole mission passed" in got.text
+    whole = decide(
+        (), parts, dict.fromkeys(parts, 20.0), AXLES, LIMITS, (), HYDRAULIC, driving_s=dict.fromkeys(parts, 20.0)
+    )
+    assert "only" not in whole.text
 
 
 @pytest.mark.parametrize("check", list(Check))

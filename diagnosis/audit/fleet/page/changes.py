@@ -16,7 +16,7 @@ _CHANGES: dict[FaultChange, tuple[str, str]] = {
     "new": ("+", "new"),
     "worse": ("▲", "worse"),
     "better": ("▼", "better"),
-    "not_seen_again": ("?", "not seen again, but not assessed"),
+    "not_seen_again": ("?", "not seen again, no repair shown"),
     "resolved": ("✓", "resolved"),
     "unchanged": ("=", "unchanged"),
 }
