@@ -139,7 +139,7 @@ def _found(
 
 def _recovered(key: tuple[str, Side, FaultMode], after_s: float, states: Sequence[StateRow]) -> bool:
     """Whether every side of a part was healthy for a second or more of the same mission behind a time [s]."""
-    healthy = {k: 0.0 for k in _keys(*key[:2])}
+    healthy = dict.fromkeys(_keys(*key[:2]), 0.0)
     for row in states:
         if (row["component"], row["side"]) in healthy and row["state"] == State.HEALTHY:
             healthy[row["component"], Side(row["side"])] += max(0.0, row["stop_s"] - max(after_s, row["start_s"]))
