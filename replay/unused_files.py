@@ -11,6 +11,9 @@ from replay.log.raw_log import LogSummary
 from replay.signals.signal import Signals
 
 _SHOWN = 6
+#: What is said of tables that hold nothing of a machine and are too slow to be the log of one.
+NO_LOG = "no log of a machine: "
+_SLOWEST_S = 10.0  # between two rows of a log
 
 
 class ReadFile(Protocol):
@@ -55,6 +58,11 @@ def require_use(files: Sequence[ReadFile], signals: Signals) -> None:
     if not signals.items and all(t.encoding == "table" for f in files for t in f.summary.topics):
         columns = [c for f in files for t in f.summary.topics for c in t.fields if c.strip()]
         shown = f" ({', '.join(columns[:_SHOWN])}{' …' if len(columns) > _SHOWN else ''})" if columns else ""
+        if all(_is_slow(f.summary) for f in files):
+            raise LogError(
+                f"{', '.join(str(f.path) for f in files)}: {NO_LOG}no column{shown} is called like a signal of a machine, and rows are "
+                f"{_SLOWEST_S:g} s and more apart"
+            )
         raise LogError(
             f"{', '.join(str(f.path) for f in files)}: no wheel signal: no column{shown} is called like a signal of a machine "
             "or stands in the machine file's [signals]; name them there (`mfhca channels LOG --all` lists them), or leave the file "
@@ -68,3 +76,9 @@ def require_use(files: Sequence[ReadFile], signals: Signals) -> None:
         f"{idle[0].path}: none of its channels is used, all signals were found in the other files; diagnose it by itself, "
         "or name its signals with source = in the machine file's [signals]"
     )
+
+
+def _is_slow(summary: LogSummary) -> bool:
+    """Whether a table's rows are so far apart that no motion shows in them."""
+    rows = max((t.count for t in summary.topics), default=0)
+    return rows > 1 and (summary.stop_ns - summary.start_ns) * 1e-9 >= _SLOWEST_S * (rows - 1)

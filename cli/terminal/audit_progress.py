@@ -80,7 +80,8 @@ def _lines(terminal: Terminal, counted: Counted) -> Emit:
         if terminal.verbose:
             _note(terminal, event, facts)
         now = time.monotonic()
-        if now - last > every or (terminal.verbose and event in ("planned", "page")):
+        told = terminal.verbose or event == "mission"
+        if (now - last > every and told) or (terminal.verbose and event in ("planned", "page")):
             last, every = now, _LINE_S if terminal.verbose else min(every * _LONGER, _LAST_S)
             parts = (f"{sum(counted.states.values())} of {counted.total}", clean(counted.text()))
             terminal.plain(" · ".join(part for part in parts if part))

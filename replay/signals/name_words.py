@@ -62,7 +62,10 @@ _MEANINGS = {
 _ENGLISH = {word: meaning for meaning, words in _MEANINGS.items() for word in words.split()}
 # Words that say nothing more behind others: Gierrate, Ventil Y VR.
 _DROPPED = {"yaw_rate": ("rate", "geschwindigkeit", "vitesse", "vit"), "valve": ("y", "u")}
-_FILLERS = frozenset(("wert", "werte", "value", "val", "values", "percent", "pct", "prozent", "pourcent"))
+_FILLERS = frozenset(
+    ("wert", "werte", "value", "val", "values", "percent", "pct", "prozent", "pourcent",
+     *("mps", "kmh", "kph", "radps", "rads", "degps", "degs", "dps"))  # units that are no other word
+)  # fmt: skip
 #: Words that ask for something: setpoints and commands, in English.
 ASKING = frozenset(
     ("ref", "reference", "cmd", "command", "commanded", "set", "setpoint", "des", "desired", "target", "demand", "soll",

@@ -9,8 +9,8 @@ from replay.signals.name_words import folded
 
 # Ends of names that people give to columns.
 _ENDS = (
-    (r"rpm|u_?min|umdr_?min|tr_?min|1_min|min_1", "rpm"), (r"mps|m_s", "m/s"), (r"kmh|kph|km_h", "km/h"),
-    (r"rads|rad_s", "rad/s"), (r"degs|deg_s|dps|grad_s", "deg/s"), (r"deg|grad", "deg"),
+    (r"rpm|u_?min|umdr_?min|tr_?min|1_min|min_1", "rpm"), (r"mps|m_s|m_per_s|mpers", "m/s"), (r"kmh|kph|km_h", "km/h"),
+    (r"rads|rad_s|radps|rad_per_s", "rad/s"), (r"degs|deg_s|degps|deg_per_s|dps|grad_s", "deg/s"), (r"deg|grad", "deg"),
     (r"pct|percent|prozent|pourcent", "%"), (r"bar", "bar"), (r"nm", "N·m"),
 )  # fmt: skip
 # Ends that may be another word: ms a time, Rad a wheel, current a quantity.

@@ -68,6 +68,13 @@ def test_without_wheels_the_error_names_the_file(tmp_path: Path) -> None:
         load_mission([log], haulotte())
 
 
+def test_a_slow_table_that_holds_nothing_of_a_machine_is_no_log(tmp_path: Path) -> None:
+    log = tmp_path / "oil.csv"
+    log.write_text("date,iron_ppm\n2026-10-04,12\n2026-10-11,13\n2026-10-18,15\n")
+    with pytest.raises(LogError, match=r"oil\.csv: no log of a machine: no column .*iron_ppm"):
+        load_mission([log], haulotte())
+
+
 def test_files_of_different_days_are_refused(tmp_path: Path) -> None:
     a = write_table(tmp_path / "a.csv", "wheel.FR.v", np.arange(200.0) / 1000)
     b = write_table(tmp_path / "b.csv", "wheel.FR.u", np.arange(200.0) / 1000, start=START + 86_400 * 10**9)

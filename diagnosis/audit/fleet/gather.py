@@ -55,6 +55,8 @@ def machines_of(
     limits = cache(limits) if limits else None
     owners = Owners(missions, folder)
     for m in missions:
+        if m.result is not None and m.result.no_log:
+            continue
         key, other = owners.of(m)
         if other:
             nowhere.append(m)

@@ -24,6 +24,7 @@ from diagnosis.audit.store.repairs import Repair, read_repairs
 from diagnosis.audit.store.store import FILE_NAME
 from diagnosis.results.vocabulary import Severity, Verdict
 from replay.faults import Side
+from replay.unused_files import NO_LOG
 
 CALENDAR_NS = 946_684_800 * 10**9  # a clock that says a time before 2000 does not know the date
 
@@ -77,6 +78,11 @@ class Result:
     config_hash: str
     faults: tuple[FoundFault, ...]
     parts: Parts
+
+    @property
+    def no_log(self) -> bool:
+        """Whether it is a table that is no machine's log, so that nothing of a machine is missing with it."""
+        return self.state is MissionState.UNREADABLE and f": {NO_LOG}" in self.reason
 
     @property
     def judged(self) -> bool:

@@ -39,6 +39,20 @@ def test_a_fault_that_was_not_seen_again_is_said_of_an_earlier_mission(tmp_path:
     assert one.name == "b"
 
 
+def test_a_table_that_is_no_log_blocks_no_machine(tmp_path: Path) -> None:
+    for reason, leave in (
+        ("HX-1/oil.csv: no log of a machine: no column (iron_ppm) is called like a signal", Leave.MAY),
+        ("HX-1/b.csv: no wheel signal: no column (a) is called like a signal of a machine", Leave.NOT_KNOWN),
+    ):
+        other = Sample("HX-1/oil", "HX-1", None, "unreadable", None, reason=reason)
+        document = fleet_json(
+            load_fleet(samples.write_store(tmp_path / leave.value / "fleet.sqlite", [Sample("HX-1/a"), other]))
+        )
+        (one,) = lists_of(document)
+        assert one.leave is leave
+        assert "oil" in build_fleet_page(document)
+
+
 def test_the_page_shows_as_many_machines_as_the_lists_hold(tmp_path: Path) -> None:
     document = fleet_json(load_fleet(samples.write_store(tmp_path / "fleet.sqlite", samples.few())))
     page = build_fleet_page(document)
