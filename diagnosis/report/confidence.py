@@ -78,7 +78,7 @@ def _judged_words(share: float, moving: str) -> str:
 
 
 def _likely(p: float) -> str:
-    return next((words for least, words in _WORDS if p >= least), "Possible" if p < 0.5 else "Probable")
+    return next((words for least, words in _WORDS if round(p, 3) >= least), "Possible" if p < 0.5 else "Probable")
 
 
 def judged(report: ReportDocument) -> str:

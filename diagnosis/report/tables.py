@@ -148,8 +148,8 @@ def _delay(fault: IntervalRow) -> str:
 
 def other_caveats(verdict: VerdictRow) -> list[str]:
     """Caveats but those that stand beside what would clear them."""
-    said = {row["reason"] for row in verdict.get("to_clear", [])}
-    return [text for text in verdict["caveats"] if text not in said]
+    said = {row["reason"].rstrip(".") for row in verdict.get("to_clear", [])}
+    return [text for text in verdict["caveats"] if text.rstrip(".") not in said]
 
 
 def clearing_sentences(verdict: VerdictRow) -> list[tuple[str, str]]:

@@ -23,6 +23,7 @@ from replay.readers.twincat.text_groups import Group, Repeats, finished_stamps, 
 from replay.readers.twincat.text_header import HOW, START, Scope, open_scope
 
 _SPARSE = 1024  # right-hand groups may end early
+_MISSING_S = 1.0  # at the end, by the header
 
 
 class TwincatCsvReader:
@@ -205,6 +206,9 @@ def _log(
         raise LogError(f"{path}: none of its columns holds numbers; {HOW}")
     used = [c.stamps for c in channels.values() if len(c.stamps)]
     start, stop = (int(min(s.min() for s in used)), int(max(s.max() for s in used))) if used else (0, 0)
+    missing = scope.missing_s(stop)
+    if used and window is None and missing is not None and missing >= _MISSING_S:
+        report.note(f"{path.name}: its header has the recording end {missing:.1f} s later than its rows do")
     said = tuple(report.notes), tuple(report.damage)
     summary = LogSummary(str(path), "twincat", start, stop, tuple(topics), *said, scope.metadata)
     return RawLog(str(path), "twincat", clock, channels, summary, report.store)

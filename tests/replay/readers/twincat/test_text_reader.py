@@ -192,6 +192,15 @@ def test_an_export_that_was_cut_off_loses_its_last_row(target: Path) -> None:
     assert any("does not end in EOF" in d for d in log.summary.damage)
 
 
+@pytest.mark.parametrize(("later_s", "told"), [(0.5, False), (60.0, True)])
+def test_a_header_that_ends_later_than_the_rows_is_told(target: Path, later_s: float, told: bool) -> None:
+    lines = list(TOOL)
+    at = next(i for i, line in enumerate(lines) if line.lower().startswith("endtime"))
+    lines[at] = f"EndTime of export\t{START + int(later_s * 1e7)}\t2022-06-15\t10:01:00"
+    notes = read(write(target, lines)).summary.notes
+    assert any("end 60.0 s later than its rows" in n for n in notes) is told
+
+
 def test_cells_that_are_no_numbers_are_counted(target: Path) -> None:
     lines = [x.replace("1\t1,75", "1\t###") for x in TOOL]
     log = read(write(target, lines))
