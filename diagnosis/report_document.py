@@ -19,6 +19,7 @@ from diagnosis.decision.caveats import more_caveats
 from diagnosis.decision.decide import Decision, decide
 from diagnosis.decision.intervals import intervals_of, spans_of
 from diagnosis.decision.scale import Scale, scale_of
+from diagnosis.decision.wording import join_words
 from diagnosis.results.assessment import CODE
 from diagnosis.results.clearing import Checked, clearing_rows
 from diagnosis.results.detectability import Detectability, detectability_table
@@ -204,11 +205,8 @@ def _scope(judged: Judged) -> tuple[str, ...]:
         out.append(
             f"the {machine.part}{'s' if len(left_out) > 1 else ''} {', '.join(left_out)} {'were' if len(left_out) > 1 else 'was'} not judged"
         )
-    out += [
-        f"the {axle.removesuffix('_steer')} steering was not judged"
-        for axle in machine.axles
-        if _unjudged(judged.found, axle)
-    ]
+    unjudged = [axle.removesuffix("_steer") for axle in machine.axles if _unjudged(judged.found, axle)]
+    out += [f"the {join_words(unjudged)} steering was not judged"] if unjudged else []
     out += [
         f"for {missing * line.dt:.1f} s of {line.size * line.dt:.1f} s, without data, the {axle.removesuffix('_steer')} steering was not judged"
         for axle in machine.axles

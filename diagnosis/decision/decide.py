@@ -171,7 +171,7 @@ def decide(
     )
     open_points = to_clear(against, assessments, decided_s, driven, axles, limits, intervals)
     found = _with_faults(intervals, against) or _without_faults(assessments, decided_s, axles, against)
-    if found.status is Verdict.NOT_ASSESSED and open_points:
+    if found.status is Verdict.NOT_ASSESSED and open_points and not against.misplaced:  # which says it itself
         found = replace(found, text=f"{found.text} To clear it: {open_points[0].act}.")
     said = found.title == _SENSORS_ALONE  # which parts are not judged, and why
     caveats = caveats_of(against, assessments, decided_s, driven, axles, limits, short_named=said)

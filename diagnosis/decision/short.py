@@ -18,6 +18,7 @@ from replay.machine.config import Limits
 #: A component and its side.
 Part = tuple[str, str]
 
+_NOT_LOGGED = "not in the log"  # ends the reason of an axle without a signal
 _SAID_S = 0.05  # of judged driving: less is nothing
 _NOT_SAID = "no {valve} command"  # begins the reason of a model without it
 _NO_DRIVE = "no {valve} is seen there"  # ends the reason of a wheel whose effort is nothing from end to end
@@ -101,12 +102,13 @@ def unjudged_axles(axles: Sequence[Part], assessments: Mapping[Part, Assessment]
     """Parts of the steering that nothing judged."""
     who = join_words([words.part_words(Kind.STEER, *part) for part in axles])
     first = assessments[axles[0]]
+    reason = main_reason(first, main_state(first))
     act = (
-        "steer from stop to stop twice while the log runs"
-        if STATES.index(State.NOT_EXCITED) in first.states
-        else "log steer.<part>.phi and steer.<part>.u, and steer from stop to stop twice while driving"
+        "log steer.<part>.phi and steer.<part>.u, and steer from stop to stop twice while driving"
+        if reason.endswith(_NOT_LOGGED)
+        else "steer from stop to stop twice while the log runs"
     )
-    return ToClear(f"Not assessed: {who} ({main_reason(first, main_state(first))}).", act)
+    return ToClear(f"Not assessed: {who} ({reason}).", act)
 
 
 def exempt_axles(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -26,6 +27,7 @@ from diagnosis.results.document import (
     MachineRow,
     QualityRow,
     ReportDocument,
+    ToClearRow,
     VerdictRow,
 )
 from diagnosis.results.fault_rows import state_label
@@ -155,8 +157,14 @@ def other_caveats(verdict: VerdictRow) -> list[str]:
 def clearing_sentences(verdict: VerdictRow) -> list[tuple[str, str]]:
     """What keeps the machine from being cleared and what would clear it, but for what the verdict's own sentences say."""
     text = verdict["text"]
-    rows = [row for row in verdict.get("to_clear", []) if row["reason"] not in text]
+    rows = [row for row in verdict.get("to_clear", []) if not _said(row, text)]
     return [(_begun(row["reason"]), "" if row["act"] in text else row["act"]) for row in rows]
+
+
+def _said(row: ToClearRow, text: str) -> bool:
+    """Whether the verdict's sentences give a reason, or why parts were not judged together with what would clear them."""
+    why = re.search(r"^Not judged: .* \((.*)\)\.$", row["reason"])
+    return row["reason"] in text or (why is not None and why[1] in text and row["act"] in text)
 
 
 def _begun(text: str) -> str:

@@ -67,7 +67,9 @@ class Scope:
 
     def missing_s(self, last_ns: int) -> float | None:
         """By how much the head has the recording end later than a last stamp [s]; None where it does not say when it ends."""
-        found = re.match(r"\d{17,19}(?!\d)", self.metadata.get("scope.endtime", self.metadata.get("scope.endrecord", "")))
+        found = re.match(
+            r"\d{17,19}(?!\d)", self.metadata.get("scope.endtime", self.metadata.get("scope.endrecord", ""))
+        )
         if found is None or abs(stop := (int(found[0]) - FILETIME_EPOCH) * 100) >= 2**62:
             return None
         return (stop - last_ns) * 1e-9
