@@ -18,7 +18,7 @@ from replay.machine.config import Limits
 #: A component and its side.
 Part = tuple[str, str]
 
-_NOT_LOGGED = "not in the log"  # ends the reason of an axle without a signal
+_NOT_LOGGED = "in the log"  # ends the reason of an axle without a signal, or of which nothing is there
 _SAID_S = 0.05  # of judged driving: less is nothing
 _NOT_SAID = "no {valve} command"  # begins the reason of a model without it
 _NO_DRIVE = "no {valve} is seen there"  # ends the reason of a wheel whose effort is nothing from end to end

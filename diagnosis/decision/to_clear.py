@@ -16,7 +16,7 @@ from diagnosis.results.left_out import is_left_out
 from diagnosis.results.machine_words import MachineWords
 from diagnosis.results.result import FaultInterval
 from diagnosis.results.vocabulary import Kind, Severity, Tier
-from replay.faults import Side
+from replay.faults import Side, State
 from replay.machine.config import Limits
 
 _STEERING = "steering was not judged"
@@ -107,7 +107,8 @@ def to_clear(
     out += _of_checks([c for k, c in enumerate(against.open) if k not in blamed], twice)
     steered = [k for k in assessments if k[0] in axles]
     unjudged = [k for k in steered if assessments[k].tier is Tier.NONE]
-    brief = [k for k in steered if k not in unjudged and _brief(k, decided_s, driven, limits)]
+    at_rest = {k for k, state in against.open_state.items() if state is State.NOT_EXCITED}  # exempt: its checks count
+    brief = [k for k in steered if k not in {*unjudged, *at_rest} and _brief(k, decided_s, driven, limits)]
     out += short_parts(brief, assessments, decided_s, driven, limits, words, Kind.STEER, open_state=against.open_state)
     return tuple(out + ([unjudged_axles(unjudged, assessments, words)] if unjudged else []))
 
