@@ -28,6 +28,7 @@ _VERDICTS = (Verdict.STOP, Verdict.WATCH, Verdict.READY, Verdict.NOT_ASSESSED)
 _WORST_FIRST = (MissionState.CRASHED, MissionState.OUT_OF_MEMORY, MissionState.TIMEOUT, MissionState.UNREADABLE)
 _LEAVES = {Leave.MUST_NOT: Verdict.STOP, Leave.NOT_KNOWN: Verdict.NOT_ASSESSED, Leave.MAY: Verdict.READY}
 _SHOWN, _MACHINES, _FAULTS = 10, 20, 2
+_NAMED = 5  # missions
 
 
 def plan_parts(rows: Sequence[tuple[Planned, str]], found: Discovery) -> list[RenderableType]:
@@ -70,6 +71,11 @@ def summary_parts(audited: Audited, found: Discovery, output: Path) -> list[Rend
         [f"{states['degraded']} with damage or parts that cannot be judged"] if states[MissionState.DEGRADED] else []
     )
     parts.append(text(", ".join(notes), "dim"))
+    damaged = [end.name for end in ends if end.state is MissionState.DEGRADED]
+    if damaged:
+        rest = len(damaged) - _NAMED
+        more = f" and {rest} more" if rest > 0 else ""
+        parts.append(text(f"damaged, or in part not judged: {', '.join(damaged[:_NAMED])}{more}", "dim"))
     if audited.gone:
         was = "mission that is" if audited.gone == 1 else "missions that are"
         parts.append(text(f"the fleet page also counts {audited.gone} {was} no longer there", "dim"))
