@@ -50,6 +50,7 @@ def test_failures_stand_first_then_machines_then_counts_and_the_page() -> None:
         "Missions",
         "stop and repair: 1 · faults to watch: 1 · ready: 1 · not assessed: 1 · unreadable: 1 · crashed: 1",
         "6 in all, 2 of them from an earlier run, 1 with damage or parts that cannot be judged",
+        "damaged, or in part not judged: e",
         "fleet page  out/fleet.html",
         "failures    out/failures.txt",
     ]
