@@ -227,7 +227,8 @@ def _by_word(channel: Channel, text: str, last: Sequence[str], unit: str) -> Ite
         return
     signal = next((signal for signal, pattern in _MACHINE_PATTERNS if re.search(pattern, text)), None)
     asks = role(last)
-    if "yaw_rate" in last and asks != "both":
+    turns = "yaw_rate" in last or ({*last} - MEASURED == {"yaw", "rate"} and not re.search(r"odom|est", text))
+    if turns and asks != "both":
         signal = "cmd.omega" if asks == "ref" else signal or "imu.yaw_rate"
     elif signal is None and (asks == "ref" or "joystick" in last) and _is_speed(last, unit) and {*last} <= _WHOLE:
         signal = "cmd.v"

@@ -226,6 +226,30 @@ def test_units_in_names() -> None:
     assert (unit_by_end("speed_kmh"), unit_by_end("RPM"), unit_by_end("RPM", doubtful=True)) == ("km/h", "", "rpm")
 
 
+@pytest.mark.parametrize(
+    ("name", "signal", "unit"),
+    [
+        ("yaw_rate_radps", "imu.yaw_rate", "rad/s"),
+        ("yaw_rate_degps", "imu.yaw_rate", "deg/s"),
+        ("yaw_rate", "imu.yaw_rate", ""),
+        ("cmd_yaw_rate_radps", "cmd.omega", "rad/s"),
+        ("odom_yaw_rate_radps", None, ""),
+        ("speed_cmd_mps", "cmd.v", "m/s"),
+        ("front_left_wheel_cmd_mps", "wheel.FL.v_ref", "m/s"),
+        ("front_left_wheel_speed_rad_per_s", "wheel.FL.v", "rad/s"),
+        ("front_left_wheel_setpoint_radps", "wheel.FL.v_ref", "rad/s"),
+    ],
+)
+def test_units_that_are_written_as_a_word(name: str, signal: str | None, unit: str) -> None:
+    assert found(column(name)) == ([] if signal is None else [(signal, unit)])
+
+
+@pytest.mark.parametrize("names", ["w{}_rpm", "m{}_speed"])
+def test_wheels_that_are_a_letter_with_a_number(names: str) -> None:
+    channels = {n: column(n) for n in (names.format(i) for i in range(4))}
+    assert [c.signal for c in candidates(channels, haulotte())] == [f"wheel.{w}.v" for w in haulotte().wheels]
+
+
 def test_words() -> None:
     assert folded("Stellgröße, arrière") == "Stellgroesse, arriere"
     assert tokens("rLenkwinkelSoll_VA") == ["lenk", "winkel", "soll", "va"]
