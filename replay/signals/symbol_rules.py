@@ -226,11 +226,12 @@ def _by_word(channel: Channel, text: str, last: Sequence[str], unit: str) -> Ite
     if re.search(r"wheel|steer|valve|axle", text) or any(is_place(w) and w != "fwd" for w in last):
         return
     signal = next((signal for signal, pattern in _MACHINE_PATTERNS if re.search(pattern, text)), None)
-    asks = role(last)
+    asks, named = role(last), True
     turns = "yaw_rate" in last or ({*last} - MEASURED == {"yaw", "rate"} and not re.search(r"odom|est", text))
     if turns and asks != "both":
+        named = signal is not None or asks == "ref"
         signal = "cmd.omega" if asks == "ref" else signal or "imu.yaw_rate"
     elif signal is None and (asks == "ref" or "joystick" in last) and _is_speed(last, unit) and {*last} <= _WHOLE:
         signal = "cmd.v"
     if signal is not None:
-        yield Candidate(signal, source_of(channel, unit), 9, f"{channel.name} by its name")
+        yield Candidate(signal, source_of(channel, unit), 9 if named else 10, f"{channel.name} by its name")
