@@ -43,6 +43,7 @@ from diagnosis.response.models import (
 from diagnosis.response.power import powers_of
 from diagnosis.response.rivals import by_each_other, held_back_together, jumped, others_fault, shared
 from diagnosis.response.sides import sides_of
+from diagnosis.response.sideways import goes_sideways
 from diagnosis.response.spells import spells_of, where_asked
 from diagnosis.response.turning import turning_of, turns_with, wrong_yaw_rate
 from diagnosis.results.assessment import CODE, Assessment, Finding
@@ -108,7 +109,9 @@ def assess_response(
     found = by_each_other(found, width * dt, rest)
     holds = {w: holds_of(j.wheel.samples, _MOVES * limits.driving_speed, dt) for w, j in found.items()}
     found = {w: j._replace(wheel=j.wheel._replace(habit=_habit(w, holds))) for w, j in found.items()}
-    sideways = any(d.commands.shape[1] > _BODY_COMMANDS for d in drives)
+    sideways = any(d.commands.shape[1] > _BODY_COMMANDS for d in drives) or goes_sideways(
+        {w: j.wheel.blocks.mean for w, j in found.items()}, geometry, width * dt
+    )
     bodies = Bodies(speeds, None if yaw is None else cells(yaw, width), width * dt, sideways)
     efforts = {w: cells(j.data.effort, width) for w, j in found.items() if j.data.effort is not None and not sideways}
     mates = {w: tuple(o for o in found if o != w and same_side(w, o, geometry)) for w in found}
@@ -209,6 +212,9 @@ def _wheels(
             continue
         # a wheel that alone makes nothing of its command is judged by the others, and by its channel
         response = without_command(-(-y.size // cell)) if found is None else found
+        if response.answered and samples.wild.any():
+            around = response.reach(d.commands, cell, dt, y.size)
+            samples = samples_of(np.where(hidden[w], np.nan, y), d.fresh, around)
         blocks = blocks_of(samples, response, cell, width, y.size)
         moves = np.abs(np.nan_to_num(blocks.mean))
         if response.answered:
