@@ -36,6 +36,7 @@ _WHITE_UP = np.log(3.0)
 _LONG_S = 2.0  # a value held for longer is no habit, unless a quarter of the driving is like that
 _STILL = 0.02  # of the usual top speed
 _QUIET = 0.01  # of the usual top speed: less than that from sample to sample is no noise worth a word
+_STEP, _FAST = 0.25, 2.0  # of the range that a command makes a speed go through, in so many readings of a block: that is its roughness
 _NEVER = -60.0
 
 
@@ -136,10 +137,13 @@ def blocks_of(samples: Samples, response: Response, cell: int, width: int, size:
     cells = np.minimum((start + width // 2) // cell, response.low.size - 1)
     white = np.sqrt(total(samples.white**2) / np.maximum(count, 1))
     top = float(np.nanquantile(np.abs(samples.value), 0.99))
-    usual = np.maximum(_usual_white(white, np.abs(mean), count), _QUIET * top)
+    low, high = response.low[cells], response.high[cells]
+    swing = _STEP * min(1.0, _FAST / max(float(np.median(count[count > 0])), 1.0)) if count.any() else 0.0
+    asked = swing * np.where(np.isfinite(high - low), high - low, 0.0)
+    usual = np.maximum(np.maximum(_usual_white(white, np.abs(mean), count), _QUIET * top), asked)
     still = np.abs(samples.value) <= _STILL * top
     return Blocks(
-        start, mean, response.low[cells], response.high[cells], response.noise[cells], count,
+        start, mean, low, high, response.noise[cells], count,
         total(samples.same), total(still), white, usual,
     )  # fmt: skip
 
