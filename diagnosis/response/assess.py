@@ -119,7 +119,7 @@ def assess_response(
     beside_it = {w: tuple(o for o in mates[w] if o in efforts) or tuple(o for o in found if o != w) for w in found}
     pulls, spans = shares_of(found, efforts, beside_it), idle_spans(efforts, found, beside_it, width * dt)
     found = {
-        w: j._replace(rolls=w in none, wheel=j.wheel._replace(pull=own_pull(j, efforts.get(w), pulls.get(w))))
+        w: j._replace(yaw=yaw, rolls=w in none, wheel=j.wheel._replace(pull=own_pull(j, efforts.get(w), pulls.get(w))))
         for w, j in found.items()
     }
     names = {w: j.data.name for w, j in found.items()}

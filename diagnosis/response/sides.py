@@ -13,6 +13,7 @@ from diagnosis.response.findings import Wheel, finding_of
 from diagnosis.response.inputs import cell_of
 from diagnosis.response.machine import Judged
 from diagnosis.response.models import HEALTHY, LEAST_P, NOISY, OTHER, SILENT
+from diagnosis.response.shaking import shaken
 from diagnosis.response.spells import Spell
 from diagnosis.results.assessment import CODE, Assessment, Finding
 from diagnosis.results.evidence_columns import Pictured, steps_of
@@ -81,7 +82,7 @@ def sides_of(
         long = (spell.stop - spell.start) * width * dt >= _LEAST_S
         found = finding_of(spell, *_shown_by(one, spell)) if long and spell.p >= LEAST_P else None
         if found is not None:
-            findings.append(_by_itself(found) if one.alone else _undriven(found) if one.rolls else found)
+            findings.append(_by_itself(found) if one.alone else _undriven(found) if one.rolls else shaken(found, one))
         elif one.posterior[spell.start : spell.stop].argmax(axis=1).min() > NOISY and _entered_calmly(
             one, spell, width, dt
         ):
