@@ -44,7 +44,7 @@ from diagnosis.response.power import powers_of
 from diagnosis.response.rivals import by_each_other, held_back_together, jumped, others_fault, shared
 from diagnosis.response.sides import sides_of
 from diagnosis.response.sideways import goes_sideways
-from diagnosis.response.spells import spells_of, where_asked
+from diagnosis.response.spells import spells_of, until_back, where_asked
 from diagnosis.response.turning import turning_of, turns_with, wrong_yaw_rate
 from diagnosis.results.assessment import CODE, Assessment, Finding
 from replay.faults import State
@@ -136,6 +136,7 @@ def assess_response(
     least = max(1, round(_LEAST_S / BLOCK_S))
     asked = {w: _asked(j, limits) for w, j in judged.items()}
     kept = {w: where_asked(spells, asked[w], least) for w, spells in kept.items()}
+    kept = {w: until_back(spells, judged[w].wheel.blocks.dead, asked[w]) for w, spells in kept.items()}
     kept = {w: [s for s in spells if not stands_with_all(s, w, judged, asked)] for w, spells in kept.items()}
     turning = turning_of(judged, geometry, bodies.yaw if not sideways else None)
     kept = {w: [s._replace(turns=turns_with(w, s, judged, turning)) for s in spells] for w, spells in kept.items()}

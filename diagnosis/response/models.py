@@ -36,7 +36,10 @@ _WHITE_UP = np.log(3.0)
 _LONG_S = 2.0  # a value held for longer is no habit, unless a quarter of the driving is like that
 _STILL = 0.02  # of the usual top speed
 _QUIET = 0.01  # of the usual top speed: less than that from sample to sample is no noise worth a word
-_STEP, _FAST = 0.25, 2.0  # of the range that a command makes a speed go through, in so many readings of a block: that is its roughness
+_STEP, _FAST = (
+    0.25,
+    2.0,
+)  # of the range that a command makes a speed go through, in so many readings of a block: that is its roughness
 _NEVER = -60.0
 
 
@@ -80,6 +83,11 @@ class Blocks(NamedTuple):
     def held(self) -> Flags:
         """Blocks whose every reading repeats the one before. Shape (blocks,)."""
         return np.asarray((self.readings > 0) & (self.same == self.readings))
+
+    @property
+    def dead(self) -> Flags:
+        """Blocks in which nothing but one reading of standstill came, or none. Shape (blocks,)."""
+        return np.asarray((self.same == self.readings) & (self.zero == self.readings))
 
 
 class Beside(NamedTuple):

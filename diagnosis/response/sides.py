@@ -93,6 +93,8 @@ def sides_of(
     sensor = np.where(driving, CODE[State.HEALTHY], CODE[State.NOT_EXCITED]).astype(np.int8)
     unseen = not one.response.answered and one.speed is None
     sensor[np.repeat(doubtful | (one.driving & unseen), width)[:size]] = CODE[State.NOT_ASSESSED]
+    if one.speed is None:  # nothing says what it should read
+        sensor[driving & _uncommanded(one, cell_of(dt), size)] = CODE[State.NOT_ASSESSED]
     drive = np.where(driving, CODE[State.NOT_ASSESSED], CODE[State.NOT_EXCITED]).astype(np.int8)
     for states in (sensor, drive):
         states[idle] = CODE[State.NOT_ASSESSED]
@@ -106,6 +108,11 @@ def sides_of(
         sensor[f.start : f.stop] = CODE[State(f.mode.value)]
         drive[f.start : f.stop] = CODE[State(f.mode.value) if f in both else State.MASKED]
     return _assessment(one, sensor, tuple(findings), limits, dt), _drive(one, drive, (*drives, *both))
+
+
+def _uncommanded(one: Judged, cell: int, size: int) -> Flags:
+    """Steps at which no command is known, shape (size,): a robot may go on with the last one, or stop."""
+    return np.repeat(~np.isfinite(one.data.commands).all(axis=1), cell)[:size]
 
 
 def _by_itself(found: Finding) -> Finding:

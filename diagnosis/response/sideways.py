@@ -16,7 +16,10 @@ from replay.machine.geometry import Geometry
 Array = NDArray[np.float64]
 
 _APART, _TOGETHER = 0.15, 0.25  # of the top speed; residual by the difference
-_MOSTLY, _LEAST_S = 0.3, 4.0  # of the time in which wheels of a side differ, one that is wrong included, and how long it must be
+_MOSTLY, _LEAST_S = (
+    0.3,
+    4.0,
+)  # of the time in which wheels of a side differ, one that is wrong included, and how long it must be
 
 
 def goes_sideways(means: Mapping[str, Array], geometry: Geometry | None, block_s: float) -> bool:
