@@ -43,7 +43,8 @@ from diagnosis.response.models import (
 from diagnosis.response.power import powers_of
 from diagnosis.response.rivals import by_each_other, held_back_together, jumped, others_fault, shared
 from diagnosis.response.sides import sides_of
-from diagnosis.response.spells import spells_of, where_asked
+from diagnosis.response.sideways import goes_sideways
+from diagnosis.response.spells import spells_of, until_back, where_asked
 from diagnosis.response.turning import turning_of, turns_with, wrong_yaw_rate
 from diagnosis.results.assessment import CODE, Assessment, Finding
 from replay.faults import State
@@ -108,7 +109,9 @@ def assess_response(
     found = by_each_other(found, width * dt, rest)
     holds = {w: holds_of(j.wheel.samples, _MOVES * limits.driving_speed, dt) for w, j in found.items()}
     found = {w: j._replace(wheel=j.wheel._replace(habit=_habit(w, holds))) for w, j in found.items()}
-    sideways = any(d.commands.shape[1] > _BODY_COMMANDS for d in drives)
+    sideways = any(d.commands.shape[1] > _BODY_COMMANDS for d in drives) or goes_sideways(
+        {w: j.wheel.blocks.mean for w, j in found.items()}, geometry, width * dt
+    )
     bodies = Bodies(speeds, None if yaw is None else cells(yaw, width), width * dt, sideways)
     efforts = {w: cells(j.data.effort, width) for w, j in found.items() if j.data.effort is not None and not sideways}
     mates = {w: tuple(o for o in found if o != w and same_side(w, o, geometry)) for w in found}
@@ -116,7 +119,7 @@ def assess_response(
     beside_it = {w: tuple(o for o in mates[w] if o in efforts) or tuple(o for o in found if o != w) for w in found}
     pulls, spans = shares_of(found, efforts, beside_it), idle_spans(efforts, found, beside_it, width * dt)
     found = {
-        w: j._replace(rolls=w in none, wheel=j.wheel._replace(pull=own_pull(j, efforts.get(w), pulls.get(w))))
+        w: j._replace(yaw=yaw, rolls=w in none, wheel=j.wheel._replace(pull=own_pull(j, efforts.get(w), pulls.get(w))))
         for w, j in found.items()
     }
     names = {w: j.data.name for w, j in found.items()}
@@ -133,6 +136,7 @@ def assess_response(
     least = max(1, round(_LEAST_S / BLOCK_S))
     asked = {w: _asked(j, limits) for w, j in judged.items()}
     kept = {w: where_asked(spells, asked[w], least) for w, spells in kept.items()}
+    kept = {w: until_back(spells, judged[w].wheel.blocks.dead, asked[w]) for w, spells in kept.items()}
     kept = {w: [s for s in spells if not stands_with_all(s, w, judged, asked)] for w, spells in kept.items()}
     turning = turning_of(judged, geometry, bodies.yaw if not sideways else None)
     kept = {w: [s._replace(turns=turns_with(w, s, judged, turning)) for s in spells] for w, spells in kept.items()}
@@ -209,6 +213,9 @@ def _wheels(
             continue
         # a wheel that alone makes nothing of its command is judged by the others, and by its channel
         response = without_command(-(-y.size // cell)) if found is None else found
+        if response.answered and samples.wild.any():
+            around = response.reach(d.commands, cell, dt, y.size)
+            samples = samples_of(np.where(hidden[w], np.nan, y), d.fresh, around)
         blocks = blocks_of(samples, response, cell, width, y.size)
         moves = np.abs(np.nan_to_num(blocks.mean))
         if response.answered:

@@ -15,6 +15,8 @@ _AROUND = 3  # samples on each side that a wild reading is compared with
 _COARSE = 0.1  # of the readings of a moving wheel: as many that are far off are steps of a coarse encoder
 _MOVES = 0.1  # of the usual top speed
 _WILD_SHARE, _WILD_NOISE = 0.4, 12.0  # of the usual top speed; times the usual distance from the neighbours
+_NEAR = 0.2  # of the usual top speed: so near to what the command explains nothing is wild
+_LEAP = 0.75  # of that, from the last reading before and to the first one after that are not wild
 
 
 class Samples(NamedTuple):
@@ -44,7 +46,7 @@ class Samples(NamedTuple):
     white: Array
 
 
-def samples_of(y: Array, fresh: Flags) -> Samples:
+def samples_of(y: Array, fresh: Flags, band: tuple[Array, Array] | None = None) -> Samples:
     """New samples of a channel, with what is wild in them set aside.
 
     Parameters
@@ -53,10 +55,15 @@ def samples_of(y: Array, fresh: Flags) -> Samples:
         Readings [m/s]; NaN where not valid.
     fresh : Flags, shape (n,)
         Steps with a new sample.
+    band : tuple[Array, Array] or None, each of shape (n,)
+        Between what a command makes the speed be around that time [m/s]: what it explains is not wild.
     """
     step = np.flatnonzero(fresh & np.isfinite(y))
     value = y[step].astype(np.float64)
     wild = _wild(value)
+    if band is not None and wild.any():
+        near = _NEAR * float(np.quantile(np.abs(value), 0.9))
+        wild &= ~((value >= band[0][step] - near) & (value <= band[1][step] + near))
     value = np.where(wild, np.nan, value)
     before = np.r_[np.nan, value[:-1]]
     change = value - before
@@ -118,6 +125,19 @@ def _wild(value: Array) -> Flags:
     usual = median_filter(value, 2 * _AROUND + 1, mode="nearest")
     off = np.abs(value - usual)
     top = float(np.quantile(np.abs(usual), 0.99))
-    wild = np.asarray(off > max(_WILD_SHARE * top, _WILD_NOISE * float(np.quantile(off, 0.75)), 1e-9))
+    least = max(_WILD_SHARE * top, _WILD_NOISE * float(np.quantile(off, 0.75)), 1e-9)
+    wild = np.asarray(off > least)
+    wild &= _leaps(value, wild, least)
     moving = wild | (np.abs(usual) > _MOVES * top)
     return wild if np.count_nonzero(wild) < _COARSE * np.count_nonzero(moving) else np.zeros_like(wild)
+
+
+def _leaps(value: Array, wild: Flags, least: float) -> Flags:
+    """Whether readings leave, and are left, by leaps to one side: on a short start or stop that few readings show one lies between others."""
+    good = np.flatnonzero(~wild)
+    if not good.size:
+        return wild
+    at = np.searchsorted(good, np.arange(value.size))
+    before, after = good[np.maximum(at - 1, 0)], good[np.minimum(at, good.size - 1)]
+    rises, falls = value - value[before], value - value[after]
+    return np.asarray((np.sign(rises) == np.sign(falls)) & (np.minimum(np.abs(rises), np.abs(falls)) > _LEAP * least))

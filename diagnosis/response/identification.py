@@ -56,6 +56,25 @@ class Response(NamedTuple):
         """Whether a command says what is expected."""
         return self.weights.size > 0
 
+    def reach(self, commands: Array, cell: int, dt: float, size: int) -> tuple[Array, Array]:
+        """Between what the commands could make of the speed around each step [m/s], at once or with the lag; both of shape (size,).
+
+        Parameters
+        ----------
+        commands : Array, shape (cells, k)
+            As for `identify_response`.
+        cell, size : int
+            Steps of a cell, and of the mission.
+        dt : float
+            Step [s].
+        """
+        h = cell * dt
+        around = max(1, round(_TIMING_S / h))
+        target = _target(commands, self.weights, self.limit, self.delay / h)
+        low = np.minimum(self.low, _moving(target, around, np.minimum)) - self.noise
+        high = np.maximum(self.high, _moving(target, around, np.maximum)) + self.noise
+        return np.repeat(low, cell)[:size], np.repeat(high, cell)[:size]
+
 
 def without_command(size: int) -> Response:
     """What is expected of a drive whose command is not logged: any speed."""
@@ -135,6 +154,12 @@ def _within(asked: Array, weights: Array, limit: float) -> Array:
     return np.asarray(np.linalg.lstsq(asked, made, rcond=None)[0], dtype=np.float64)
 
 
+def _target(commands: Array, weights: Array, limit: float, delay: float) -> Array:
+    """Speed that commands ask for, within its limit, `delay` cells later; shape (cells,)."""
+    target = np.clip(np.nan_to_num(commands) @ weights, -limit, limit)
+    return np.asarray(np.interp(np.arange(target.size) - delay, np.arange(target.size), target))
+
+
 def as_another(response: Response, commands: Array, share: Array, h: float) -> Response:
     """What a drive would make of its commands if it answered as another one does.
 
@@ -150,8 +175,7 @@ def as_another(response: Response, commands: Array, share: Array, h: float) -> R
         Length of a cell [s].
     """
     weights = response.weights * share
-    target = np.clip(np.nan_to_num(commands) @ weights, -response.limit, response.limit)
-    target = np.interp(np.arange(target.size) - response.delay / h, np.arange(target.size), target)
+    target = _target(commands, weights, response.limit, response.delay / h)
     lag = max(response.lag, 1e-3)
     expected = np.asarray(follow(target, float(target[0]), -np.expm1(-h / lag), response.rate * h))
     reach = max(1, round(_TIMING_S / h))

@@ -196,7 +196,7 @@ def late_wheels(judged: Mapping[str, Judged], block_s: float) -> dict[str, list[
 
     `block_s` is the length of a block [s].
     """
-    found = {w: late_of(j, block_s) for w, j in judged.items()}
+    found = {w: late_of(_beside_sound(w, judged), block_s) for w in judged}
     width = {w: int(j.wheel.blocks.start[1]) for w, j in judged.items() if j.wheel.blocks.start.size > 1}
     wrong = {
         w: [(s.start * width.get(w, 1), s.stop * width.get(w, 1)) for s in j.spells if evident(s, j)]
@@ -213,3 +213,15 @@ def late_wheels(judged: Mapping[str, Judged], block_s: float) -> dict[str, list[
             and not any(overlaps(span, (f.start, f.stop)) for span in others)
         ]
     return out
+
+
+def _beside_sound(wheel: str, judged: Mapping[str, Judged]) -> Judged:
+    """A wheel without its other view where another wheel, by which that may be made, is evidently wrong."""
+    one = judged[wheel]
+    wrong = [s for o, j in judged.items() if o != wheel for s in j.spells if evident(s, j)]
+    if one.speed is None or not wrong:
+        return one
+    speed = one.speed.copy()
+    for s in wrong:
+        speed[s.start : s.stop] = np.nan
+    return one._replace(speed=speed)

@@ -50,6 +50,8 @@ class Judged(NamedTuple):
         As in `models.Beside`.
     rolls : bool
         Whether its effort is nothing from end to end while others pull, as that of a wheel without a drive.
+    yaw : Array or None, shape (n,)
+        Measured yaw rate of the body [rad/s].
     """
 
     data: FollowerData
@@ -64,6 +66,7 @@ class Judged(NamedTuple):
     alone: bool = False
     across: Array | None = None
     rolls: bool = False
+    yaw: Array | None = None
 
 
 def standstills(idle: Sequence[tuple[int, int]], dt: float) -> tuple[str, ...]:

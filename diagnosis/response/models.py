@@ -18,6 +18,7 @@ BLOCK_S = 0.25
 SCALES = (0.15, 0.21, 0.3, 0.38, 0.48, 0.6, 0.72, 1.4, 1.65, 1.95, 2.3, 2.7)
 HEALTHY, OTHER, FROZEN, SILENT, NOISY = range(5)
 STATES = 5 + len(SCALES)
+_BETWEEN = 0.05  # of the speed: what a gain between two of them leaves
 #: How long a wheel stays healthy, and a fault stays, on average [s].
 MEAN_HEALTHY_S, MEAN_FAULTY_S = 120.0, 10.0
 #: Mean probability of its state from which a spell is a finding.
@@ -35,6 +36,10 @@ _WHITE_UP = np.log(3.0)
 _LONG_S = 2.0  # a value held for longer is no habit, unless a quarter of the driving is like that
 _STILL = 0.02  # of the usual top speed
 _QUIET = 0.01  # of the usual top speed: less than that from sample to sample is no noise worth a word
+_STEP, _FAST = (
+    0.25,
+    2.0,
+)  # of the range that a command makes a speed go through, in so many readings of a block: that is its roughness
 _NEVER = -60.0
 
 
@@ -78,6 +83,11 @@ class Blocks(NamedTuple):
     def held(self) -> Flags:
         """Blocks whose every reading repeats the one before. Shape (blocks,)."""
         return np.asarray((self.readings > 0) & (self.same == self.readings))
+
+    @property
+    def dead(self) -> Flags:
+        """Blocks in which nothing but one reading of standstill came, or none. Shape (blocks,)."""
+        return np.asarray((self.same == self.readings) & (self.zero == self.readings))
 
 
 class Beside(NamedTuple):
@@ -135,10 +145,13 @@ def blocks_of(samples: Samples, response: Response, cell: int, width: int, size:
     cells = np.minimum((start + width // 2) // cell, response.low.size - 1)
     white = np.sqrt(total(samples.white**2) / np.maximum(count, 1))
     top = float(np.nanquantile(np.abs(samples.value), 0.99))
-    usual = np.maximum(_usual_white(white, np.abs(mean), count), _QUIET * top)
+    low, high = response.low[cells], response.high[cells]
+    swing = _STEP * min(1.0, _FAST / max(float(np.median(count[count > 0])), 1.0)) if count.any() else 0.0
+    asked = swing * np.where(np.isfinite(high - low), high - low, 0.0)
+    usual = np.maximum(np.maximum(_usual_white(white, np.abs(mean), count), _QUIET * top), asked)
     still = np.abs(samples.value) <= _STILL * top
     return Blocks(
-        start, mean, response.low[cells], response.high[cells], response.noise[cells], count,
+        start, mean, low, high, response.noise[cells], count,
         total(samples.same), total(still), white, usual,
     )  # fmt: skip
 
@@ -193,10 +206,11 @@ def _misfit(blocks: Blocks, scale: float, beside: Beside | None, wider: float = 
     """Log-likelihood of a block's mean if the sensor shows `scale` of the speed, 0 at best."""
     ends = np.array([scale * blocks.low, scale * blocks.high])
     off = beyond(blocks.mean, ends.min(axis=0), ends.max(axis=0))
-    alone = -_SECOND * np.nan_to_num(_loss(off / (wider * max(scale, 0.3) * blocks.noise)))
+    size = np.nan_to_num(np.max(np.abs(ends), axis=0), posinf=0.0)
+    alone = -_SECOND * np.nan_to_num(_loss(off / (wider * _usual(scale, blocks.noise, size))))
     if beside is None:
         return np.asarray(alone)
-    other = _loss((blocks.mean - scale * beside.speed) / (max(scale, 0.3) * beside.noise))
+    other = _loss((blocks.mean - scale * beside.speed) / _usual(scale, beside.noise, scale * beside.speed))
     known = np.isfinite(other)
     # what two views agree on is no misfit of one of them
     agreed = np.where(known, alone * np.clip(np.nan_to_num(other) / _loss(_OTHER_Z), 0.0, 1.0), alone)
@@ -207,8 +221,14 @@ def _contradicted(blocks: Blocks, scale: float, joint: Beside | None) -> Array:
     """What a position takes from a scale of the speed beside it; nothing where both channels agree, whatever they show."""
     if joint is None:
         return np.zeros(blocks.mean.size)
-    off = _loss((blocks.mean - scale * joint.speed) / (max(scale, 0.3) * joint.noise))
+    off = _loss((blocks.mean - scale * joint.speed) / _usual(scale, joint.noise, scale * joint.speed))
     return np.asarray(-_BESIDE * np.nan_to_num(off) * joint.blame * _apart(blocks, joint))
+
+
+def _usual(scale: float, noise: Array, size: Array) -> Array:
+    """Usual misfit of a scaled sensor [m/s] that is to read `size`: a gain lies between two of `SCALES`, however quiet the channel is."""
+    usual = max(scale, 0.3) * noise
+    return usual if scale == 1.0 else np.maximum(usual, _BETWEEN * np.nan_to_num(np.abs(size)))
 
 
 def _apart(blocks: Blocks, joint: Beside) -> Array:

@@ -119,7 +119,7 @@ def held_back_together(judged: Mapping[str, Judged]) -> Flags:
             return np.zeros(j.driving.size, np.bool_)
         b = j.wheel.blocks
         middle = 0.5 * (b.low + b.high)
-        with np.errstate(divide="ignore", invalid="ignore"):
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             gains.append(np.nan_to_num(b.mean / middle, nan=_NO_SHARE, posinf=_NO_SHARE, neginf=-_NO_SHARE))
         off.append(np.abs(b.mean - np.clip(b.mean, b.low, b.high)) > _HELD_BACK * b.noise)
     spread = np.max(gains, axis=0) - np.min(gains, axis=0) if len(gains) > 1 else np.full(off[0].size, np.inf)

@@ -13,6 +13,7 @@ from diagnosis.response.findings import Wheel, finding_of
 from diagnosis.response.inputs import cell_of
 from diagnosis.response.machine import Judged
 from diagnosis.response.models import HEALTHY, LEAST_P, NOISY, OTHER, SILENT
+from diagnosis.response.shaking import shaken
 from diagnosis.response.spells import Spell
 from diagnosis.results.assessment import CODE, Assessment, Finding
 from diagnosis.results.evidence_columns import Pictured, steps_of
@@ -81,7 +82,7 @@ def sides_of(
         long = (spell.stop - spell.start) * width * dt >= _LEAST_S
         found = finding_of(spell, *_shown_by(one, spell)) if long and spell.p >= LEAST_P else None
         if found is not None:
-            findings.append(_by_itself(found) if one.alone else _undriven(found) if one.rolls else found)
+            findings.append(_by_itself(found) if one.alone else _undriven(found) if one.rolls else shaken(found, one))
         elif one.posterior[spell.start : spell.stop].argmax(axis=1).min() > NOISY and _entered_calmly(
             one, spell, width, dt
         ):
@@ -92,6 +93,8 @@ def sides_of(
     sensor = np.where(driving, CODE[State.HEALTHY], CODE[State.NOT_EXCITED]).astype(np.int8)
     unseen = not one.response.answered and one.speed is None
     sensor[np.repeat(doubtful | (one.driving & unseen), width)[:size]] = CODE[State.NOT_ASSESSED]
+    if one.speed is None:  # nothing says what it should read
+        sensor[driving & _uncommanded(one, cell_of(dt), size)] = CODE[State.NOT_ASSESSED]
     drive = np.where(driving, CODE[State.NOT_ASSESSED], CODE[State.NOT_EXCITED]).astype(np.int8)
     for states in (sensor, drive):
         states[idle] = CODE[State.NOT_ASSESSED]
@@ -105,6 +108,11 @@ def sides_of(
         sensor[f.start : f.stop] = CODE[State(f.mode.value)]
         drive[f.start : f.stop] = CODE[State(f.mode.value) if f in both else State.MASKED]
     return _assessment(one, sensor, tuple(findings), limits, dt), _drive(one, drive, (*drives, *both))
+
+
+def _uncommanded(one: Judged, cell: int, size: int) -> Flags:
+    """Steps at which no command is known, shape (size,): a robot may go on with the last one, or stop."""
+    return np.repeat(~np.isfinite(one.data.commands).all(axis=1), cell)[:size]
 
 
 def _by_itself(found: Finding) -> Finding:

@@ -85,3 +85,26 @@ def where_asked(spells: Sequence[Spell], asked: Flags, least: int) -> list[Spell
         if places.size >= least:
             out.append(s._replace(start=int(places[0]), stop=int(places[-1]) + 1))
     return out
+
+
+def until_back(spells: Sequence[Spell], dead: Flags, asked: Flags) -> list[Spell]:
+    """Spells of a silent speed, each up to the last expected motion before the reading comes back: what stands in between ends none.
+
+    Parameters
+    ----------
+    spells : Sequence[Spell]
+        Spells.
+    dead : Flags, shape (b,)
+        Blocks in which nothing but one reading of standstill came, or none.
+    asked : Flags, shape (b,)
+        Blocks in which command or other wheels make the wheel move.
+    """
+    out = []
+    for s in spells:
+        stop = s.stop
+        if s.mode is FaultMode.NO_SIGNAL:
+            back = np.flatnonzero(~dead[stop:])
+            missed = np.flatnonzero(asked[stop : stop + int(back[0]) if back.size else dead.size])
+            stop += int(missed[-1]) + 1 if missed.size else 0
+        out.append(s._replace(stop=stop))
+    return out

@@ -213,3 +213,16 @@ def test_a_channel_that_falls_silent_while_others_go_on_is_the_sensors_fault(oth
     found = [f for f in parts["FL"][0].findings if f.mode is FaultMode.NO_SIGNAL]
     assert [(f.start, f.stop, f.side) for f in found] == ([(first, last, Side.SENSOR)] if told else [])
     assert all(not parts[w][0].findings for w in ("FR", "RR", "RL"))
+
+
+def test_a_wheel_that_drives_while_no_command_is_known_and_nothing_else_shows_its_speed_is_not_healthy() -> None:
+    measured, asked, body = speeds(8, ("R", "L"))
+    silent = slice(round(60 / DT), round(90 / DT))
+    body[silent] = np.nan
+    measured["L"][silent] = 0.0
+    j = assess_response(followers_of(measured, asked, body), geometry(("R", "L")), None, Limits(driving_speed=0.05), DT)
+    for w in ("R", "L"):
+        sensor = j.parts[w][0]
+        moving = np.abs(measured[w][silent]) > 0.1
+        assert not np.any((sensor.states[silent] == CODE[State.HEALTHY])[moving])
+        assert np.any(sensor.states[: silent.start] == CODE[State.HEALTHY])

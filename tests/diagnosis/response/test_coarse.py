@@ -64,3 +64,34 @@ def test_one_commanded_speed_at_the_limit_leaves_the_weight_at_what_the_wheel_ma
     j = assess_response(data, geometry(("R", "L")), None, Limits(driving_speed=0.05), DT)
     for sensor, _ in j.parts.values():
         assert not any("reads" in text for text in sensor.reasons.values())
+
+
+def test_a_short_stop_that_few_readings_show_is_motion_and_not_spikes() -> None:
+    """Odometry of 5 Hz: a start and a stop of half a second have a reading on their way, a spike has none."""
+    drive = np.tile(np.r_[np.full(12, 0.2), 0.12, 0.0, 0.0, 0.05], 12) + np.random.default_rng(1).normal(0, 0.002, 192)
+    every = np.ones(drive.size, np.bool_)
+    assert not samples_of(drive, every).wild.any()
+    drive[40] = 1.2
+    assert np.flatnonzero(samples_of(drive, every).wild).tolist() == [40]
+
+
+def test_what_the_command_explains_is_not_wild() -> None:
+    y = np.full(200, 0.3)
+    y[50], y[120] = 0.45, 2.0
+    every, wide = np.ones(y.size, np.bool_), np.full(y.size, 0.3)
+    wide[48:53] = 0.44
+    assert np.flatnonzero(samples_of(y, every).wild).tolist() == [50, 120]
+    assert np.flatnonzero(samples_of(y, every, (np.full(y.size, 0.3), wide)).wild).tolist() == [120]
+
+
+def test_a_gain_between_two_of_the_models_is_found_however_quiet_the_channel_is() -> None:
+    """A wheel that follows its command to a thousandth leaves no noise for the distance between two gains."""
+    n = round(90 / DT)
+    rng = np.random.default_rng(3)
+    v = np.repeat(rng.choice([0.1, 0.2, 0.3], n // 100 + 1), 100)[:n]
+    asked = {w: v.copy() for w in ("R", "L")}
+    measured = {w: np.r_[np.zeros(3), a[:-3]] + rng.normal(0, 2e-4, n) for w, a in asked.items()}
+    fault = slice(round(40 / DT), round(50 / DT))
+    measured["R"][fault] *= 0.53
+    j = judged(measured, asked, np.column_stack([v, np.zeros(n)]))
+    assert {(w, f.mode) for w, (s, _) in j.parts.items() for f in s.findings} == {("R", FaultMode.INEFFICIENT)}

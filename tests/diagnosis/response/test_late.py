@@ -11,7 +11,7 @@ from diagnosis.results.assessment import Finding
 from diagnosis.results.detectability import Deviation
 from replay.faults import FaultMode, Side
 from replay.machine.config import Limits
-from tests.diagnosis.response.robot import DT, followers_of, geometry, speeds
+from tests.diagnosis.response.robot import DT, TRACK, followers_of, geometry, speeds
 
 Array = NDArray[np.float64]
 
@@ -77,3 +77,15 @@ def test_a_speed_that_never_changes_says_nothing_of_delays() -> None:
     for sensor, _ in j.parts.values():
         assert sensor.powers is not None
         assert [p.size for p in sensor.powers.rows if p.deviation is Deviation.DELAY] == [None]
+
+
+def test_a_wheel_beside_one_with_a_noisy_sensor_is_not_called_late() -> None:
+    """While the other wheel is evidently wrong its readings tell no delay; straight on nothing ends what they would begin."""
+    n = round(40 / DT)
+    v, turn = np.full(n, 0.1), 0.05 * np.exp(-np.arange(n) * DT / 4.0)
+    asked = {w: v + s * turn for w, s in (("R", 0.5), ("L", -0.5))}
+    rng = np.random.default_rng(5)
+    measured = {w: np.r_[np.zeros(2), a[:-2]] + rng.normal(0, 1e-4, n) for w, a in asked.items()}
+    part = slice(round(12 / DT), round(22 / DT))
+    measured["L"][part] += rng.uniform(-0.05, 0.05, part.stop - part.start)
+    assert {w for w, _ in findings(judged(measured, asked, np.column_stack([v, turn / TRACK])))} == {"L"}

@@ -1,0 +1,62 @@
+"""Machines on rollers that go sideways are known by their wheels where no command says so."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from diagnosis.response.assess import Judgement, assess_response
+from diagnosis.response.inputs import FollowerData
+from diagnosis.response.sideways import goes_sideways
+from replay.faults import FaultMode
+from replay.machine.config import Limits
+from tests.diagnosis.response.robot import DT, WHEELS, followers_of, geometry, speeds
+
+Array = NDArray[np.float64]
+
+FAULT = slice(round(60 / DT), round(80 / DT))
+#: Share of the speed to the left in the speed of each wheel with rollers.
+LEFTWARD = {"FR": 1.0, "FL": -1.0, "RR": -1.0, "RL": 1.0}
+
+
+def rollers(seed: int) -> dict[str, Array]:
+    """Speeds of a mecanum base of which no command is recorded."""
+    measured, _, _ = speeds(seed)
+    forward, _, _ = speeds(seed + 50, ("FR",))
+    left = 0.6 * np.roll(forward["FR"], round(20 / DT))
+    rng = np.random.default_rng(seed)
+    return {w: y + LEFTWARD[w] * left + rng.normal(0.0, 0.01, y.size) for w, y in measured.items()}
+
+
+def judged(measured: dict[str, Array]) -> Judgement:
+    nothing = {w: np.full(y.size, np.nan) for w, y in measured.items()}
+    size = next(iter(measured.values())).size
+    data: dict[str, FollowerData] = followers_of(measured, nothing, np.full((size, 2), np.nan))
+    data = {w: replace(d, commands=d.commands[:, :1]) for w, d in data.items()}
+    return assess_response(data, geometry(), None, Limits(driving_speed=0.05), DT)
+
+
+def told(j: Judgement) -> set[tuple[str, FaultMode]]:
+    return {(w, f.mode) for w, sides in j.parts.items() for a in sides for f in a.findings}
+
+
+def test_a_healthy_base_on_rollers_raises_no_alarm_and_a_wrong_sensor_is_told_on_its_wheel() -> None:
+    assert told(judged(rollers(5))) == set()
+    halved = rollers(5)
+    halved["RL"][FAULT] *= 0.5
+    assert told(judged(halved)) == {("RL", FaultMode.INEFFICIENT)}
+
+
+@pytest.mark.parametrize("wrong", ["", "dead", "half"])
+def test_wheels_without_rollers_do_not_go_sideways_whatever_one_sensor_says(wrong: str) -> None:
+    measured, _, _ = speeds(6)
+    measured["FL"][FAULT] *= {"dead": 0.0, "half": 0.5}.get(wrong, 1.0)
+    assert not goes_sideways(measured, geometry(), DT)
+    turned = rollers(6)
+    turned["FL"][FAULT] *= {"dead": 0.0, "half": 0.5}.get(wrong, 1.0)
+    assert goes_sideways(turned, geometry(), DT)
+    assert not goes_sideways(turned, None, DT)
+    assert not goes_sideways({w: turned[w] for w in WHEELS[:2]}, geometry(), DT)
