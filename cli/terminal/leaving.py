@@ -12,8 +12,8 @@ from typing import NoReturn
 def leave(code: int) -> NoReturn:
     """End the process with an exit code, after everything that is registered for its end.
 
-    Python then takes every module and object apart, and the compiler its code: a twentieth of the CPU time of a diagnosis, for
-    memory that goes with the process. Where other threads still run, they are waited for in Python's own way.
+    Python then takes every module and object apart, and the compiler its code, for memory that goes
+    with the process: over half a second of CPU time after a diagnosis. Where other threads still run, they are waited for in Python's own way.
 
     Raises
     ------

@@ -1,7 +1,7 @@
 """Memory of columns that are no longer needed, for the next ones.
 
 Arrays of a mission are made and freed by the hundred. glibc gives what is freed back to the system at once where it lies at the
-top of the heap, and every page of it is asked for and zeroed again a moment later: a twentieth of the CPU time of a diagnosis.
+top of the heap, and every page of it is asked for and zeroed again a moment later.
 """
 
 from __future__ import annotations

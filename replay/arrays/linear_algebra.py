@@ -1,7 +1,7 @@
 """The linear algebra of compiled kernels, without the rest of `scipy.linalg`.
 
 Before its first kernel numba imports two modules of `scipy.linalg`, which hold addresses of BLAS and LAPACK and need nothing else of it.
-Their package loads a hundred others, of which a diagnosis uses none: a fiftieth of its CPU time.
+Their package loads a hundred others, of which a diagnosis uses none.
 """
 
 from __future__ import annotations
