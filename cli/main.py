@@ -38,6 +38,7 @@ from cli.commands import replay as replay_command  # the package of that name is
 from cli.terminal.command import USAGE, App, Quiet, Verbose
 from cli.terminal.console import Terminal, discard
 from cli.terminal.interrupts import asked, check, forget, listen
+from cli.terminal.leaving import leave
 from replay.arrays.kernel_cache import drop_own_stale_kernels
 from replay.errors import MfhcaError
 from replay.version import __version__
@@ -186,7 +187,7 @@ def main() -> None:
         warnings.simplefilter("ignore")
     listen()  # being asked to end removes unfinished files too
     drop_own_stale_kernels()
-    sys.exit(run())
+    leave(run())
 
 
 if __name__ == "__main__":

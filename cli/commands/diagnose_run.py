@@ -12,6 +12,8 @@ from cli.terminal.console import Terminal
 from cli.terminal.options import FailOn
 from diagnosis.api.inputs import check_output, check_times, check_wheels, machine_of, mission_paths
 from diagnosis.api.saved_results import previous_result
+from replay.arrays.freed_memory import keep_freed_memory
+from replay.arrays.linear_algebra import load_addresses
 from replay.progress import Progress, Stage, Subscriber
 
 if TYPE_CHECKING:
@@ -126,6 +128,8 @@ def _diagnosed(
     """The mission where clips are to be cut from it, its result, and the files that were written."""
     from cli.terminal.progress import diagnosis_plan
 
+    keep_freed_memory()
+    load_addresses()
     machine = checked.machine
     plan = diagnosis_plan(checked.paths, checked.wheels or machine.wheels, machine.axles)
     with terminal.progress(Stage.STARTING, plan=plan) as progress:

@@ -93,12 +93,27 @@ def valves_of_kind(found: Sequence[Relation]) -> list[Relation]:
     return [typical._replace(gain=r.gain) if strange else r for r, strange in zip(found, odd, strict=True)]
 
 
+class _Filled(NamedTuple):
+    """A reference with 0 where it is not known."""
+
+    x: Array
+    known: NDArray[np.bool_]
+    unknown: NDArray[np.bool_]
+
+    @classmethod
+    def of(cls, x: Array) -> _Filled:
+        known = np.isfinite(x)
+        return cls(np.where(known, x, 0.0), known, ~known)
+
+    def followed(self, play: float, lag: float, dt: float) -> Array:
+        out = np.empty(self.x.size)
+        _follow(self.x, self.known, 0.5 * play, float(np.exp(-dt / lag)) if lag > 0.0 else 0.0, out)
+        out[self.unknown] = np.nan
+        return out
+
+
 def _followed(x: Array, play: float, lag: float, dt: float) -> Array:
-    known = np.isfinite(x)
-    out = np.empty(x.size)
-    _follow(np.where(known, x, 0.0), known, 0.5 * play, float(np.exp(-dt / lag)) if lag > 0.0 else 0.0, out)
-    out[~known] = np.nan
-    return out
+    return _Filled.of(x).followed(play, lag, dt)
 
 
 @njit(cache=True, nogil=True)
@@ -253,10 +268,11 @@ def _loss(x, at, y, whole, part, gain, scale):  # type: ignore[no-untyped-def]
 def _least(places: _Places, trials: Iterable[Relation], dt: float, scale: float) -> tuple[Relation, float]:
     """The trial that leaves least, and what it leaves."""
     best, least, followed, key = Relation(), np.inf, places.x, (0.0, 0.0)
+    filled = _Filled.of(places.x)
     for trial in trials:
         if (trial.lag, trial.play) != key:
             key = (trial.lag, trial.play)
-            followed = _followed(places.x, trial.play, trial.lag, dt)
+            followed = filled.followed(trial.play, trial.lag, dt)
         misfit = _misfit(places._replace(x=followed), trial._replace(lag=0.0, play=0.0), dt, scale)
         if misfit < least:
             best, least = trial, misfit

@@ -149,7 +149,10 @@ class Frame:
 
     def sums(self, x: Array) -> Array:
         """Sum over each window of what is known, shape (windows, …)."""
-        total = np.concatenate([np.zeros((1, *x.shape[1:])), np.cumsum(np.nan_to_num(x), axis=0)])
+        return self._sums(np.nan_to_num(x))
+
+    def _sums(self, x: Array) -> Array:
+        total = np.concatenate([np.zeros((1, *x.shape[1:])), np.cumsum(x, axis=0)])
         stops = np.minimum(self.starts + self.length, self.cells)
         return np.asarray(total[stops] - total[self.starts])
 
@@ -158,7 +161,7 @@ class Frame:
 
         `x` has shape (cells, …), its unit is kept.
         """
-        count = self.sums(np.isfinite(x).astype(np.float64))
+        count = self._sums(np.isfinite(x).astype(np.float64))
         enough = count >= _LEAST_SHARE * min(self.length, self.cells)
         return np.asarray(np.where(enough, self.sums(x) / np.maximum(count, 1), np.nan))
 

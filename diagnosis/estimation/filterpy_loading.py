@@ -1,6 +1,6 @@
 """filterpy's Kalman filter, without the second of CPU time that its import otherwise takes.
 
-`import filterpy` loads all of `scipy.stats`, `scipy.ndimage` and `scipy.sparse`, for densities, convolutions and matrices that
+`import filterpy` loads all of `scipy.stats`, `scipy.ndimage`, `scipy.linalg` and `scipy.sparse`, for densities, convolutions and matrices that
 the filter is not asked for here. While filterpy is loaded, stand-ins have the places of those that are not there yet; whatever is
 asked of them later, the real ones answer.
 """
@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from filterpy.kalman import KalmanFilter
 
-_LEFT_OUT = ("scipy.stats", "scipy.ndimage", "scipy.sparse", "scipy.sparse.linalg")
+_LEFT_OUT = ("scipy.stats", "scipy.ndimage", "scipy.linalg", "scipy.sparse", "scipy.sparse.linalg")
 
 
 class _Later:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from markupsafe import Markup
 from numpy.typing import NDArray
@@ -59,7 +61,7 @@ def _marks(t: Array, y: Array, frame: Frame, style: str, shape: str, down: float
     use = np.isfinite(y)
     if not use.any():
         return Markup("")
-    places = zip(frame.px(t[use]), frame.py(y[use]) + down, strict=True)
+    places = zip(frame.px(t[use]).tolist(), (frame.py(y[use]) + down).tolist(), strict=True)
     d = "".join(f"M{a:.1f} {b:.1f}{shape}" for a, b in places)
     return Markup(f'<path class="{style}" d="{d}"/>')
 
@@ -150,8 +152,8 @@ def _scaled(both: tuple[Array, Array], scale: float) -> tuple[Array, Array]:
 def _curve(t: Array, low: Array, high: Array, frame: Frame, style: str) -> Markup:
     """Line through the extremes of each stretch, broken where a stretch is empty."""
     out, pen = [], "M"
-    for x, a, b in zip(frame.px(t), frame.py(low), frame.py(high), strict=True):
-        if not np.isfinite(a):
+    for x, a, b in zip(*(v.tolist() for v in (frame.px(t), frame.py(low), frame.py(high))), strict=True):
+        if not math.isfinite(a):
             pen = "M"
             continue
         out.append(f"{pen}{x:.1f} {a:.1f}" + (f"V{b:.1f}" if abs(a - b) >= 0.1 or pen == "M" else ""))
@@ -165,7 +167,7 @@ def _band(t: Array, half: Array, frame: Frame) -> Markup:
     edges = np.flatnonzero(np.diff(np.r_[False, np.isfinite(half), False].astype(np.int8)))
     out = []
     for a, b in zip(edges[::2], edges[1::2], strict=True):
-        x, top, low = frame.px(t[a:b]), frame.py(half[a:b]), frame.py(-half[a:b])
+        x, top, low = (v.tolist() for v in (frame.px(t[a:b]), frame.py(half[a:b]), frame.py(-half[a:b])))
         upper = "L".join(f"{p:.1f} {q:.1f}" for p, q in zip(x, top, strict=True))
         lower = "L".join(f"{p:.1f} {q:.1f}" for p, q in zip(x[::-1], low[::-1], strict=True))
         out.append(f"M{upper}L{lower}Z")

@@ -18,7 +18,7 @@ _MARKS = 24
 
 def _path_d(x: NDArray[np.floating], y: NDArray[np.floating]) -> str:
     out, pen = [], "M"
-    for a, b in zip(x, y, strict=True):
+    for a, b in zip(x.tolist(), y.tolist(), strict=True):
         if math.isfinite(a) and math.isfinite(b):
             out.append(f"{pen}{a:.1f},{b:.1f}")
             pen = "L"

@@ -12,7 +12,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
-from scipy.signal import lfilter
 
 from diagnosis.results.assessment import Finding
 from diagnosis.results.evidence_columns import Pictured, steps_of
@@ -20,6 +19,7 @@ from diagnosis.steering.filter_state import SteeringPath
 from diagnosis.steering.inputs import AxleInputs
 from diagnosis.steering.model_bank import HEALTHY, SENSOR
 from diagnosis.steering.path import AxleFilter
+from diagnosis.steering.windows import lagged
 from replay.faults import Side
 from replay.signals.timeline import Timeline
 
@@ -72,7 +72,7 @@ def _of_valve(axle: AxleFilter, path: SteeringPath) -> _Expected:
         return _Expected(np.full(angle.size, np.nan), np.full(angle.size, np.nan))
     unknown = ~np.isfinite(axle.driven.command) | (SENSOR[path.model] != HEALTHY)
     decay = axle.constants.axle.rate_decay
-    rate = lfilter([1.0 - decay], [1.0, -decay], np.nan_to_num(axle.driven.command))
+    rate = lagged(np.nan_to_num(axle.driven.command), decay)
     window = sliding_window_view(rate, n)[1:]
     asked = angle[:-n] + dt * window.sum(axis=1)
     error = sliding_window_view(axle.driven.spread**2 + axle.model.rate_error**2, n)[1:].mean(axis=1) * (n * dt) ** 2

@@ -117,7 +117,10 @@ def _fit_axles(windows: Sequence[AxleWindows], scale: float) -> list[FittedPlant
         tried.append(
             [
                 min(
-                    (fit_plant(w.short, x, prior, scale, TOLERANCES[1:]) for x in (reference.x, own.x)),
+                    (
+                        fit_plant(w.short, x, prior, scale, TOLERANCES[1:])
+                        for x in ((own.x,) if own is reference else (reference.x, own.x))
+                    ),
                     key=lambda fit: fit.loss,
                 )
                 for w, own in zip(windows, alone, strict=True)

@@ -38,6 +38,17 @@ def _window_angles(u, valve, lag, play, dt, length):  # type: ignore[no-untyped-
 
 
 @njit(cache=True, error_model="numpy")
+def lagged(x, decay):  # type: ignore[no-untyped-def]
+    """First-order lag of x from 0 [unit of x], shape (n,): what is left of the former value after a step is `decay` [1]."""
+    out = np.empty(x.size)
+    kept = 0.0
+    for k in range(x.size):
+        out[k] = kept + (1.0 - decay) * x[k]
+        kept = decay * out[k]
+    return out
+
+
+@njit(cache=True, error_model="numpy")
 def _window_slopes(u, valve, lag, play, dt, length):  # type: ignore[no-untyped-def]
     """What `_window_angles` gives, (w,), and its derivatives by slopes, dead bands, limits (up, down), lag and play, (w, 8).
 

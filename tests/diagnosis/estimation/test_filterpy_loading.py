@@ -41,7 +41,8 @@ import numpy as np
 from diagnosis.estimation.filterpy_loading import kalman_filter
 
 kalman_filter()
-print([name for name in ("scipy.stats", "scipy.ndimage", "scipy.sparse", "scipy.sparse.linalg") if name in sys.modules])
+left_out = ("scipy.stats", "scipy.ndimage", "scipy.linalg", "scipy.sparse", "scipy.sparse.linalg")
+print([name for name in left_out if name in sys.modules])
 from filterpy.discrete_bayes import predict
 print(np.round(predict(np.array([0.0, 1.0, 0.0]), 1, np.array([0.1, 0.8, 0.1])), 6).tolist())
 import scipy.ndimage, scipy.sparse.linalg

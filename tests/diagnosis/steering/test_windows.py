@@ -1,4 +1,4 @@
-"""What a steering plant gives in windows: derivatives by its constants, and openings of coarser blocks."""
+"""What a steering plant gives in windows: derivatives by its constants, openings of coarser blocks, and a lag."""
 
 from __future__ import annotations
 
@@ -7,9 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from scipy.signal import lfilter
 
 from diagnosis.steering.valve_map import ValveMap
-from diagnosis.steering.windows import Windows
+from diagnosis.steering.windows import Windows, lagged
 
 CONSTANTS = np.array([1.0, 1.2, 0.03, 0.02, 0.25, 0.2, 0.06, 0.002])
 
@@ -53,3 +54,9 @@ def test_coarser_openings_give_about_the_same_rates() -> None:
     assert windows().coarser(5).u.size == windows().u.size // 5
     assert np.abs(fine - coarse).max() < 0.1 * np.abs(fine).max()
     assert windows().coarser(4).length == 25
+
+
+@pytest.mark.parametrize("decay", [0.0, 0.3, 0.95, 1.0])
+def test_a_lag_is_scipys_filter_to_the_last_digit(decay: float) -> None:
+    x = np.random.default_rng(3).normal(size=500)
+    np.testing.assert_array_equal(lagged(x, decay), lfilter([1.0 - decay], [1.0, -decay], x))
