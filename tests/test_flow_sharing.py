@@ -91,9 +91,10 @@ def test_a_speed_sensor_that_fails_reads_what_its_fault_says_and_the_wheel_turns
     assert np.abs(true[_SPAN, 1]).max() > 0.1
     _, _, read, *_ = machine.driven(502, (fault("FL", Side.SENSOR, FaultMode.STUCK, 1.0, np.nan),), LENGTH)
     assert np.ptp(read[_SPAN, 1]) == 0.0
-    ref, true, read, *_ = machine.driven(502, (fault("FL", Side.SENSOR, FaultMode.INEFFICIENT, 0.3),), LENGTH)
+    _, true, read, given, *_ = machine.driven(502, (fault("FL", Side.SENSOR, FaultMode.INEFFICIENT, 0.3),), LENGTH)
     assert np.abs(read[_SPAN, 1] - 0.7 * true[_SPAN, 1]).mean() < 0.05 * machine.build(502)[0].top
-    assert np.abs(true[_SPAN, 1]).sum() > 1.1 * np.abs(ref[_SPAN, 1]).sum()
+    healthy = machine.driven(502, (), LENGTH)[3]  # the ground holds the wheel's speed, its valve opens more
+    assert np.abs(given[_SPAN, 1]).mean() > np.abs(healthy[_SPAN, 1]).mean() + 0.05
 
 
 def test_a_dead_steering_valve_leaves_its_axle_where_it_is_and_a_stuck_one_runs_to_the_end(
@@ -125,8 +126,8 @@ def test_a_brake_valve_holds_a_load_that_pulls(machine: ModuleType, physics: Mod
     supply = np.array([0.0, 0.0, 1.0, 1.0, 45.0, 1.0])
     area = 0.5 * made.small / made.flow
     torque = [physics.motor(w, parts[0], area, supply, made)[0] for _ in range(2000)][-1]
-    assert w[physics.PA] < 5e5
-    assert torque < -0.5 * made.small * made.relief
+    assert w[physics.PA] < made.pilot
+    assert torque < -0.3 * made.small * made.relief
 
 
 def test_the_edges_of_a_valve_and_the_two_ways_of_a_cylinder_differ(machine: ModuleType, physics: ModuleType) -> None:
@@ -160,6 +161,7 @@ def test_a_pole_wheel_shows_a_steady_speed_and_learns_a_new_direction_late(machi
 
     made = machine.build(502)[0]
     e, turned, shown = np.zeros(8), 0.0, []
+    e[control.PERIOD], e[control.AT] = 1e3, -10.0
     speed = 0.5 * made.top / made.radius
     for k in range(8000):
         rate = speed if k < 4000 else -speed

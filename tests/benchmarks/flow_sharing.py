@@ -206,7 +206,9 @@ def driven(seed: int, faults: tuple[FaultSpec, ...], duration: float) -> tuple[A
     (made, parts), rng = build(seed), np.random.default_rng(103_000 + seed)
     speed, angle = commands(seed, duration)
     loss, sat = courses(faults, duration, seed, made.top)
-    noise = rng.standard_normal((speed.size, 2)) * 5e-4 + rng.uniform(-0.004, 0.004, 2)  # how well they were set to zero
+    noise = rng.standard_normal((speed.size, 2)) * 5e-4 + rng.uniform(
+        -0.004, 0.004, 2
+    )  # how well they were set to zero
     crane = np.repeat(rng.uniform(-1.0, 1.0, (round(duration / 6.0) + 2, 2)), 6000, axis=0)[: speed.size]
     reach = rng.uniform(0.0, 1.0) * np.array([0.09, 0.05])
     shift = np.column_stack([_smooth(c, 3.0) for c in (crane * reach).T])

@@ -143,9 +143,7 @@ def drive(
         wanted = 0.0
         for i in range(4):
             want = hit(w[i, ASKED], loss[m, 6 + i], sat[m, 6 + i], held, 6 + i)
-            w[i, COIL], w[i, SEAT], w[i, SPOOL] = spool_of(
-                w[i, COIL], w[i, SEAT], w[i, SPOOL], want, parts[i, ZERO], b
-            )
+            w[i, COIL], w[i, SEAT], w[i, SPOOL] = spool_of(w[i, COIL], w[i, SEAT], w[i, SPOOL], want, parts[i, ZERO], b)
             area[i] = edge_of(w[i, SPOOL], parts[i], b)
             wanted += abs(area[i]) * b.flow
         first = min(1.0, s[ENGINE] / b.engine)

@@ -136,7 +136,7 @@ def motor(w: Array, part: Array, area: float, supply: Array, b: Build) -> tuple[
     """
     head = w[PA] if area > 0 else w[PB]
     out = w[PB] if area > 0 else w[PA]
-    room = min(max((b.most - b.margin - head) / 8e5, 0.0), 1.0)
+    room = min(max((b.most - b.margin - head) / 2e6, 0.0), 1.0)
     fed = abs(area) * b.flow * supply[SHARE] * room * (1.0 - b.yields * head / b.most) if area != 0.0 else 0.0
     root = math.sqrt(out / b.back) if out > 1e5 else out / math.sqrt(1e5 * b.back)
     opens = min(max((head - 2e5) / b.pilot, 0.0), 1.0) if area != 0.0 else 0.0
@@ -147,7 +147,7 @@ def motor(w: Array, part: Array, area: float, supply: Array, b: Build) -> tuple[
     thin = b.leakage * part[LEAK] * math.exp(0.022 * (supply[OIL] - 45.0))
     slip = thin * across * (1.0 + abs(across) / b.most)
     if abs(across) > b.relief:
-        slip += (across - math.copysign(b.relief, across)) * b.flow * 1e-6
+        slip += (across - math.copysign(b.relief, across)) * b.flow / (0.08 * b.most)
     swept = disp * w[TURN]
     w[PA] = max(w[PA] + H * bulk(w[PA]) / b.volume * (qa - swept - slip - 0.3 * thin * w[PA]), 0.0)
     w[PB] = max(w[PB] + H * bulk(w[PB]) / b.volume * (qb + swept + slip - 0.3 * thin * w[PB]), 0.0)
@@ -196,7 +196,9 @@ def supply_of(s: Array, wanted: float, steering: float, taken: float, head: floa
     """Move engine, pump, oil and the motors' displacement by the flow asked for at full margin and the one taken [m³/s]."""
     stall = min(max((s[ENGINE] - 0.72 * b.engine) / (0.12 * b.engine), 0.1), 1.0)
     most = b.pump * s[ENGINE] * stall
-    goal = min(wanted + steering, most, 0.92 * b.power * s[ENGINE] / max(s[PRESSURE], 1e6))  # no more than the diesel gives
+    goal = min(
+        wanted + steering, most, 0.92 * b.power * s[ENGINE] / max(s[PRESSURE], 1e6)
+    )  # no more than the diesel gives
     s[FLOW] += H / b.pump_lag * (goal + 0.005 * b.pump - s[FLOW])
     free = max(s[FLOW] - steering, 0.0)  # steering is served first
     s[SHARE] = min(max(free / max(wanted, 1e-3 * b.pump), 0.0), 1.05)
