@@ -233,7 +233,7 @@ def signals(seed: int, faults: Sequence[FaultSpec], duration: float, tier: str) 
     (made, parts), has = build(seed), commands_of(seed)
     rng, noise = np.random.default_rng(104_000 + seed), np.random.default_rng(105_000 + seed)
     demand, _ = commands(seed, duration)
-    ref, true, read, given, done, body, source = driven(seed, tuple(faults), duration)
+    ref, true, read, given, done, body, _ = driven(seed, tuple(faults), duration)
     n, loses, shake = demand.size, float(rng.choice([0.0, 0.003, 0.01])), float(rng.choice([0.0, 0.05, 0.15]))
     rates = {"drive": float(rng.choice([50.0, 100.0, 100.0, 200.0])), "steer": float(rng.choice([20.0, 50.0, 100.0]))}
     rates |= {"valve": rates["drive"] * float(rng.choice([0.5, 1.0])), "cmd": 50.0, "imu": 100.0, "gnss": 5.0}
