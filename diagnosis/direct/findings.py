@@ -14,11 +14,11 @@ from diagnosis.channels.sample_status import BLIND, PAIR
 from diagnosis.direct.fault_runs import fault_runs
 from diagnosis.direct.identification import IdentifiedPair
 from diagnosis.direct.isolation import Isolated, estimate_run, isolate
-from diagnosis.direct.one_cause import Measured, with_one_cause
 from diagnosis.direct.onset import refine
 from diagnosis.direct.sentences import BOUNDS, OF_SAT, alike_sentence, sentences
 from diagnosis.direct.timing import timing_explains
 from diagnosis.estimation.fault_models import HEALTHY, INEFFICIENT, STUCK, VARYING_ROWS
+from diagnosis.estimation.one_cause import Measured, with_one_cause
 from diagnosis.estimation.segments import Run, with_leads
 from diagnosis.estimation.viterbi import ModePath
 from diagnosis.results.assessment import Finding

@@ -14,10 +14,11 @@ from diagnosis.steering.blocks import SteeringBlocks, second_differences
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
+#: What two healthy instruments differ by at most, of full opening or in rad; those of tuning machines differ by up to 0.003.
+MOST_APART = 0.02
 _MAX_LAG_S = 0.05
 _ZERO_ERROR = 0.01  # rad: what two healthy angle sensors are set to zero apart
 _SHARE_RANGE = (0.85, 1.15)
-_MOST_APART = 0.02  # of full opening, rad: no more than that is how two healthy instruments differ (tuning machines: up to 0.003)
 _LEAST_CHANGES = 4
 _LEAST_SHARE = 0.5
 _JITTER_S = 0.25
@@ -62,7 +63,7 @@ def with_second_angle(
 
 def _slow(deviation: Array, use: Flags, dt: float) -> float:
     """How far two instruments usually differ, as far as healthy ones do: a fault from start to end is no usual difference."""
-    return float(np.clip(np.nan_to_num(slow_mismatch(deviation, use, dt)), 0.0, _MOST_APART))
+    return float(np.clip(np.nan_to_num(slow_mismatch(deviation, use, dt)), 0.0, MOST_APART))
 
 
 def _zero_error(apart: Array, use: Flags) -> float:

@@ -23,7 +23,11 @@ Flags = NDArray[np.bool_]
 _GAP_S = 3.0  # between pieces of one fault
 _LEAST_S, _LEAST = 1.0, 40  # of a cluster: seconds, samples
 _LEFT = 0.06  # of the power of a deviation: what a cause leaves of it, at most
-_RIVAL, _RIVAL_LEFT = 3.0, 0.15  # times what the cause leaves, and of the power: what any cause of another row leaves, at least
+_RIVAL, _RIVAL_LEFT = (
+    3.0,
+    0.15,
+)  # times what the cause leaves, and of the power: what any cause of another row leaves, at least
+_NOTHING = 0.01  # of the power, that a cause may leave beside what a gain with an offset does
 _FOLLOWS = 0.9  # correlation with the reference of a channel that is neither stuck nor dead
 _P = 0.95  # that a cause which explains so much is it
 _LATEST_S, _DELAYS = 1.0, 41
@@ -70,6 +74,7 @@ class _Cause:
     left: float
     words: str
     epsilon: Epsilon | None = None
+    changes: bool = False  # with time, or with the reference's past
 
 
 def with_one_cause(findings: Sequence[Finding], measured: Measured) -> list[Finding]:
@@ -83,8 +88,10 @@ def with_one_cause(findings: Sequence[Finding], measured: Measured) -> list[Find
         Its channel and reference.
     """
     out: list[Finding] = []
-    for near in _clusters(findings, round(_GAP_S / measured.dt)):
-        cause = _cause_of(near, measured)
+    clusters = list(_clusters(findings, round(_GAP_S / measured.dt)))
+    common = _cause_of([f for near in clusters for f in near], measured) if len(clusters) > 1 else None
+    for near in clusters:
+        cause = common or _cause_of(near, measured)
         out += near if cause is None or {f.mode for f in near} == {cause.mode} else [_joined(near, cause)]
     return out
 
@@ -102,7 +109,7 @@ def _clusters(findings: Sequence[Finding], gap: int) -> Iterator[list[Finding]]:
 
 def _cause_of(near: Sequence[Finding], measured: Measured) -> _Cause | None:
     """What explains all pieces at once; None where nothing does, or more than one thing."""
-    first, last = near[0].start, max(f.stop for f in near)
+    first, last = near[0].start, min(max(f.stop for f in near), measured.y.size)
     inside = np.zeros(last - first, np.bool_)
     for f in near:
         inside[f.start - first : f.stop - first] = True
@@ -110,21 +117,27 @@ def _cause_of(near: Sequence[Finding], measured: Measured) -> _Cause | None:
     inside &= measured.use[first:last] & np.isfinite(y) & np.isfinite(x)
     if np.count_nonzero(inside) < max(_LEAST, _LEAST_S / measured.dt):
         return None
-    t = np.flatnonzero(inside) * measured.dt
+    at = first + np.flatnonzero(inside)
     y, x = y[inside], x[inside]
     if not (np.std(x) > 0.0 and np.std(y) > 0.0 and float(np.corrcoef(x, y)[0, 1]) > _FOLLOWS):
         return None
-    causes = sorted(_causes(y, x, t, measured), key=lambda c: c.left)
+    causes = sorted(_causes(y, x, at, measured), key=lambda c: c.left)
     best = causes[0]
     others = min((c.left for c in causes if c.mode is not best.mode), default=np.inf)
-    return best if best.left <= _LEFT and others >= max(_RIVAL * best.left, _RIVAL_LEFT) else None
+    if best.left > _LEFT or others < max(_RIVAL * best.left, _RIVAL_LEFT):
+        return None
+    both = np.column_stack([x, np.ones(x.size)])  # a loss with a bias is the row of noise
+    rest = _power(y - both @ np.linalg.lstsq(both, y, rcond=None)[0], measured) / max(_power(y - x, measured), 1e-30)
+    if best.changes:
+        return best if rest >= _RIVAL_LEFT else None
+    return best if best.left < max(_NOTHING, _RIVAL * rest) else None
 
 
-def _causes(y: Array, x: Array, t: Array, measured: Measured) -> Iterator[_Cause]:
-    """Every simple cause, with what it leaves."""
+def _causes(y: Array, x: Array, at: NDArray[np.intp], measured: Measured) -> Iterator[_Cause]:
+    """Every simple cause, with what it leaves of y beside x at some steps."""
     off = y - x
     whole = max(_power(off, measured), 1e-30)
-    channel, reference = measured.names
+    reference = measured.names[1]
     offset = float(np.mean(off))
     if abs(offset) >= measured.least:
         more = "more" if offset > 0.0 else "less"
@@ -135,21 +148,27 @@ def _causes(y: Array, x: Array, t: Array, measured: Measured) -> Iterator[_Cause
         )
     gain = float(x @ y) / float(x @ x)
     yield _loss(_power(y - gain * x, measured) / whole, (gain, gain), measured)
-    when = t - t[0]
+    when = (at - at[0]) * measured.dt
     shapes = np.column_stack([x, x * when])
     (start, slope), *_ = np.linalg.lstsq(shapes, y, rcond=None)
     ends = (float(start), float(start + slope * when[-1]))
     yield _loss(_power(y - shapes @ np.array([start, slope]), measured) / whole, ends, measured)
-    line = np.column_stack([np.ones(t.size), when])
+    line = np.column_stack([np.ones(at.size), when])
     drift, *_ = np.linalg.lstsq(line, off, rcond=None)
     yield _Cause(
         FaultMode.OUTSIDE_TABLE,
         _power(off - line @ drift, measured) / whole,
         f"It departs from {reference} by {amount(float(drift[1]), measured.unit, 2)} a second, whatever that is: a drift.",
+        changes=True,
     )
-    late = [(float(_power(y - np.interp(t - d, t, x), measured) / whole), d) for d in np.linspace(0.0, _LATEST_S, _DELAYS)[1:]]
+    late = []
+    for delay in np.linspace(0.0, _LATEST_S, _DELAYS)[1:]:
+        before = measured.x[np.maximum(at - round(delay / measured.dt), 0)]
+        late.append((_power(y - np.where(np.isfinite(before), before, x), measured) / whole, float(delay)))
     left, delay = min(late)
-    yield _Cause(FaultMode.OUTSIDE_TABLE, left, f"It comes {1e3 * delay:.0f} ms after {reference}: a delay.")
+    yield _Cause(
+        FaultMode.OUTSIDE_TABLE, left, f"It comes {1e3 * delay:.0f} ms after {reference}: a delay.", changes=True
+    )
 
 
 def _loss(left: float, gains: tuple[float, float], measured: Measured) -> _Cause:
@@ -160,7 +179,13 @@ def _loss(left: float, gains: tuple[float, float], measured: Measured) -> _Cause
     low, high = sorted(1.0 - g for g in gains)
     steady = gains[0] == gains[1]
     share = f"{gains[0]:.2f}" if steady else f"{gains[0]:.2f} at first and {gains[1]:.2f} at last"
-    return _Cause(mode, left, f"{channel} is {share} of {reference} all through it.", Epsilon(0.5 * (low + high), low, high))
+    return _Cause(
+        mode,
+        left,
+        f"{channel} is {share} of {reference} all through it.",
+        Epsilon(0.5 * (low + high), low, high),
+        changes=not steady,
+    )
 
 
 def _power(off: Array, measured: Measured) -> float:
