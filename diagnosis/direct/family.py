@@ -10,6 +10,7 @@ import numpy as np
 from diagnosis.channels.habit import Habit, identify_habit, of_kind
 from diagnosis.channels.relation import relations_of_kind, valves_of_kind
 from diagnosis.direct.assess import assess_identified
+from diagnosis.direct.at_once import without_shared_moments
 from diagnosis.direct.identification import IdentifiedPair, identify
 from diagnosis.direct.inputs import Pair, make_pair
 from diagnosis.direct.low_speed import without_low_speed_habit
@@ -57,6 +58,7 @@ class DirectEvidence:
         parts |= dict(zip(identified, judged, strict=True))
         sensors = {wheel: found for (wheel, side), found in identified.items() if side == SENSOR}
         told = without_low_speed_habit(sensors, {wheel: parts[wheel, SENSOR] for wheel in sensors})
+        told = without_shared_moments(sensors, told)
         return Contribution({**parts, **{(wheel, SENSOR): a for wheel, a in told.items()}})
 
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnosis.channels.sample_status import PAIR
+from diagnosis.channels.sample_status import BLIND, PAIR
 from diagnosis.direct.fault_runs import fault_runs
 from diagnosis.direct.identification import IdentifiedPair
 from diagnosis.direct.isolation import Isolated, estimate_run, isolate
@@ -18,6 +18,7 @@ from diagnosis.direct.onset import refine
 from diagnosis.direct.sentences import BOUNDS, OF_SAT, alike_sentence, sentences
 from diagnosis.direct.timing import timing_explains
 from diagnosis.estimation.fault_models import HEALTHY, INEFFICIENT, STUCK, VARYING_ROWS
+from diagnosis.estimation.one_cause import Measured, with_one_cause
 from diagnosis.estimation.segments import Run, with_leads
 from diagnosis.estimation.viterbi import ModePath
 from diagnosis.results.assessment import Finding
@@ -105,7 +106,15 @@ def find_faults(path: ModePath, found: IdentifiedPair, limits: Limits) -> Faults
                 run.row,
             )
             findings.append(_widened(finding, run, whole, dt, _detected(path, whole, dt, shortest, found.lag)))
-    return FaultsFound([_as_beside(f, findings, found) for f in findings], timing, below)
+    beside = [_as_beside(f, findings, found) for f in findings]
+    return FaultsFound(with_one_cause(beside, _measured(found, limits)), timing, below)
+
+
+def _measured(found: IdentifiedPair, limits: Limits) -> Measured:
+    """The pair as one cause is looked for in it."""
+    pair, (y, x, status, *_) = found.pair, found.samples
+    use = np.isin(status, (PAIR, BLIND))
+    return Measured(y, x, use, pair.dt, (pair.y_name, pair.x_name), pair.unit, found.model.noise, limits.min_sat)
 
 
 def finding_of(run: Run, found: IdentifiedPair, limits: Limits) -> Finding | None:

@@ -103,8 +103,8 @@ class Isolated:
     gain: float
 
 
-def run_samples(run: Run, found: IdentifiedPair) -> RunSamples:
-    """Samples of a run and what they look like."""
+def run_samples(run: Run, found: IdentifiedPair, min_sat: float = 0.0) -> RunSamples:
+    """Samples of a run and what they look like; a mean below `min_sat` [unit of y] is zero."""
     y, x, status, _, white, passing, _ = found.samples.part(run.start, run.stop)
     use = np.isin(status, (PAIR, BLIND))
     model = found.model
@@ -112,7 +112,7 @@ def run_samples(run: Run, found: IdentifiedPair) -> RunSamples:
     noise = float(np.sqrt(power.mean())) if use.any() else model.noise
     play = found.relation.play
     slack = 3 * model.constant_noise / np.sqrt(min(use.sum(), 100)) + 0.6 * play if use.any() else 0.0
-    zero = not use.any() or abs(float(np.mean(y[use]))) <= slack
+    zero = not use.any() or abs(float(np.mean(y[use]))) <= max(slack, min_sat)
     still = bool(use.any()) and (float(np.std(x[use])) < 2 * noise or float(np.ptp(x[use])) < 2 * play)
     deviation = float(np.sqrt(np.mean((y[use] - x[use]) ** 2))) if use.any() else float("inf")
     return RunSamples(y, x, status, use, zero, still, deviation, noise)
@@ -158,7 +158,7 @@ def isolate(run: Run, found: IdentifiedPair, min_sat: float) -> Isolated | None:
     if evidence[run.row] - evidence[HEALTHY] < model.switch_cost:
         return None
     p = row_probabilities(evidence, model.side)
-    seen = run_samples(run, found)
+    seen = run_samples(run, found, min_sat)
     row = stated_row(run.row, p, zero=seen.zero, still=seen.still)
     if row != run.row:  # the path came by this one from its neighbours or for want of time to change
         other = estimate_run(replace(run, row=row), found)

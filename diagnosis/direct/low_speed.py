@@ -6,7 +6,7 @@ off then is taken from all passages of all wheels through low speed; a finding t
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -44,19 +44,19 @@ def without_low_speed_habit(
         return dict(assessments)
     speeds = {w: np.abs(np.nan_to_num(one.samples.x)) for w, one in found.items()}
     low = _LOW * max(float(np.quantile(x, _TOP)) for x in speeds.values())
-    off = {w: _off(one) for w, one in found.items()}
+    off = {w: evened_off(one) for w, one in found.items()}
     peaks = np.concatenate([_peaks(off[w], speeds[w], low) for w in found])
     if peaks.size < _PASSAGES:
         return dict(assessments)
     limit = _BEYOND * float(np.quantile(peaks, _USUAL))
     return {
-        w: _without(a, [f for f in a.findings if _is_habit(f, off[w], speeds[w] < low, limit)])
+        w: left_open(a, [f for f in a.findings if _is_habit(f, off[w], speeds[w] < low, limit)])
         for w, a in assessments.items()
     }
 
 
-def _off(one: IdentifiedPair) -> Array:
-    """How far the readings are off their reference, evened [unit], shape (n,)."""
+def evened_off(one: IdentifiedPair) -> Array:
+    """How far readings are off their reference, evened over a tenth of a second [unit], shape (n,)."""
     known = one.samples.status == PAIR
     width = max(1, round(_EVEN_S / one.pair.dt))
     count = moving_sum(known, width)
@@ -76,7 +76,7 @@ def _is_habit(finding: Finding, off: Array, low: NDArray[np.bool_], limit: float
     return bool(low[part].mean() >= _MOSTLY and off[part].max(initial=0.0) <= limit)
 
 
-def _without(a: Assessment, findings: list[Finding]) -> Assessment:
+def left_open(a: Assessment, findings: Sequence[Finding]) -> Assessment:
     """An assessment that leaves open what some findings said."""
     if not findings:
         return a

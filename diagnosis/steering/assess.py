@@ -21,6 +21,7 @@ from diagnosis.steering.filter_state import SteeringPath
 from diagnosis.steering.findings import SideFindings, apart, findings_of
 from diagnosis.steering.identification import identify_plants
 from diagnosis.steering.inputs import AxleInputs, Counts, axle_inputs
+from diagnosis.steering.measured_twice import of_one_cause
 from diagnosis.steering.models import model_of
 from diagnosis.steering.path import AxleFilter, allowed_models, most_probable
 from diagnosis.steering.path_refinement import refine_path
@@ -176,6 +177,7 @@ def _found(
         found = paired(found)
     found = not_denied(found, inputs, blocks)
     found = {side: acquitted(side, found[side], inputs, blocks, believed=not otherwise) for side in _SIDES}
+    found = {side: of_one_cause(side, found[side], inputs, machine.limits.min_sat) for side in _SIDES}
     return _Found(axle, path, found, valve_judged)
 
 

@@ -31,7 +31,7 @@ Fault = tuple[Side | None, FaultMode | None]
 Span = tuple[int, int]
 
 _TEMPER = 0.35
-_MOST = 0.6  # of a mission: the longest fault of a valve
+_MOST = 0.6  # of a mission: the longest fault of a valve whose opening nobody measures
 _BRIEF_S = 0.9  # a shorter stretch is rather what the model leaves out
 _FEW_READINGS, _LAPSE_S = 3, 0.1  # readings that agree, seconds without any: no more may be chance, or a message lost
 _FRAGMENT_S = 2.0  # a row that holds for less beside another one is rather its end
@@ -245,7 +245,8 @@ def _may_be_stated(choice: _Choice, epsilon: Epsilon | None, run: _Run) -> bool:
     """Whether the choice is probable, large and lasting enough, and on the side that the run is of."""
     limits = run.limits
     elsewhere = choice.stated not in (run.side, Side.SENSOR_OR_ACTUATOR)
-    too_long = choice.side is Side.ACTUATOR and run.stop - run.start > _MOST * run.path.model.size
+    modelled = choice.side is Side.ACTUATOR and not run.axle.model.opening_measured
+    too_long = modelled and run.stop - run.start > _MOST * run.path.model.size
     small = choice.mode is FaultMode.INEFFICIENT and epsilon is not None and epsilon.value < limits.min_epsilon
     flicker = _lapse(run) if choice.dead_sensor else run.seconds < _BRIEF_S
     return not (choice.probability < limits.min_probability or too_long or small or flicker or elsewhere)

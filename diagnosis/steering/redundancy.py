@@ -14,6 +14,8 @@ from diagnosis.steering.blocks import SteeringBlocks, second_differences
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
+#: What two healthy instruments differ by at most, of full opening or in rad; those of tuning machines differ by up to 0.003.
+MOST_APART = 0.02
 _MAX_LAG_S = 0.05
 _ZERO_ERROR = 0.01  # rad: what two healthy angle sensors are set to zero apart
 _SHARE_RANGE = (0.85, 1.15)
@@ -51,12 +53,17 @@ def with_second_angle(
     known = np.isfinite(moved)
     mean, count = _means(moved, known, blocks)
     power = _white(moved[known])
-    slow = np.nan_to_num(slow_mismatch(moved - y, use & np.isfinite(moved), dt))
+    slow = _slow(moved - y, use & np.isfinite(moved), dt)
     redundancy = blocks.redundancy._replace(
         angle=np.where(count > 0, mean, np.nan),
         angle_variance=power / np.maximum(count, 1) + max(slow**2 - power, 0.0) + tolerance**2,
     )
     return replace(blocks, redundancy=redundancy)
+
+
+def _slow(deviation: Array, use: Flags, dt: float) -> float:
+    """How far two instruments usually differ, as far as healthy ones do: a fault from start to end is no usual difference."""
+    return float(np.clip(np.nan_to_num(slow_mismatch(deviation, use, dt)), 0.0, MOST_APART))
 
 
 def _zero_error(apart: Array, use: Flags) -> float:
@@ -104,7 +111,7 @@ def with_valve_opening(
     known = use & np.isfinite(command)
     deviation = np.where(known, position - command, 0.0)
     power = max(_white(deviation[known]), 1e-8)
-    slow = np.nan_to_num(slow_mismatch(np.where(known, deviation, np.nan), known, dt))
+    slow = _slow(np.where(known, deviation, np.nan), known, dt)
     command_mean, count = _means(command, known, blocks)
     opening, _ = _means(position, known, blocks)
     share, share_variance = _followed_share(

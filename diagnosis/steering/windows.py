@@ -15,6 +15,7 @@ Array = NDArray[np.float64]
 
 _DEAD_STEP, _PLAY_STEP = 1e-4, 5e-5  # over which differences are taken [fraction], [rad]
 _MISSED = 2.0  # times the usual distance of samples: from there on some are missing
+_FAULTY = 0.1  # of the windows: a valve that does not obey in more has an opening of its own
 _OBEYED, _NEARLY = 4.0, 1e-3  # standard deviations and opening [fraction] by which a healthy valve may differ
 
 
@@ -181,11 +182,12 @@ def windows_of(blocks: SteeringBlocks, noise: SensorNoise, stop: float, window_s
     if noise.resolved:
         alive &= power > noise.white / usual
     rate = np.diff(middle) / (length * blocks.dt)
-    alive &= _obeyed(blocks, length)
-    opening = window_means(blocks.u, length)
+    u, obeyed = _opened(blocks, length)
+    alive &= obeyed
+    opening = window_means(u, length)
     spread = float(np.sqrt(2 * noise.white / max(counts, 1.0))) / (length * blocks.dt)
     middle_u = (opening[1:] + opening[:-1]) / 2
-    return Windows(rate, blocks.u, middle_u, alive[1:] & alive[:-1], length, blocks.dt, spread)
+    return Windows(rate, u, middle_u, alive[1:] & alive[:-1], length, blocks.dt, spread)
 
 
 def _sampled(known: NDArray[np.bool_]) -> NDArray[np.bool_]:
@@ -196,6 +198,19 @@ def _sampled(known: NDArray[np.bool_]) -> NDArray[np.bool_]:
     gaps, sampled = np.diff(at), known.copy()
     sampled[at[0] : at[-1]] = np.repeat(gaps, gaps) <= _MISSED * np.median(gaps)
     return sampled
+
+
+def _opened(blocks: SteeringBlocks, length: int) -> tuple[Array, NDArray[np.bool_]]:
+    """Openings of the blocks [fraction], shape (m,), and the windows of `length` blocks in which they are known, shape (w,).
+
+    The command's; where a measured opening leaves that for long, the command less what the opening lacks of it.
+    """
+    obeyed = _obeyed(blocks, length)
+    if float(np.mean(~obeyed)) < _FAULTY:
+        return blocks.u, obeyed
+    lacks = blocks.redundancy.opening - blocks.redundancy.command
+    known = np.flatnonzero(np.isfinite(lacks))
+    return blocks.u + np.interp(np.arange(blocks.u.size), known, lacks[known]), np.ones_like(obeyed)
 
 
 def _obeyed(blocks: SteeringBlocks, length: int) -> NDArray[np.bool_]:

@@ -156,11 +156,10 @@ def test_epsilon_is_a_share_unless_outside_the_table() -> None:
 
 
 @SIDES
-def test_bias_alone_lands_in_the_noisystated_row(side: Side) -> None:
+def test_a_bias_alone_is_told_as_an_offset(side: Side) -> None:
     found = single(judged(side, lambda a, _: a + 0.08, 3))
-    assert found.mode is FaultMode.NOISY  # δ = 1, δ̄ ≠ 0 has no row of its own
-    assert found.epsilon is not None
-    assert found.epsilon.low <= 0.05
+    assert found.mode is FaultMode.OUTSIDE_TABLE  # δ = 1, δ̄ ≠ 0 has no row of its own
+    assert any("an offset" in line for line in found.evidence)
 
 
 @SIDES
