@@ -27,6 +27,7 @@ _RIVAL, _RIVAL_LEFT = (
     3.0,
     0.15,
 )  # times what the cause leaves, and of the power: what any cause of another row leaves, at least
+_ABOUT = 0.03  # of a gain, by which its ends may be beyond the table
 _NOTHING = 0.01  # of the power, that a cause may leave beside what a gain with an offset does
 _FOLLOWS = 0.9  # correlation with the reference of a channel that is neither stuck nor dead
 _P = 0.95  # that a cause which explains so much is it
@@ -74,7 +75,8 @@ class _Cause:
     left: float
     words: str
     epsilon: Epsilon | None = None
-    changes: bool = False  # with time, or with the reference's past
+    changes: bool = False  # with time
+    late: bool = False
 
 
 def with_one_cause(findings: Sequence[Finding], measured: Measured) -> list[Finding]:
@@ -119,12 +121,14 @@ def _cause_of(near: Sequence[Finding], measured: Measured) -> _Cause | None:
         return None
     at = first + np.flatnonzero(inside)
     y, x = y[inside], x[inside]
-    if not (np.std(x) > 0.0 and np.std(y) > 0.0 and float(np.corrcoef(x, y)[0, 1]) > _FOLLOWS):
+    if not (np.std(x) > 0.0 and np.std(y) > 0.0):
         return None
     causes = sorted(_causes(y, x, at, measured), key=lambda c: c.left)
     best = causes[0]
     others = min((c.left for c in causes if c.mode is not best.mode), default=np.inf)
     if best.left > _LEFT or others < max(_RIVAL * best.left, _RIVAL_LEFT):
+        return None
+    if not best.late and float(np.corrcoef(x, y)[0, 1]) < _FOLLOWS:
         return None
     both = np.column_stack([x, np.ones(x.size)])  # a loss with a bias is the row of noise
     rest = _power(y - both @ np.linalg.lstsq(both, y, rcond=None)[0], measured) / max(_power(y - x, measured), 1e-30)
@@ -167,14 +171,18 @@ def _causes(y: Array, x: Array, at: NDArray[np.intp], measured: Measured) -> Ite
         late.append((_power(y - np.where(np.isfinite(before), before, x), measured) / whole, float(delay)))
     left, delay = min(late)
     yield _Cause(
-        FaultMode.OUTSIDE_TABLE, left, f"It comes {1e3 * delay:.0f} ms after {reference}: a delay.", changes=True
+        FaultMode.OUTSIDE_TABLE,
+        left,
+        f"It comes {1e3 * delay:.0f} ms after {reference}: a delay.",
+        changes=True,
+        late=True,
     )
 
 
 def _loss(left: float, gains: tuple[float, float], measured: Measured) -> _Cause:
     """A gain that is steady or changes from the one to the other."""
     channel, reference = measured.names
-    table = all(0.0 <= g <= 1.0 for g in gains)
+    table = all(-_ABOUT <= g <= 1.0 + _ABOUT for g in gains)
     mode = FaultMode.INEFFICIENT if table else FaultMode.OUTSIDE_TABLE
     low, high = sorted(1.0 - g for g in gains)
     steady = gains[0] == gains[1]

@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from diagnosis.steering.blocks import SteeringBlocks, blocks_of
+from diagnosis.steering.blocks import SensorNoise, SteeringBlocks, blocks_of
 from diagnosis.steering.redundancy import with_second_angle, with_valve_opening
+from diagnosis.steering.windows import windows_of
 
 DT, SIZE, STUCK_AT, DELAY = 0.001, 20_000, 15_000, 2
 ALWAYS = np.ones(SIZE, np.bool_)
@@ -89,3 +90,27 @@ def test_a_valve_that_lags_does_not_follow_jitter_at_once() -> None:
     found, _ = with_valve_opening(blocks_of(np.zeros(SIZE), u, ALWAYS, ALWAYS, step), u, opening, ALWAYS, step)
     apart = np.abs(found.redundancy.opening - found.redundancy.command)[5:]
     assert np.nanmax(apart) < 0.1
+
+
+def test_a_loss_from_start_to_end_is_no_usual_difference() -> None:
+    rng = np.random.default_rng(6)
+    t = np.arange(SIZE) * DT
+    u = 0.4 * np.sin(2 * t)
+    found, _ = with_valve_opening(blocks(u), u, 0.2 * u + rng.normal(0.0, 2e-4, SIZE), ALWAYS, DT)
+    seen = found.redundancy
+    assert np.nanmax(np.sqrt(seen.opening_variance)) < 0.05
+    assert np.nanmax(np.abs(seen.opening - seen.command)) > 0.25
+
+
+def test_the_plant_is_found_by_what_a_valve_opens_where_it_does_not_obey() -> None:
+    rng = np.random.default_rng(7)
+    t = np.arange(SIZE) * DT
+    u = 0.4 * np.sin(2 * t)
+    for share in (0.2, 1.0):
+        phi = 0.3 * np.cumsum(share * u) * DT + rng.normal(0.0, 3e-4, SIZE)
+        cut = blocks_of(phi, u, ALWAYS, ALWAYS, DT)
+        found, _ = with_valve_opening(cut, u, share * u + rng.normal(0.0, 2e-4, SIZE), ALWAYS, DT)
+        windows = windows_of(found, SensorNoise(9e-8, 0.0, 0.0, 0.0), 1.0, 0.25)
+        moving = windows.good & (np.abs(windows.opening) > 0.05 * share)
+        assert np.count_nonzero(moving) > 10
+        assert np.median(windows.rate[moving] / windows.opening[moving]) == pytest.approx(0.3, rel=0.05)

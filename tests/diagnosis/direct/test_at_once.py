@@ -1,0 +1,61 @@
+"""What two speed sensors do in the same moment of changing speed is how they measure; what lasts at steady speed is a fault."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from diagnosis.channels.sample_status import PAIR
+from diagnosis.direct.at_once import without_shared_moments
+from diagnosis.direct.identification import IdentifiedPair
+from diagnosis.results.assessment import CODE, Assessment, Finding
+from diagnosis.results.vocabulary import Tier
+from replay.faults import FaultMode, Side, State
+
+Array = NDArray[np.float64]
+DT, SIZE = 0.01, 6000
+WHEELS = ("FR", "FL", "RR", "RL")
+T = np.arange(SIZE) * DT
+SPEED = np.clip(2.0 * np.sin(2 * np.pi * T / 20.0), -1.0, 1.0)  # steady for most of the time, turns round every 10 s
+TURN = (970, 1030)
+
+
+def sensor(*, late_s: float = 0.0, offset: float = 0.0) -> IdentifiedPair:
+    """A sensor that comes late and is off."""
+    samples = SimpleNamespace(x=SPEED, y=np.interp(T - late_s, T, SPEED) + offset, status=np.full(SIZE, PAIR, np.int8))
+    return cast(IdentifiedPair, SimpleNamespace(samples=samples, pair=SimpleNamespace(dt=DT)))
+
+
+def assessment(start: int, stop: int) -> Assessment:
+    """One fault of a sensor."""
+    states = np.full(SIZE, CODE[State.HEALTHY])
+    states[start:stop] = CODE[State.NOISY]
+    finding = Finding(start, stop, Side.SENSOR, FaultMode.NOISY, 0.99, (), None, None, (), Tier.DIRECT)
+    return Assessment(states, findings=(finding,), tier=Tier.DIRECT)
+
+
+def kept(pairs: dict[str, IdentifiedPair], span: tuple[int, int]) -> bool:
+    told = without_shared_moments(pairs, {w: assessment(*span) for w in ("FR",)})
+    return bool(told["FR"].findings)
+
+
+def test_a_delay_that_another_sensor_has_as_well_is_left_open() -> None:
+    pairs = {w: sensor(late_s=0.1 if w in ("FR", "RL") else 0.0) for w in WHEELS}
+    told = without_shared_moments(pairs, {"FR": assessment(*TURN)})
+    assert told["FR"].findings == ()
+    assert (told["FR"].states[slice(*TURN)] == CODE[State.NOT_ASSESSED]).all()
+
+
+def test_what_no_other_sensor_does_stays() -> None:
+    assert kept({w: sensor(late_s=0.1 if w == "FR" else 0.0) for w in WHEELS}, TURN)
+
+
+def test_what_is_off_at_steady_speed_stays_though_all_are() -> None:
+    assert kept({w: sensor(offset=0.1) for w in WHEELS}, (200, 1200))
+
+
+def test_two_sensors_show_no_habit() -> None:
+    assert kept({w: sensor(late_s=0.1) for w in WHEELS[:2]}, TURN)

@@ -1,0 +1,87 @@
+"""Pieces of one fault are joined where one simple cause explains them together, and nowhere else."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from diagnosis.estimation.one_cause import Measured, with_one_cause
+from diagnosis.results.assessment import Finding
+from diagnosis.results.result import Hypothesis
+from diagnosis.results.vocabulary import Tier
+from replay.faults import FaultMode, Side
+
+Array = NDArray[np.float64]
+DT, SIZE = 0.01, 4000
+T = np.arange(SIZE) * DT
+X = 0.4 * np.sin(0.9 * T) + 0.15 * np.sin(2.3 * T + 1.0)
+RNG = np.random.default_rng(5)
+NOISE = 0.004
+PIECES = ((1000, 1200, FaultMode.STUCK), (1200, 1900, FaultMode.NOISY), (1950, 2400, FaultMode.INEFFICIENT))
+
+
+def pieces(spans: Sequence[tuple[int, int, FaultMode]] = PIECES) -> list[Finding]:
+    """Findings of one sensor, one after the other."""
+    return [
+        Finding(a, b, Side.SENSOR, mode, 0.99, (Hypothesis("sensor", mode, 0.99),), None, None, (), Tier.DIRECT, a + 5)
+        for a, b, mode in spans
+    ]
+
+
+def measured(change: Callable[[Array], Array]) -> Measured:
+    y = change(X) + NOISE * RNG.standard_normal(SIZE)
+    return Measured(y, X, np.ones(SIZE, np.bool_), DT, ("a", "b"), "m/s", NOISE, 0.02)
+
+
+@pytest.mark.parametrize(
+    ("change", "mode", "words"),
+    [
+        (lambda x: x + 0.08, FaultMode.OUTSIDE_TABLE, "0.08 {speed_unit} more than b all through it"),
+        (lambda x: np.interp(T - 0.4, T, x), FaultMode.OUTSIDE_TABLE, "400 ms after b: a delay"),
+        (lambda x: 1.35 * x, FaultMode.OUTSIDE_TABLE, "1.35 of b"),
+        (lambda x: 0.6 * x, FaultMode.INEFFICIENT, "0.60 of b"),
+        (lambda x: (1.0 - 0.6 * (T - 10.0) / 14.0) * x, FaultMode.INEFFICIENT, "at first and"),
+    ],
+    ids=["offset", "delay", "too much", "loss", "fading"],
+)
+def test_one_cause_joins_its_pieces(change: Callable[[Array], Array], mode: FaultMode, words: str) -> None:
+    (found,) = with_one_cause(pieces(), measured(change))
+    assert (found.start, found.stop, found.mode) == (1000, 2400, mode)
+    assert found.probability == pytest.approx(0.95)
+    assert sum(h.p for h in found.hypotheses) <= 1.0 + 1e-9
+    assert found.detected == 1005
+    assert words in found.evidence[0]
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda x: 0.7 * x + 0.15,  # the row of noise: a loss with a bias
+        lambda x: x + 0.15 * RNG.standard_normal(SIZE),
+        lambda x: 0.3 + 0.0 * x,
+        lambda x: 0.0 * x,
+        lambda x: np.where(T < 15.0, x + 0.1, 0.5 * x),
+    ],
+    ids=["loss and bias", "noise", "stuck", "dead", "two faults"],
+)
+def test_nothing_else_is_joined(change: Callable[[Array], Array]) -> None:
+    assert with_one_cause(pieces(), measured(change)) == pieces()
+
+
+def test_a_cause_of_all_pieces_names_each_of_them_where_health_lies_between() -> None:
+    spans = ((300, 420, FaultMode.NOISY), (1500, 1560, FaultMode.STUCK), (3000, 3300, FaultMode.NOISY))
+    found = with_one_cause(pieces(spans), measured(lambda x: x + 0.1))
+    assert [(f.start, f.stop, f.mode) for f in found] == [(a, b, FaultMode.OUTSIDE_TABLE) for a, b, _ in spans]
+
+
+def test_what_already_has_its_name_keeps_its_evidence() -> None:
+    own = pieces([(1000, 2400, FaultMode.INEFFICIENT)])
+    assert with_one_cause(own, measured(lambda x: 0.6 * x)) == own
+
+
+def test_a_moment_is_no_cause() -> None:
+    own = pieces([(1000, 1030, FaultMode.NOISY)])
+    assert with_one_cause(own, measured(lambda x: x + 0.2)) == own
