@@ -78,7 +78,7 @@ class Judged:
     @cached_property
     def cells(self) -> Cells:
         """The mission in cells, with what is stated."""
-        return cells_of(self.mission.timeline, self.replay, self.machine, self.intervals)
+        return cells_of(self.mission.timeline, self.replay, self.machine, self.intervals, self.found.wheel_model)
 
     @cached_property
     def checks(self) -> tuple[Checked, ...]:

@@ -34,12 +34,15 @@ class Cells:
         The aligned mission, the replayed loop and the machine.
     stated : Mapping[str, Sequence[tuple[float, float]]]
         When a fault of a component is stated, by component [s].
+    carried : Mapping[str, float]
+        Share of its speed that the ground gives a wheel whose valve is dead, by wheel, as far as a model of the mission says it [1].
     """
 
     timeline: Timeline
     replay: Replay
     machine: Machine
     stated: Mapping[str, Sequence[tuple[float, float]]] = field(default_factory=dict)
+    carried: Mapping[str, float] = field(default_factory=dict)
     _kept: dict[str, Array] = field(default_factory=dict, repr=False, compare=False)
 
     @cached_property

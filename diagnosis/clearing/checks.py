@@ -14,12 +14,19 @@ from diagnosis.results.clearing import Checked
 from diagnosis.results.machine_words import MachineWords
 from diagnosis.results.result import FaultInterval
 from diagnosis.results.vocabulary import Severity
+from diagnosis.results.wheel_model import WheelModelFit
 from replay.control.loop import Replay
 from replay.machine.config import Machine
 from replay.signals.timeline import Timeline
 
 
-def cells_of(timeline: Timeline, replay: Replay, machine: Machine, faults: Sequence[FaultInterval] = ()) -> Cells:
+def cells_of(
+    timeline: Timeline,
+    replay: Replay,
+    machine: Machine,
+    faults: Sequence[FaultInterval] = (),
+    model: WheelModelFit | None = None,
+) -> Cells:
     """A mission in cells.
 
     Parameters
@@ -28,12 +35,16 @@ def cells_of(timeline: Timeline, replay: Replay, machine: Machine, faults: Seque
         The aligned mission, the replayed loop and the machine.
     faults : Sequence[FaultInterval]
         What is stated: it need not be asked again whether something is wrong with such a part at that time.
+    model : WheelModelFit or None
+        Of the wheels on the ground.
     """
     stated: dict[str, list[tuple[float, float]]] = {}
     for f in faults:
         if f.severity is not Severity.INFO:
             stated.setdefault(f.component, []).append((f.start_s, f.stop_s))
-    return Cells(timeline, replay, machine, stated)
+    plants = () if model is None or not model.reliable else model.plants
+    held = {w: p.grip for w, p in zip(machine.wheels, plants, strict=False) if p is not None and p.grip is not None}
+    return Cells(timeline, replay, machine, stated, {w: grip / (1.0 + grip) for w, grip in held.items()})
 
 
 def checks_of(cells: Cells, words: MachineWords) -> tuple[Checked, ...]:

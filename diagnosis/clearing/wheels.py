@@ -10,6 +10,7 @@ import numpy as np
 from diagnosis.clearing.cells import Array, Cells
 from diagnosis.clearing.measure import alone, compared, lasts, late, off_commands, times, worst
 from diagnosis.clearing.responses import (
+    LEAST_SEEN,
     OTHERS,
     largest,
     measured_twice,
@@ -27,6 +28,7 @@ FLOOR = 0.16  # of the top speed: a deviation is a share of at least this
 OPENING = 0.03  # of full opening: likewise
 ROUGH, _ROUGHER = 0.15, 5.0  # quick changes: share of the speed, times those of the other wheels
 LATE_S = 0.2
+CARRIED = float(np.exp(-LEAST_SEEN))  # of its speed: a wheel that the ground gives more shows no loss of its valve
 _TRACKING, _TRACKING_ALONE = 0.35, 0.12  # at most, and at least where the other wheels follow much better
 _SLOWER = 3.0  # times the deviation of the others' valves, or speeds: a slow one
 VALVE = 1.4  # dead band and hysteresis of a healthy valve: the limit as a multiple of the loss that counts
@@ -62,6 +64,8 @@ def wheel_checks(cells: Cells, clear_at: float) -> Iterator[Checked]:
         if twice[i][0]:
             limit = alone(slowest, i, VALVE * clear_at, clear_at, _SLOWER)
             yield worst(cells, (*about, Side.ACTUATOR, Check.SECOND_MEASUREMENT), behind[:, i], limit, apart=True)
+        if wheel in cells.carried and not any(twice[i]) and _known(command[:, i]):
+            yield Checked(*about, Side.ACTUATOR, Check.CARRIED, cells.carried[wheel], CARRIED)
         # where an opening is no speed, nothing of it is asked of a wheel that is measured twice on either side
         if _known(used[:, i]) and speed.shape[1] > OTHERS and (tells or not all(twice[i])):
             own = limits[i]

@@ -193,6 +193,11 @@ def _act(check: Checked, twice: Collection[str]) -> str:
         )
     if check.check in _STEERED or check.kind == Kind.STEER:
         return "steer from stop to stop twice at standstill, and watch whether the axle follows"
+    if check.check is Check.CARRIED:
+        return (
+            f"log wheel.<part>.u_applied (the {words.drive}'s own measurement), or lift the machine, give every {words.part} the same "
+            "command for 10 s, and diagnose that log"
+        )
     if check.check is Check.SECOND_MEASUREMENT and check.worst is not None:
         return "compare both measurements at one steady speed with a third one, such as a hand tachometer, then repair or rescale the one that is off"
     if check.worst is None:

@@ -21,6 +21,7 @@ class Check(StrEnum):
     LASTING_RESPONSE = "lasting_response"
     EXCESS = "excess"
     LASTING_EXCESS = "lasting_excess"
+    CARRIED = "carried"
     TRACKING = "tracking"
     ROUGHNESS = "roughness"
     DELAY = "delay"
@@ -54,6 +55,10 @@ CHECK_WORDS: dict[Check, tuple[str, str]] = {
     Check.LASTING_EXCESS: (
         "speed per {unit_command} above the other {wheels}', over the mission",
         "the speed of {part} per {unit_command} is above the other {wheels}' by {value} % over the mission",
+    ),
+    Check.CARRIED: (
+        "share of the speed that the ground gives a {wheel} whose {valve} is dead",
+        "the ground carries {part}: by this mission's own model of the {wheels} a dead {valve} would leave it {value} % of its speed",
     ),
     Check.TRACKING: (
         "error of tracking, less that of the other {wheels}",
