@@ -3,8 +3,8 @@
 Where a mission's motions scatter about the best plant by more than half a per cent even where it fits best, valves creep within
 their overlap, axles push each other, oil warms: the filters' evidence, which knows none of that, is sure of faults that are none.
 A fault of the sensor must then show between two angles, and one of the valve between its command and its opening, beyond what they
-differ by at such motion all through the mission; without a second measurement only a sensor that comes no more is told, or one
-that never rests and repeats one reading to its last digit.
+differ by at such motion all through the mission; without a second measurement only a sensor that comes no more is told, one
+that never rests and repeats one reading to its last digit, or one that shakes far more than it does elsewhere.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from diagnosis.channels.noise_growth import NoiseGrowth, noise_growth
 from diagnosis.results.assessment import Finding
 from diagnosis.steering.blocks import SteeringBlocks
+from diagnosis.steering.denied import shaken_power, usual_power
 from diagnosis.steering.driven import driven_by
 from diagnosis.steering.findings import SideFindings
 from diagnosis.steering.inputs import AxleInputs
@@ -44,6 +45,7 @@ _RESTLESS, _FROZEN = (
     0.01,
 )  # share of readings that change: of a sensor that never rests, and of one that repeats itself
 _FEW_READINGS = 25
+_FAR_MORE = 16.0  # times the usual power of what changes from reading to reading
 _CALM = 0.1  # quantile of stretches of so many readings: in the others they change more often
 _LEFT = 0.5  # of the power between two measurements: what a fault that is believed leaves of it, at most
 _LEAST = {Side.SENSOR: 0.012, Side.ACTUATOR: 0.02}  # rad and of full opening: less is nobody's fault
@@ -124,7 +126,8 @@ def acquitted(
     limit = np.maximum(_BEYOND**2 * growth.variance(moved), least**2)
     kept, open_, refuted = [], list(found.unexplained), list(found.refuted)
     for f, (a, b) in zip(found.findings, spans, strict=True):
-        if _shown(f, apart[a:b], by[a:b], limit[a:b], blocks.dt, believed=believed) or _frozen(f, found, inputs):
+        alone = _frozen(f, found, inputs) or _shaken(f, found, blocks)
+        if alone or _shown(f, apart[a:b], by[a:b], limit[a:b], blocks.dt, believed=believed):
             kept.append(f)
         elif side is Side.ACTUATOR and _followed(f, apart[a:b], by[a:b], limit[a:b]):
             refuted.append((a, b))
@@ -193,6 +196,16 @@ def _frozen(finding: Finding, found: SideFindings, inputs: AxleInputs) -> bool:
     windows = elsewhere[: elsewhere.size // _FEW_READINGS * _FEW_READINGS].reshape(-1, _FEW_READINGS)
     restless = float(np.quantile(np.mean(windows > 0.0, axis=1), _CALM))
     return restless >= _RESTLESS and float(np.mean(np.diff(inputs.angle[at]) != 0.0)) <= _FROZEN
+
+
+def _shaken(finding: Finding, found: SideFindings, blocks: SteeringBlocks) -> bool:
+    """Whether a sensor's readings change from one to the next far more than elsewhere in the mission: no axle moves like that."""
+    if finding.side is not Side.SENSOR or finding.mode is not FaultMode.NOISY:
+        return False
+    usual = usual_power(found, blocks)
+    span = finding.start // blocks.length, -(-finding.stop // blocks.length)
+    known = bool((blocks.count[slice(*span)] > 0).any())
+    return known and 0.0 < _FAR_MORE * usual < shaken_power(blocks, *span)
 
 
 def _mostly(shown: NDArray[np.bool_]) -> bool:

@@ -46,11 +46,11 @@ def not_denied(
     out = dict(found)
     sensor, valve = found[Side.SENSOR], found[Side.ACTUATOR]
     if not inputs.angle_redundant:
-        usual = _usual_power(sensor, blocks)
+        usual = usual_power(sensor, blocks)
         denied = [
             f
             for f in sensor.findings
-            if (f.mode is FaultMode.NOISY and _power(blocks, *_span(f, blocks)) < _SHAKEN * usual)
+            if (f.mode is FaultMode.NOISY and shaken_power(blocks, *_span(f, blocks)) < _SHAKEN * usual)
             or (f.mode.total and _trembles(f, inputs))
         ]
         kept = tuple(f for f in sensor.findings if f not in denied)
@@ -105,13 +105,13 @@ def _span(finding: Finding, blocks: SteeringBlocks) -> tuple[int, int]:
     return finding.start // blocks.length, -(-finding.stop // blocks.length)
 
 
-def _power(blocks: SteeringBlocks, a: int, b: int) -> float:
-    """Mean power of what changes from reading to reading in blocks [a, b) [rad²]."""
+def shaken_power(blocks: SteeringBlocks, a: int, b: int) -> float:
+    """Mean power of what changes from reading to reading in blocks [a, b) [rad²]; infinite where there is none."""
     use = blocks.count[a:b] > 0
     return float(np.mean(blocks.power[a:b][use])) if use.any() else float("inf")
 
 
-def _usual_power(side: SideFindings, blocks: SteeringBlocks) -> float:
+def usual_power(side: SideFindings, blocks: SteeringBlocks) -> float:
     """That power where the side has no fault [rad²]; 0 where too little is left."""
     use = np.asarray(blocks.count > 0)
     for f in side.findings:
