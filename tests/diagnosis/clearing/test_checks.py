@@ -224,3 +224,12 @@ def test_wheels_that_are_steered_one_by_one_are_an_axle_beside_the_yaw_rate() ->
     yaw = {c.component: c for c in checks_of(one, HYDRAULIC) if c.check is Check.LASTING_YAW}
     assert set(yaw) == set(machine.axles)
     assert all(c.passed for c in yaw.values())
+
+
+@pytest.mark.parametrize(("base", "share", "passed"), [(True, 0.95, False), (True, 0.7, True), (False, 0.95, None)])
+def test_a_wheel_that_the_ground_carries_shows_no_dead_valve(base: bool, share: float, passed: bool | None) -> None:
+    """With the opening measured, the ground hides nothing of the valve: it is not asked."""
+    cells = replace(in_cells(simulated(), base=base), carried={"FR": share})
+    asked = [c for c in checks_of(cells, HYDRAULIC) if c.check is Check.CARRIED]
+    assert [(c.component, c.passed) for c in asked] == ([] if passed is None else [("FR", passed)])
+    assert all(c.passed or "ground carries FR" in c.text for c in asked)

@@ -180,3 +180,17 @@ def test_an_opening_that_follows_refutes_a_dead_valve() -> None:
     assert not found.findings
     assert not found.unexplained
     assert found.refuted == ((2000, 4000),)
+
+
+@pytest.mark.parametrize(("noise", "named"), [(0.05, True), (6e-4, False)])
+def test_a_sensor_that_shakes_far_more_than_elsewhere_is_noisy_whatever_the_model_says(
+    noise: float, named: bool
+) -> None:
+    u, angle = moved(0.0)
+    rng = np.random.default_rng(8)
+    reading = angle + rng.normal(0.0, 5e-4, SIZE)
+    reading[4000:5000] += rng.normal(0.0, noise, 1000)
+    inputs: Any = SimpleNamespace(angle_redundant=False, angle=reading, fresh=ALWAYS)
+    noisy = SideFindings((finding(Side.SENSOR, FaultMode.NOISY, 4000, 5000),), ())
+    found = acquitted(Side.SENSOR, noisy, inputs, blocks(u, reading), believed=False)
+    assert bool(found.findings) is named
