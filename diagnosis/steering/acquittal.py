@@ -126,8 +126,8 @@ def acquitted(
     limit = np.maximum(_BEYOND**2 * growth.variance(moved), least**2)
     kept, open_, refuted = [], list(found.unexplained), list(found.refuted)
     for f, (a, b) in zip(found.findings, spans, strict=True):
-        alone = _frozen(f, found, inputs) or _shaken(f, found, blocks)
-        if alone or _shown(f, apart[a:b], by[a:b], limit[a:b], blocks.dt, believed=believed):
+        shown = _shown(f, apart[a:b], by[a:b], limit[a:b], blocks.dt, believed=believed)
+        if shown or _frozen(f, found, inputs) or _shaken(f, found, blocks):
             kept.append(f)
         elif side is Side.ACTUATOR and _followed(f, apart[a:b], by[a:b], limit[a:b]):
             refuted.append((a, b))
