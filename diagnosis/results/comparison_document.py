@@ -5,7 +5,7 @@ Fields may be added within the schema, none renamed or removed; times are second
 
 from __future__ import annotations
 
-from typing import Final, Literal, TypedDict
+from typing import Final, Literal, NotRequired, TypedDict
 
 from diagnosis.results.size_rows import EpsilonRow
 from diagnosis.results.vocabulary import Kind, Severity, Tier, Verdict
@@ -61,6 +61,7 @@ class FoundFaultRow(TypedDict):
     epsilon: EpsilonRow | None
     probability: float
     tier: Tier
+    recovered: NotRequired[bool]  # missing in documents of earlier versions
 
 
 class FaultChangeRow(TypedDict):

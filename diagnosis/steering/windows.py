@@ -206,7 +206,7 @@ def _opened(blocks: SteeringBlocks, length: int) -> tuple[Array, NDArray[np.bool
     The command's; where a measured opening leaves that for long, the command less what the opening lacks of it.
     """
     obeyed = _obeyed(blocks, length)
-    if float(np.mean(~obeyed)) < _FAULTY:
+    if np.count_nonzero(~obeyed) <= _FAULTY * obeyed.size:
         return blocks.u, obeyed
     lacks = blocks.redundancy.opening - blocks.redundancy.command
     known = np.flatnonzero(np.isfinite(lacks))
