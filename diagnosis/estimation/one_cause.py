@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from diagnosis.results.assessment import Finding
 from diagnosis.results.result import Epsilon, Hypothesis
 from diagnosis.results.sizes import amount
-from replay.faults import FaultMode
+from replay.faults import FaultMode, State
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -23,15 +23,14 @@ Flags = NDArray[np.bool_]
 _GAP_S = 3.0  # between pieces of one fault
 _LEAST_S, _LEAST = 1.0, 40  # of a cluster: seconds, samples
 _LEFT = 0.06  # of the power of a deviation: what a cause leaves of it, at most
-_RIVAL, _RIVAL_LEFT = (
-    3.0,
-    0.15,
-)  # times what the cause leaves, and of the power: what any cause of another row leaves, at least
-_ABOUT = 0.03  # of a gain, by which its ends may be beyond the table
+# what any cause of another row leaves, at least: times what the cause leaves, and of the power
+_RIVAL, _RIVAL_LEFT = 3.0, 0.15
+_ABOUT = 0.03  # by which a gain is uncertain, and may be beyond the table
 _NOTHING = 0.01  # of the power, that a cause may leave beside what a gain with an offset does
 _FOLLOWS = 0.9  # correlation with the reference of a channel that is neither stuck nor dead
 _P = 0.95  # that a cause which explains so much is it
 _LATEST_S, _DELAYS = 1.0, 41
+_NOTHING_WRONG = Hypothesis("none", State.HEALTHY.value, 1.0 - _P)
 _OWN = 1.5  # times the noise: a healthy channel's own deviation
 
 
@@ -94,7 +93,7 @@ def with_one_cause(findings: Sequence[Finding], measured: Measured) -> list[Find
     common = _cause_of([f for near in clusters for f in near], measured) if len(clusters) > 1 else None
     for near in clusters:
         cause = common or _cause_of(near, measured)
-        out += near if cause is None or {f.mode for f in near} == {cause.mode} else [_joined(near, cause)]
+        out += near if cause is None or all(f.mode == cause.mode for f in near) else [_joined(near, cause)]
     return out
 
 
@@ -191,7 +190,7 @@ def _loss(left: float, gains: tuple[float, float], measured: Measured) -> _Cause
         mode,
         left,
         f"{channel} is {share} of {reference} all through it.",
-        Epsilon(0.5 * (low + high), low, high),
+        Epsilon(0.5 * (low + high), low - _ABOUT, high + _ABOUT),
         changes=not steady,
     )
 
@@ -204,11 +203,12 @@ def _power(off: Array, measured: Measured) -> float:
 def _joined(near: Sequence[Finding], cause: _Cause) -> Finding:
     """One finding over all pieces."""
     longest = max(near, key=lambda f: f.stop - f.start)
-    rest = {h.mode: h for h in longest.hypotheses if h.mode is not cause.mode}
+    rest = {h.mode: h for h in longest.hypotheses if h.mode != cause.mode}
     total = sum(h.p for h in rest.values())
-    others = tuple(replace(h, p=(1.0 - _P) * h.p / total) for h in rest.values()) if total > 0.0 else ()
+    others = [replace(h, p=(1.0 - _P) * h.p / total) for h in rest.values()] if total > 0.0 else [_NOTHING_WRONG]
     named = Hypothesis(longest.side.value, cause.mode.value, _P)
     raised = [f.detected for f in near if f.detected is not None]
+    figures = tuple(e for e in longest.evidence if e.startswith(("Residual,", "Over ")) or "times as probable" in e)
     pieces = f"This alone leaves {100 * cause.left:.0f} % of the deviation's power over {len(near)} pieces that were found one after the other."
     return replace(
         longest,
@@ -219,6 +219,6 @@ def _joined(near: Sequence[Finding], cause: _Cause) -> Finding:
         hypotheses=(named, *sorted(others, key=lambda h: -h.p)),
         epsilon=cause.epsilon,
         sat=None,
-        evidence=(cause.words, pieces) if len(near) > 1 else (cause.words,),
+        evidence=(cause.words, *((pieces,) if len(near) > 1 else ()), *figures),
         detected=min(raised, default=None),
     )

@@ -19,10 +19,8 @@ from replay.machine.quantities import OPENING
 Array = NDArray[np.float64]
 
 _NORMAL = 1.4826  # standard deviations per median of what is off
-_AT_REST, _STEADY = (
-    0.5,
-    0.25,
-)  # probability that a valve does not answer a command which stays; of its mean, by which it varies
+_AT_REST = 0.5  # probability that a valve does not answer a command which stays
+_STEADY = 0.25  # of its mean, by which such a command varies
 _CONSTANT = "The command hardly moved meanwhile: a {valve} that is off by a constant would look the same."
 
 

@@ -51,7 +51,8 @@ def test_one_cause_joins_its_pieces(change: Callable[[Array], Array], mode: Faul
     (found,) = with_one_cause(pieces(), measured(change))
     assert (found.start, found.stop, found.mode) == (1000, 2400, mode)
     assert found.probability == pytest.approx(0.95)
-    assert sum(h.p for h in found.hypotheses) <= 1.0 + 1e-9
+    assert sum(h.p for h in found.hypotheses) == pytest.approx(1.0)
+    assert len({h.mode for h in found.hypotheses}) == len(found.hypotheses)
     assert found.detected == 1005
     assert words in found.evidence[0]
 
