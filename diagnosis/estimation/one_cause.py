@@ -122,8 +122,10 @@ def _cause_of(near: Sequence[Finding], measured: Measured) -> _Cause | None:
     y, x = y[inside], x[inside]
     if not (np.std(x) > 0.0 and np.std(y) > 0.0):
         return None
-    causes = sorted(_causes(y, x, at, measured), key=lambda c: c.left)
-    best = causes[0]
+    causes = list(_causes(y, x, at, measured))
+    best = min((c for c in causes if not c.changes), key=lambda c: c.left)
+    if best.left > _LEFT:  # what changes with time explains more than what does not, always
+        best = min(causes, key=lambda c: c.left)
     others = min((c.left for c in causes if c.mode is not best.mode), default=np.inf)
     if best.left > _LEFT or others < max(_RIVAL * best.left, _RIVAL_LEFT):
         return None

@@ -78,6 +78,11 @@ def test_a_cause_of_all_pieces_names_each_of_them_where_health_lies_between() ->
     assert [(f.start, f.stop, f.mode) for f in found] == [(a, b, FaultMode.OUTSIDE_TABLE) for a, b, _ in spans]
 
 
+def test_an_offset_that_hardly_changes_is_no_drift() -> None:
+    (found,) = with_one_cause(pieces(), measured(lambda x: x + 0.12 + 0.0005 * (T - 17.0)))
+    assert "an offset" in found.evidence[0]
+
+
 def test_what_already_has_its_name_keeps_its_evidence() -> None:
     own = pieces([(1000, 2400, FaultMode.INEFFICIENT)])
     assert with_one_cause(own, measured(lambda x: 0.6 * x)) == own
