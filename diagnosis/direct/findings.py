@@ -114,12 +114,17 @@ def _measured(found: IdentifiedPair, limits: Limits) -> Measured:
     """The pair as one cause is looked for in it."""
     pair, (y, x, status, *_) = found.pair, found.samples
     use = np.isin(status, (PAIR, BLIND))
-    return Measured(y, x, use, pair.dt, (pair.y_name, pair.x_name), pair.unit, found.model.noise, limits.min_sat)
+    return Measured(y, x, use, pair.dt, (pair.y_name, pair.x_name), pair.unit, found.model.noise, _least(found, limits))
+
+
+def _least(found: IdentifiedPair, limits: Limits) -> float:
+    """Smallest constant that counts [unit of y]."""
+    return limits.min_sat if found.pair.side is Side.SENSOR else limits.min_opening * found.pair.span
 
 
 def finding_of(run: Run, found: IdentifiedPair, limits: Limits) -> Finding | None:
     """A run as a finding; None where it lies below the limits or the evidence is thin."""
-    isolated = isolate(run, found, limits.min_sat)
+    isolated = isolate(run, found, _least(found, limits))
     if isolated is None:
         return None
     mode = _mode_of(isolated, found, limits)

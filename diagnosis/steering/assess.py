@@ -177,7 +177,7 @@ def _found(
         found = paired(found)
     found = not_denied(found, inputs, blocks)
     found = {side: acquitted(side, found[side], inputs, blocks, believed=not otherwise) for side in _SIDES}
-    found = {side: of_one_cause(side, found[side], inputs, machine.limits.min_sat) for side in _SIDES}
+    found = {side: of_one_cause(side, found[side], inputs, machine.limits.min_opening) for side in _SIDES}
     return _Found(axle, path, found, valve_judged)
 
 

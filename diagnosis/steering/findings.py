@@ -172,7 +172,7 @@ def apart(sensor: SideFindings, valve: SideFindings, length: int) -> SideFinding
 def _judge(run: _Run) -> Judged:
     """The finding on a run, if one may be stated."""
     limits, length = run.limits, run.axle.blocks.length
-    evidence = evidence_of_explanations(run.side, run.start, run.stop, run.axle, run.path, limits.min_sat)
+    evidence = evidence_of_explanations(run.side, run.start, run.stop, run.axle, run.path, limits.min_opening)
     ranked = _ranked(evidence, run)
     gain = max(evidence.values()) - evidence[NO_FAULT]
     choice = _chosen(evidence, ranked, limits.min_probability)
@@ -180,7 +180,7 @@ def _judge(run: _Run) -> Judged:
         return Judged(run.start, run.stop, None)
     epsilon, sat = estimate_size(choice.side, choice.row, run.start, run.stop, run.axle, run.path)
     stuck_valve = choice.side is Side.ACTUATOR and choice.mode is FaultMode.STUCK
-    if stuck_valve and sat is not None and abs(sat.mean) < limits.min_sat:
+    if stuck_valve and sat is not None and abs(sat.mean) < limits.min_opening:
         choice, sat = choice._replace(mode=FaultMode.NO_SIGNAL), None
     start, stop = run.start, run.stop
     if choice.needs_motion and not run.axle.model.opening_measured:

@@ -103,6 +103,9 @@ class Noise:
     lsb: float | None = None
 
 
+_MIN_OPENING = 0.02  # of full opening
+
+
 @dataclass(frozen=True)
 class Limits:
     """What counts as a fault, and when a verdict may be given.
@@ -142,6 +145,11 @@ class Limits:
         check_range("limits.min_assessed", self.min_assessed, 0.0, 1e6, "s")
         check_range("limits.driving_speed", self.driving_speed, 0.0, 1e6, "m/s")
         check_range("limits.clear_at", self.clear_at, 0.05, 0.9, "")
+
+    @property
+    def min_opening(self) -> float:
+        """Smallest saturation term of a valve that counts [fraction of full opening]: `min_sat`, which goes with the top speed, or less."""
+        return min(self.min_sat, _MIN_OPENING)
 
 
 @dataclass(frozen=True)
