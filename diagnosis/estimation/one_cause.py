@@ -25,7 +25,7 @@ _LEAST_S, _LEAST = 1.0, 40  # of a cluster: seconds, samples
 _LEFT = 0.06  # of the power of a deviation: what a cause leaves of it, at most
 # what any cause of another row leaves, at least: times what the cause leaves, and of the power
 _RIVAL, _RIVAL_LEFT = 3.0, 0.15
-_NEAR = 0.05  # of the power, likewise, where the cause does not change with time
+_NEAR = 0.05  # of the power, likewise, beside an offset: noise leaves as much of a loss
 _ABOUT = 0.03  # by which a gain is uncertain, and may be beyond the table
 _NOTHING = 0.01  # of the power, that a cause may leave beside what a gain with an offset does
 _FOLLOWS = 0.9  # correlation with the reference of a channel that is neither stuck nor dead
@@ -128,7 +128,8 @@ def _cause_of(near: Sequence[Finding], measured: Measured) -> _Cause | None:
     if best.left > _LEFT:  # what changes with time explains more than what does not, always
         best = min(causes, key=lambda c: c.left)
     others = min((c.left for c in causes if c.mode is not best.mode), default=np.inf)
-    if best.left > _LEFT or others < max(_RIVAL * best.left, _RIVAL_LEFT if best.changes else _NEAR):
+    steady_offset = not best.changes and best.epsilon is None
+    if best.left > _LEFT or others < max(_RIVAL * best.left, _NEAR if steady_offset else _RIVAL_LEFT):
         return None
     if not best.late and float(np.corrcoef(x, y)[0, 1]) < _FOLLOWS:
         return None
