@@ -104,7 +104,7 @@ class Isolated:
 
 
 def run_samples(run: Run, found: IdentifiedPair, min_sat: float = 0.0) -> RunSamples:
-    """Samples of a run and what they look like; a mean below `min_sat` [unit of y] is zero."""
+    """Samples of a run and what they look like; what keeps below `min_sat` [unit of y] is zero."""
     y, x, status, _, white, passing, _ = found.samples.part(run.start, run.stop)
     use = np.isin(status, (PAIR, BLIND))
     model = found.model
@@ -112,7 +112,7 @@ def run_samples(run: Run, found: IdentifiedPair, min_sat: float = 0.0) -> RunSam
     noise = float(np.sqrt(power.mean())) if use.any() else model.noise
     play = found.relation.play
     slack = 3 * model.constant_noise / np.sqrt(min(use.sum(), 100)) + 0.6 * play if use.any() else 0.0
-    zero = not use.any() or abs(float(np.mean(y[use]))) <= max(slack, min_sat)
+    zero = not use.any() or abs(float(np.mean(y[use]))) <= slack or float(np.sqrt(np.mean(y[use] ** 2))) <= min_sat
     still = bool(use.any()) and (float(np.std(x[use])) < 2 * noise or float(np.ptp(x[use])) < 2 * play)
     deviation = float(np.sqrt(np.mean((y[use] - x[use]) ** 2))) if use.any() else float("inf")
     return RunSamples(y, x, status, use, zero, still, deviation, noise)

@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 _GAP_S = 3.0  # between pieces of one fault
-_LEAST_S, _LEAST = 1.0, 40  # of a cluster: seconds, samples
+_LEAST_S, _LEAST, _MOST = 1.0, 40, 200_000  # of a cluster: seconds, samples; samples that are looked at of a long one
 _LEFT = 0.06  # of the power of a deviation: what a cause leaves of it, at most
 # what any cause of another row leaves, at least: times what the cause leaves, and of the power
 _RIVAL, _RIVAL_LEFT = 3.0, 0.15
@@ -119,8 +119,9 @@ def _cause_of(near: Sequence[Finding], measured: Measured) -> _Cause | None:
     inside &= measured.use[first:last] & np.isfinite(y) & np.isfinite(x)
     if np.count_nonzero(inside) < max(_LEAST, _LEAST_S / measured.dt):
         return None
-    at = first + np.flatnonzero(inside)
-    y, x = y[inside], x[inside]
+    at = np.flatnonzero(inside)
+    at = at[:: -(-at.size // _MOST)]
+    y, x, at = y[at], x[at], first + at
     if not (np.std(x) > 0.0 and np.std(y) > 0.0):
         return None
     causes = list(_causes(y, x, at, measured))
