@@ -26,13 +26,14 @@ _LEFT = 0.06  # of the power of a deviation: what a cause leaves of it, at most
 # what any cause of another row leaves, at least: times what the cause leaves, and of the power
 _RIVAL, _RIVAL_LEFT = 3.0, 0.15
 _NEAR = 0.05  # of the power, likewise, beside an offset: noise leaves as much of a loss
+_FAR, _FAR_LEFT = 5.0, 0.015  # both likewise, beside a cause that leaves nothing
 _ABOUT = 0.03  # by which a gain is uncertain, and may be beyond the table
 _NOTHING = 0.01  # of the power, that a cause may leave beside what a gain with an offset does
 _FOLLOWS = 0.9  # correlation with the reference of a channel that is neither stuck nor dead
 _P = 0.95  # that a cause which explains so much is it
 _LATEST_S, _DELAYS = 1.0, 41
 _NOTHING_WRONG = Hypothesis("none", State.HEALTHY.value, 1.0 - _P)
-_OWN = 1.5  # times the noise: a healthy channel's own deviation
+_OWN, _BEYOND = 1.5, 3.0  # times the noise: a healthy channel's own deviation, and one that a cause is looked for
 
 
 @dataclass(frozen=True)
@@ -122,23 +123,30 @@ def _cause_of(near: Sequence[Finding], measured: Measured) -> _Cause | None:
     at = np.flatnonzero(inside)
     at = at[:: -(-at.size // _MOST)]
     y, x, at = y[at], x[at], first + at
-    if not (np.std(x) > 0.0 and np.std(y) > 0.0):
+    off = float(np.mean((y - x) ** 2))
+    if not (np.std(x) > 0.0 and np.std(y) > 0.0 and off > (_BEYOND * measured.noise) ** 2):
         return None
     causes = list(_causes(y, x, at, measured))
     best = min((c for c in causes if not c.changes), key=lambda c: c.left)
     if best.left > _LEFT:  # what changes with time explains more than what does not, always
         best = min(causes, key=lambda c: c.left)
     others = min((c.left for c in causes if c.mode is not best.mode), default=np.inf)
+    others = min(others, _power(y - np.mean(y), measured) / max(_power(y - x, measured), 1e-30))  # stuck
     steady_offset = not best.changes and best.epsilon is None
-    if best.left > _LEFT or others < max(_RIVAL * best.left, _NEAR if steady_offset else _RIVAL_LEFT):
+    if best.left > _LEFT or not _far(others, best, _NEAR if steady_offset else _RIVAL_LEFT):
         return None
-    if not best.late and float(np.corrcoef(x, y)[0, 1]) < _FOLLOWS:
+    if not best.late and best.left > _NOTHING and float(np.corrcoef(x, y)[0, 1]) < _FOLLOWS:
         return None
     both = np.column_stack([x, np.ones(x.size)])  # a loss with a bias is the row of noise
     rest = _power(y - both @ np.linalg.lstsq(both, y, rcond=None)[0], measured) / max(_power(y - x, measured), 1e-30)
     if best.changes:
-        return best if rest >= _RIVAL_LEFT else None
+        return best if _far(rest, best, _RIVAL_LEFT) else None
     return best if best.left < max(_NOTHING, _RIVAL * rest) else None
+
+
+def _far(rival: float, best: _Cause, least: float) -> bool:
+    """Whether a rival leaves far more of the power than the best cause does; little is far beside nothing."""
+    return rival >= (max(_FAR * best.left, _FAR_LEFT) if best.left <= _NOTHING else max(_RIVAL * best.left, least))
 
 
 def _causes(y: Array, x: Array, at: NDArray[np.intp], measured: Measured) -> Iterator[_Cause]:
