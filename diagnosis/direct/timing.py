@@ -29,6 +29,7 @@ _AT_REST = 0.02  # of the largest plausible speed
 _FIRST_EDGE_S = 0.02  # of driving at the largest plausible speed: as far may be from edge to edge
 _ECHO = 2.0  # times a command's jumps: as large may be those of its answer
 _BRIEF_S = 0.5  # a shorter deviation may be of timing, or of a wheel that stops or starts
+_OF_LAG = 0.3  # of what a lag does: as far off is its model
 _FLIPS = 25  # samples in a row on one side of a command that switches to and fro between samples
 
 
@@ -55,7 +56,7 @@ def timing_explains(found: IdentifiedPair, run: Run, mode: FaultMode) -> bool:
             return True
         if mode.total:
             return _rests_by_chance(found, run, deviation) or _held_by_habit(found, run)
-        return mode.varying and seconds < _BRIEF_S and deviation < moves
+        return mode.varying and ((seconds < _BRIEF_S and deviation < moves) or _lags(found, run, deviation))
     if seconds <= _SPOOL_DELAY_S or (mode.varying and _settles(found, run)):
         return True
     if mode.varying and deviation <= _changes(found, run):
@@ -75,6 +76,13 @@ def timing_explains(found: IdentifiedPair, run: Run, mode: FaultMode) -> bool:
     sudden = max(of_command, min(of_answer, _ECHO * of_command))  # jumps that nothing commands are of no timing
     unsigned = np.sqrt(np.nanmean((np.abs(y) - np.abs(pair.x[part])) ** 2))
     return bool(sudden > 0.3 * deviation or unsigned < 0.3 * deviation)
+
+
+def _lags(found: IdentifiedPair, run: Run, deviation: float) -> bool:
+    """Whether the lag that was found of a sensor makes nearly all of how far its readings are off the wheel's own motion."""
+    pair, part = found.pair, slice(run.start, run.stop)
+    off = (pair.y - pair.x)[part]
+    return bool(np.isfinite(off).any() and deviation < _OF_LAG * float(np.sqrt(np.nanmean(off**2))))
 
 
 def _settles(found: IdentifiedPair, run: Run) -> bool:

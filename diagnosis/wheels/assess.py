@@ -25,6 +25,7 @@ from diagnosis.wheels.inputs import WheelsData
 from diagnosis.wheels.looks import second_look
 from diagnosis.wheels.many_weak import without_many_weak
 from diagnosis.wheels.models import ODD, JointModel, WheelFilterModel
+from diagnosis.wheels.own_swings import with_open_side
 from diagnosis.wheels.readings import with_readings
 from diagnosis.wheels.run_kernel import evidence_of_runs
 from diagnosis.wheels.shared_swings import without_shared
@@ -73,7 +74,7 @@ def assess_wheels(data: WheelsData, limits: Limits, *, gains: bool) -> WheelsJud
         for i, wheel in enumerate(model.wheels)
         if wheel is not None
     }
-    swings = without_shared(paths, {i: findings_of(path, limits) for i, path in paths.items()})
+    swings = without_shared(paths, {i: with_open_side(path, findings_of(path, limits)) for i, path in paths.items()})
     doubted = without_many_weak(swings.found)
     out = {}
     for i, path in paths.items():
