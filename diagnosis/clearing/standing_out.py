@@ -35,7 +35,24 @@ _OTHERS = 1.5  # times the limit: where others deviate by more, speed per openin
 _BY_FAR = 5.0  # ... unless a wheel deviates this many times as far
 _STILL, _DRAGS = 2.0, 1.3  # times the limit: an axle that does not answer, and one that may drag wheels along
 _WHEELS = 3  # fewer have no others to be compared with
-_P = 0.93  # on tuning missions of nine machines 23 of 24 were faults of the part that is named
+_P = 0.93  # on tuning missions of nine machines 23 of 24 were faults of the part that is named, ...
+# ... of which these shares were of the row that it looks like, and of others
+_ROWS = {
+    FaultMode.INEFFICIENT: {
+        FaultMode.INEFFICIENT: 0.7,
+        FaultMode.NO_SIGNAL: 0.1,
+        FaultMode.STUCK: 0.1,
+        FaultMode.NOISY: 0.1,
+    },
+    FaultMode.NO_SIGNAL: {
+        FaultMode.NO_SIGNAL: 0.7,
+        FaultMode.STUCK: 0.15,
+        FaultMode.INEFFICIENT: 0.1,
+        FaultMode.OUTSIDE_TABLE: 0.05,
+    },
+    FaultMode.OUTSIDE_TABLE: {FaultMode.OUTSIDE_TABLE: 1.0},
+}
+_ALL = 0.9  # of the speed per opening, that is lost where nothing is left
 _BESIDE = 0.65  # how often a partial fault beside one of the other side was right
 _LESS_SURE = "The other side has a fault that no row explains, which makes this one less probable."
 _HALF, _LARGEST = 0.5, 0.8  # of the largest deviations, by this quantile: where a fault lasts
@@ -157,7 +174,7 @@ def _wheel(check: Checked, cells: Cells) -> Finding:
     start, stop, size, spread = _where(shown, cells)
     half = max(check.limit, 2.0 * spread)
     low, middle, high = (-np.expm1(-x if below else x) for x in (size - half, size, size + half))
-    mode = FaultMode.INEFFICIENT if below else FaultMode.OUTSIDE_TABLE
+    mode = FaultMode.OUTSIDE_TABLE if not below else FaultMode.INEFFICIENT if middle < _ALL else FaultMode.NO_SIGNAL
     measured = "speed of {part} per {unit_command}".replace("{part}", check.component)
     text = (
         f"The {measured} is {'below' if below else 'above'} the other {{wheels}}' by {100 * abs(middle):.0f} %; "
@@ -217,14 +234,14 @@ def _finding(
     evidence: tuple[str, ...],
     side: Side = Side.SENSOR_OR_ACTUATOR,
 ) -> Finding:
-    healthy = Hypothesis("none", State.HEALTHY.value, 1.0 - _P)
+    rows = tuple(Hypothesis(side.value, row.value, _P * share) for row, share in _ROWS[mode].items())
     return Finding(
         start=span[0],
         stop=span[1],
         side=side,
         mode=mode,
-        probability=_P,
-        hypotheses=(Hypothesis(side.value, mode.value, _P), healthy),
+        probability=rows[0].p,
+        hypotheses=(*rows, Hypothesis("none", State.HEALTHY.value, 1.0 - _P)),
         epsilon=size,
         sat=None,
         evidence=evidence,

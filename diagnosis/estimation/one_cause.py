@@ -93,6 +93,8 @@ def with_one_cause(findings: Sequence[Finding], measured: Measured) -> list[Find
     out: list[Finding] = []
     clusters = list(_clusters(findings, round(_GAP_S / measured.dt)))
     common = _cause_of([f for near in clusters for f in near], measured) if len(clusters) > 1 else None
+    if common is not None and common.changes and not common.late:
+        common = None  # what changed between two pieces may have changed anyhow
     for near in clusters:
         cause = common or _cause_of(near, measured)
         out += near if cause is None or all(f.mode == cause.mode for f in near) else [_joined(near, cause)]

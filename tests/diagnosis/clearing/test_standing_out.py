@@ -28,13 +28,16 @@ def test_nothing_stands_out_in_a_healthy_mission() -> None:
 
 
 @pytest.mark.parametrize("side", [Side.SENSOR, Side.ACTUATOR])
-def test_a_wheel_that_hardly_moves_is_named_with_what_is_lost(side: Side) -> None:
+def test_a_wheel_that_hardly_moves_may_have_no_signal_or_be_stuck_or_lose_nearly_all(side: Side) -> None:
     found = _found(FaultSpec("RR", side, FaultMode.NO_SIGNAL, *WHOLE))
     assert list(found) == ["RR"]
     fault = found["RR"]
-    assert (fault.side, fault.mode) == (Side.SENSOR_OR_ACTUATOR, FaultMode.INEFFICIENT)
+    assert (fault.side, fault.mode) == (Side.SENSOR_OR_ACTUATOR, FaultMode.NO_SIGNAL)
     assert fault.epsilon is not None
-    assert fault.epsilon.value > 0.8
+    assert fault.epsilon.value > 0.9
+    assert fault.probability == fault.hypotheses[0].p < 0.9  # the part is certain, its row is not
+    assert sum(h.p for h in fault.hypotheses if h.mode != "healthy") == pytest.approx(0.93)
+    assert sum(h.p for h in fault.hypotheses) == pytest.approx(1.0)
     assert (fault.stop - fault.start) / 100.0 > 0.8 * LENGTH  # at 100 Hz
     assert "below the other wheels'" in fault.evidence[0]
 
@@ -77,7 +80,7 @@ def test_states_of_both_sides_say_the_fault_but_where_nothing_was_known() -> Non
         a = after["RR", side]
         assert a.findings == (fault,)
         assert (a.states[: fault.start + 5] == CODE[State.NO_DATA]).all()
-        assert (a.states[fault.start + 5 : fault.stop] == CODE[State.INEFFICIENT]).all()
+        assert (a.states[fault.start + 5 : fault.stop] == CODE[State.NO_SIGNAL]).all()
 
 
 def test_an_angle_that_is_off_its_second_measurement_all_the_time_is_its_sensors_fault() -> None:
