@@ -14,7 +14,7 @@ from diagnosis.channels.copied_rows import without_copied_rows
 from diagnosis.channels.recording_gaps import recording_gaps, without_gaps
 from diagnosis.clearing.backwards import without_claims
 from diagnosis.clearing.contradicted import without_contradicted
-from diagnosis.clearing.standing_out import what_stands_out, with_findings
+from diagnosis.clearing.standing_out import what_stands_out, with_findings, without_followers
 from diagnosis.decision import metrics, quality
 from diagnosis.decision.episodes import with_episodes
 from diagnosis.decision.second_onsets import with_second_onsets
@@ -190,8 +190,9 @@ def _without_backwards(judged: Judged) -> Judged:
 
 
 def _without_contradicted(judged: Judged) -> Judged:
-    """The same without losses of a speed that nothing but a wheel's model shows."""
+    """The same without losses of a speed that nothing but a wheel's model shows, and without faults of wheels that drag another one."""
     told = without_contradicted(judged.found.assessments, judged.cells)
+    told = without_followers(told, judged.checks, judged.cells)
     if all(told[part] is a for part, a in judged.found.assessments.items()):
         return judged
     return replace(judged, found=replace(judged.found, assessments=told))

@@ -18,12 +18,9 @@ from replay.faults import FaultMode, Side, State
 
 Array = NDArray[np.float64]
 
-_BAND, _SHARE, _FLAT = (
-    0.25,
-    0.5,
-    3.0,
-)  # about a frequency, to either side; of the power, that lies there; times what is there of white noise
 _LEAST_HZ, _CYCLES = 1.0, 8
+_BAND, _FLAT = 0.25, 3.0  # about a frequency, to either side; times what lies there of white noise
+_SHARE, _OF_ALL = 0.5, 0.35  # of the power that lies there: of what is not slower than the least, and of all
 _PIECE = 16  # cycles of the slowest swing, that are looked at together: it may wander
 _P = 0.85  # that it is a fault, and no way of the machine
 
@@ -47,11 +44,12 @@ def swing_hz(off: Array, dt: float) -> float | None:
     pieces = pieces - pieces.mean(axis=1, keepdims=True) - np.outer(pieces @ t / (t @ t), t)
     power = np.mean(np.abs(np.fft.rfft(pieces * np.hanning(length), axis=1)) ** 2, axis=0)
     f = np.fft.rfftfreq(length, dt)
+    whole = float(power.sum())
     power[f < _LEAST_HZ] = 0.0
     at = float(f[int(np.argmax(power))])
     near = np.abs(f - at) <= _BAND * at
-    least = max(_SHARE, _FLAT * float(np.mean(near)))
-    return at if at * length * dt >= _CYCLES and float(power[near].sum()) > least * float(power.sum()) else None
+    least = max(max(_SHARE, _FLAT * float(np.mean(near))) * float(power.sum()), _OF_ALL * whole)
+    return at if at * length * dt >= _CYCLES and float(power[near].sum()) > least else None
 
 
 def with_open_side(path: WheelPath, found: WheelFindings) -> WheelFindings:

@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 
 from diagnosis.clearing.checks import checks_of
-from diagnosis.clearing.standing_out import what_stands_out, with_findings
+from diagnosis.clearing.standing_out import what_stands_out, with_findings, without_followers
 from diagnosis.results.assessment import CODE, Assessment, Finding
+from diagnosis.results.clearing import Check, Checked
 from diagnosis.results.machine_words import HYDRAULIC
-from diagnosis.results.vocabulary import Tier
+from diagnosis.results.vocabulary import Kind, Tier
 from replay.faults import FaultMode, FaultSpec, Side, State
 from tests.diagnosis.clearing.missions import LENGTH, in_cells, simulated
 
@@ -53,6 +54,31 @@ def test_a_reading_that_is_too_large_for_a_third_of_the_mission_is_named_where_i
 def test_two_wheels_alike_leave_open_which_of_them_are_healthy() -> None:
     dead = [FaultSpec(w, Side.ACTUATOR, FaultMode.NO_SIGNAL, *WHOLE) for w in ("FR", "RR")]
     assert _found(*dead) == {}
+
+
+def test_the_wheel_that_does_not_follow_is_blamed_and_not_the_one_that_drags_it_along() -> None:
+    cells = in_cells(simulated(FaultSpec("RR", Side.ACTUATOR, FaultMode.NO_SIGNAL, *WHOLE)), base=True)
+    about, either = (Kind.WHEEL,), Side.SENSOR_OR_ACTUATOR
+    checks = [
+        Checked(*about, wheel, either, check, worst, 0.2)
+        for check, sizes in (
+            (Check.TRACKING, {"FR": 0.3, "FL": 0.1, "RR": 2.0, "RL": 0.1}),
+            (Check.LASTING_RESPONSE, {"FR": 2.2, "FL": 0.1, "RR": 4.0, "RL": 0.1}),
+        )
+        for wheel, worst in sizes.items()
+    ]
+    (name, fault) = next(iter(what_stands_out(checks, cells, HYDRAULIC).items()))
+    assert name == "RR"
+    assert "all other wheels follow their commands far better" in fault.evidence[0]
+    claim = replace(fault, side=Side.ACTUATOR, mode=FaultMode.STUCK, probability=0.92)
+    loss = replace(claim, mode=FaultMode.INEFFICIENT)
+    states = np.full(round(100 * LENGTH) + 1, CODE[State.STUCK])
+    before = {("FR", "actuator"): Assessment(states, findings=(claim, loss)), ("RR", "actuator"): Assessment(states)}
+    after = without_followers(before, checks, cells)
+    assert after["FR", "actuator"].findings == (loss,)
+    assert after["RR", "actuator"] is before["RR", "actuator"]
+    drags = [c if c.component != "FR" else replace(c, worst=1.0) for c in checks]  # it does not follow either
+    assert without_followers(before, drags, cells) == before
 
 
 def test_an_axle_that_stands_still_is_named_and_explains_its_wheels() -> None:

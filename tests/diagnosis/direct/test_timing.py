@@ -112,3 +112,14 @@ def test_an_opening_read_late_beside_a_restless_command_is_not_noisy(
     x = 0.3 + 0.1 * rng.normal(size=N)
     y = np.roll(x, late) + disturbed * rng.normal(size=N)
     assert explained(pair(Side.ACTUATOR, y, x), FaultMode.NOISY, stop=A + 2000) is expected
+
+
+@pytest.mark.parametrize(("noise", "expected"), [(0.0, True), (0.15, False)])
+def test_what_a_sensors_own_lag_damps_of_a_wheel_that_swings_is_no_noise(noise: float, expected: bool) -> None:
+    true = 0.4 * np.sin(2 * np.pi * 5.0 * np.arange(N) * DT)
+    late = np.r_[np.zeros(45), true[:-45]]
+    y = late + 0.03 * np.cos(2 * np.pi * 5.0 * np.arange(N) * DT) + noise * np.random.default_rng(2).standard_normal(N)
+    p = pair(Side.SENSOR, y, true)
+    samples = Samples.even(y, late, np.full(N, PAIR, dtype=np.int8), p.quiet)
+    found = IdentifiedPair(p, Relation(delay=45.0), samples, MODEL, 0.0015, ~p.alive, 0.0)
+    assert timing_explains(found, Run(A, A + 2000, 1), FaultMode.NOISY) is expected

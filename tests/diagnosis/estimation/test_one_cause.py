@@ -91,3 +91,25 @@ def test_what_already_has_its_name_keeps_its_evidence() -> None:
 def test_a_moment_is_no_cause() -> None:
     own = pieces([(1000, 1030, FaultMode.NOISY)])
     assert with_one_cause(own, measured(lambda x: x + 0.2)) == own
+
+
+def test_what_fades_while_the_reference_hardly_moves_is_told_from_a_drift() -> None:
+    x = 0.3 + 0.08 * np.sin(0.9 * T)
+    y = (1.0 - 0.6 * (T - 10.0) / 14.0) * x + 0.0005 * RNG.standard_normal(SIZE)
+    one = Measured(y, x, np.ones(SIZE, np.bool_), DT, ("a", "b"), "m/s", 0.0005, 0.02)
+    (found,) = with_one_cause(pieces(((1000, 1500, FaultMode.STUCK), (1500, 2400, FaultMode.NOISY))), one)
+    assert found.mode is FaultMode.INEFFICIENT
+
+
+@pytest.mark.parametrize("level", [0.0, 0.0155, 0.2])
+def test_a_constant_stays_stuck(level: float) -> None:
+    near = pieces(((1000, 2400, FaultMode.STUCK),))
+    for x in (X, np.full(SIZE, level) + 0.01 * np.sin(T)):
+        one = Measured(np.full(SIZE, level), x, np.ones(SIZE, np.bool_), DT, ("a", "b"), "m/s", NOISE, 0.02)
+        assert with_one_cause(near, one) == near
+
+
+def test_two_losses_of_different_sizes_far_apart_are_no_gain_that_fades() -> None:
+    y = np.where(T < 12.0, 0.0, np.where(T > 20.0, 0.6, 1.0)) * X
+    near = pieces(((1000, 1200, FaultMode.NO_SIGNAL), (2000, 2400, FaultMode.INEFFICIENT)))
+    assert with_one_cause(near, measured(lambda _: y)) == near
