@@ -14,7 +14,7 @@ from diagnosis.direct.at_once import without_shared_moments
 from diagnosis.direct.identification import IdentifiedPair, identify
 from diagnosis.direct.inputs import Pair, make_pair
 from diagnosis.direct.low_speed import without_low_speed_habit
-from diagnosis.direct.uncertainty import usual_of_kind
+from diagnosis.direct.uncertainty import most_noise_of_kind, usual_of_kind
 from diagnosis.estimation.lag import low_passed
 from diagnosis.evidence import ACTUATOR, SENSOR, Array, Contribution, Flags, MissionView, Part
 from diagnosis.results.assessment import Assessment, unassessed
@@ -76,10 +76,12 @@ def _identified(pairs: dict[Part, Pair], limits: Limits, mission: MissionView) -
         usual = usual_of_kind([one.own for one in kind.values()])
         own = [one.relation for one in kind.values()]
         alike = relations_of_kind(own, mission.timeline.dt) if side == SENSOR else valves_of_kind(own)
+        most = most_noise_of_kind([one.model.noise for one in kind.values()])
         for (part, one), relation in zip(kind.items(), alike, strict=True):
             exceeds = usual is not None and one.own.exceeds(usual)
-            if exceeds or relation != one.relation:
-                found[part] = identify(one.pair, limits, usual if exceeds else None, relation)
+            louder = most is not None and one.model.noise > most
+            if exceeds or louder or relation != one.relation:
+                found[part] = identify(one.pair, limits, usual if exceeds else None, relation, most)
     return found
 
 

@@ -196,7 +196,11 @@ def gain_windows(samples: Samples, dt: float) -> GainWindows:
 
 
 def identify(
-    pair: Pair, limits: Limits, usual: HealthyNoise | None = None, given: Relation | None = None
+    pair: Pair,
+    limits: Limits,
+    usual: HealthyNoise | None = None,
+    given: Relation | None = None,
+    most: float | None = None,
 ) -> IdentifiedPair:
     """Find how a channel follows its reference, its noise, and what of it the log does not resolve.
 
@@ -210,6 +214,8 @@ def identify(
         What healthy channels of its kind have; None: what this one has.
     given : Relation or None
         How channels of its kind follow their reference; None: as this one does.
+    most : float or None
+        Noise of a healthy channel of its kind at standstill, at most [unit]; None: what this one has.
     """
     dt, sensor = pair.dt, pair.side is Side.SENSOR
     habit = pair.habit
@@ -221,7 +227,7 @@ def identify(
     status = sample_status(pair.y, x, pair.fresh, pair.alive, dt)
     if habit.stepwise:
         status = news_alone(status, pair.y, hold, dt)
-    doubt = uncertainty_of(pair, x, spread, status, 0.25 * limits.min_sat, relation, usual)
+    doubt = uncertainty_of(pair, x, spread, status, 0.25 * limits.min_sat, relation, usual, most)
     model = doubt.model
     own, white, blind, share = doubt.own, doubt.white, np.zeros(x.size, dtype=np.bool_), 0.0
     if not sensor:  # a command may jump from step to step, a speed may not

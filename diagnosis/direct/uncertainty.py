@@ -32,6 +32,7 @@ _MOST_MOTION = {
 _MOST_SHARE = 0.1  # no healthy instrument's noise is more of its reading: what deviates by more is a fault's
 _MOST_SLOW = 0.03  # of the span: a mismatch that lasts is a fault's beyond this
 _SIBLINGS, _ALIKE, _SLACK = 3, 1.4, 0.01  # channels of one kind; how far one may be off the usual: times, and shares
+_LOUDER = 3.0  # times the usual noise: what lasts of a mismatch is no noise beyond this
 _REPEATS = 20  # news in a window of repeats
 _PLAY, _PLAY_S = (
     0.35,
@@ -97,6 +98,7 @@ def uncertainty_of(
     tolerance: float,
     relation: Relation,
     usual: HealthyNoise | None = None,
+    most: float | None = None,
 ) -> Uncertainty:
     """Noise of a pair, found from the mission where the machine file does not give it.
 
@@ -116,6 +118,8 @@ def uncertainty_of(
         How the channel follows its reference.
     usual : HealthyNoise or None
         What healthy channels of its kind have; None: what this one has.
+    most : float or None
+        Noise of a healthy channel of its kind at standstill, at most [unit]; None: what this one has.
     """
     paired, habit = status == PAIR, pair.habit
     news = pair.y[paired]
@@ -132,7 +136,8 @@ def uncertainty_of(
     relative = _relative_white(pair, growth, size, counted)
     evened = residual / np.sqrt(relative)
     moving = (~pair.quiet & (spread < tolerance))[paired]
-    noise = _noise(pair, evened[paired], moving, lsb, period, growth.floor if usual is not None else None)
+    most = growth.floor if usual is not None else most
+    noise = _noise(pair, evened[paired], moving, lsb, period, most)
     repeats = repeated_share(news, lsb, period, habit)
     # a stuck sensor has no noise left, a stuck valve is still read by a noisy spool sensor
     constant = noise
@@ -168,6 +173,14 @@ def usual_of_kind(found: Sequence[HealthyNoise]) -> HealthyNoise | None:
     if len(found) < _SIBLINGS:
         return None
     return HealthyNoise(*(float(x) for x in np.quantile(np.array(found), 0.5, axis=0, method="lower")))
+
+
+def most_noise_of_kind(noise: Sequence[float]) -> float | None:
+    """Noise at standstill that a healthy one of several channels of one kind has at most [unit]: a fault that lasts is none.
+
+    None where they are few.
+    """
+    return _LOUDER * float(np.quantile(noise, 0.5, method="lower")) if len(noise) >= _SIBLINGS else None
 
 
 def _growth(residual: Array, size: Array, counted: Array, period: float) -> NoiseGrowth:

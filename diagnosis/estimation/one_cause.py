@@ -33,6 +33,8 @@ _FOLLOWS = 0.9  # correlation with the reference of a channel that is neither st
 _P = 0.95  # that a cause which explains so much is it
 _LATEST_S, _DELAYS = 1.0, 41
 _NOTHING_WRONG = Hypothesis("none", State.HEALTHY.value, 1.0 - _P)
+_USUAL = 0.9  # of the samples
+_RESTLESS = 5.0  # times the noise, by which a reading is usually off what a loss leaves: noise of its own
 _OWN, _BEYOND = 1.5, 3.0  # times the noise: a healthy channel's own deviation, and one that a cause is looked for
 
 
@@ -125,8 +127,7 @@ def _cause_of(near: Sequence[Finding], measured: Measured) -> _Cause | None:
     at = np.flatnonzero(inside)
     at = at[:: -(-at.size // _MOST)]
     y, x, at = y[at], x[at], first + at
-    off = float(np.mean((y - x) ** 2))
-    if not (np.std(x) > 0.0 and np.std(y) > 0.0 and off > (_BEYOND * measured.noise) ** 2):
+    if not (np.std(x) > 0.0 and np.std(y) > 0.0 and _power(y - x, measured) > (_BEYOND * measured.noise) ** 2):
         return None
     causes = list(_causes(y, x, at, measured))
     best = min((c for c in causes if not c.changes), key=lambda c: c.left)
@@ -143,7 +144,15 @@ def _cause_of(near: Sequence[Finding], measured: Measured) -> _Cause | None:
     rest = _power(y - both @ np.linalg.lstsq(both, y, rcond=None)[0], measured) / max(_power(y - x, measured), 1e-30)
     if best.changes:
         return best if _far(rest, best, _RIVAL_LEFT) else None
+    if best.mode is FaultMode.INEFFICIENT and _restless(y, x, measured):
+        return None
     return best if best.left < max(_NOTHING, _RIVAL * rest) else None
+
+
+def _restless(y: Array, x: Array, measured: Measured) -> bool:
+    """Whether a reading is most of the time off its share of the reference by more than noise."""
+    gain = float(x @ y) / float(x @ x)
+    return float(np.median(np.abs(y - gain * x))) > _RESTLESS * measured.noise / 1.4826
 
 
 def _far(rival: float, best: _Cause, least: float) -> bool:
@@ -211,8 +220,10 @@ def _loss(left: float, gains: tuple[float, float], measured: Measured) -> _Cause
 
 
 def _power(off: Array, measured: Measured) -> float:
-    """Mean square of a deviation beyond what healthy noise has."""
-    return max(float(np.mean(off**2)) - (_OWN * measured.noise) ** 2, 0.0)
+    """Mean square of a deviation beyond what healthy noise has, but for its largest, which the timing of a move makes."""
+    squared = off**2
+    most = int(_USUAL * squared.size)
+    return max(float(np.mean(np.partition(squared, most)[:most])) - (_OWN * measured.noise) ** 2, 0.0)
 
 
 def _joined(near: Sequence[Finding], cause: _Cause) -> Finding:
