@@ -228,7 +228,8 @@ def _mode_of(isolated: Isolated, found: IdentifiedPair, limits: Limits) -> Fault
     if mode.scaled:
         return _mode_of_gain(isolated, noise, found, limits)
     if mode.varying:
-        least = max(2.5 * found.model.noise, 1.5 * noise, limits.min_sat / 2)
+        counts = limits.min_sat / 2 if found.pair.side is Side.SENSOR else _least(found, limits)
+        least = max(2.5 * found.model.noise, 1.5 * noise, counts)
         return None if seen.deviation < least else mode
     # a reference that hardly moves is as constant
     away = np.count_nonzero(np.abs(seen.y - seen.x)[seen.use] > _CLEAR * noise) * found.pair.dt

@@ -29,7 +29,7 @@ _AT_REST = 0.02  # of the largest plausible speed
 _FIRST_EDGE_S = 0.02  # of driving at the largest plausible speed: as far may be from edge to edge
 _ECHO = 2.0  # times a command's jumps: as large may be those of its answer
 _BRIEF_S = 0.5  # a shorter deviation may be of timing, or of a wheel that stops or starts
-_OF_LAG = 0.3  # of what a lag does: as far off is its model
+_OF_LAG = 0.4  # of what a lag does: as far off is its model
 _FLIPS = 25  # samples in a row on one side of a command that switches to and fro between samples
 
 

@@ -34,7 +34,9 @@ _P = 0.95  # that a cause which explains so much is it
 _LATEST_S, _DELAYS = 1.0, 41
 _NOTHING_WRONG = Hypothesis("none", State.HEALTHY.value, 1.0 - _P)
 _USUAL = 0.9  # of the samples
-_RESTLESS = 5.0  # times the noise, by which a reading is usually off what a loss leaves: noise of its own
+# times the noise, by which a reading is usually off what a loss leaves: noise of its own, whatever its moves add; ...
+_RESTLESS = 5.0
+_STEADILY, _EVEN = 1.6, 1.8  # ... and where they add little: root mean square, times what is usual
 _OWN, _BEYOND = 1.5, 3.0  # times the noise: a healthy channel's own deviation, and one that a cause is looked for
 
 
@@ -151,8 +153,10 @@ def _cause_of(near: Sequence[Finding], measured: Measured) -> _Cause | None:
 
 def _restless(y: Array, x: Array, measured: Measured) -> bool:
     """Whether a reading is most of the time off its share of the reference by more than noise."""
-    gain = float(x @ y) / float(x @ x)
-    return float(np.median(np.abs(y - gain * x))) > _RESTLESS * measured.noise / 1.4826
+    rest = y - float(x @ y) / float(x @ x) * x
+    usual = 1.4826 * float(np.median(np.abs(rest)))
+    even = float(np.std(rest)) < _EVEN * usual
+    return usual > (_STEADILY if even else _RESTLESS) * measured.noise
 
 
 def _far(rival: float, best: _Cause, least: float) -> bool:

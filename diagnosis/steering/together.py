@@ -12,7 +12,8 @@ from diagnosis.results.assessment import Finding
 from diagnosis.steering.findings import SideFindings
 from replay.faults import FaultMode, Side
 
-_ENDS_S = 1.5  # within which both begin, and cease
+_ENDS_S = 1.5  # within which both begin, or cease
+_COMMON = 0.7  # of the time of the longer one
 
 
 def not_together(
@@ -45,4 +46,6 @@ def _together(a: Finding, b: Finding, dt: float) -> bool:
     """Whether two findings of two axles are one of the machine."""
     if a.mode is not b.mode or a.mode is FaultMode.NO_SIGNAL:
         return False
-    return max(abs(a.start - b.start), abs(a.stop - b.stop)) * dt <= _ENDS_S
+    common = min(a.stop, b.stop) - max(a.start, b.start)
+    ends = sorted((abs(a.start - b.start) * dt, abs(a.stop - b.stop) * dt))
+    return ends[1] <= _ENDS_S or (ends[0] <= _ENDS_S and common >= _COMMON * max(a.stop - a.start, b.stop - b.start))

@@ -112,7 +112,7 @@ def test_that_a_burst_is_brief_makes_no_other_row_more_probable(monkeypatch: pyt
     opening = command()
     y = opening + noise(0.003)
     part = (T > 30.2) & (T < 30.9)
-    y[part] += np.random.default_rng(4).normal(0.0, 0.02, np.count_nonzero(part))
+    y[part] += np.random.default_rng(4).normal(0.0, 0.04, np.count_nonzero(part))
     told = [f for f in found(Side.ACTUATOR, y, opening) if f.start * DT > 30.0]
     assert told
     for f in told:

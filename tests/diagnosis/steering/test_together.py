@@ -34,6 +34,7 @@ def sides(mode: FaultMode, start: int, stop: int) -> dict[Side, SideFindings]:
     [
         (FaultMode.STUCK, 1050, False),
         (FaultMode.NOISY, 1000, False),
+        (FaultMode.STUCK, 1100, False),  # they end together, and are one for nearly all of their time
         (FaultMode.STUCK, 1300, True),
         (FaultMode.NO_SIGNAL, 1000, True),
     ],
