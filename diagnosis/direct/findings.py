@@ -18,8 +18,9 @@ from diagnosis.direct.onset import refine
 from diagnosis.direct.sentences import BOUNDS, OF_SAT, alike_sentence, sentences
 from diagnosis.direct.timing import timing_explains
 from diagnosis.estimation.fault_models import HEALTHY, INEFFICIENT, STUCK, VARYING_ROWS
-from diagnosis.estimation.one_cause import Measured, with_one_cause
+from diagnosis.estimation.one_cause import with_one_cause
 from diagnosis.estimation.segments import Run, with_leads
+from diagnosis.estimation.simple_causes import Measured
 from diagnosis.estimation.viterbi import ModePath
 from diagnosis.results.assessment import Finding
 from diagnosis.results.fault_rows import ROWS, codes_of

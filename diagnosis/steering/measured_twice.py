@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnosis.estimation.one_cause import Measured, with_one_cause
+from diagnosis.estimation.one_cause import with_one_cause
+from diagnosis.estimation.simple_causes import Measured
 from diagnosis.results.assessment import Finding
 from diagnosis.results.result import Hypothesis
 from diagnosis.steering.findings import SideFindings

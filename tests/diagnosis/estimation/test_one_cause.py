@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from diagnosis.estimation.one_cause import Measured, with_one_cause
+from diagnosis.estimation.one_cause import with_one_cause
+from diagnosis.estimation.simple_causes import Measured
 from diagnosis.results.assessment import Finding
 from diagnosis.results.result import Hypothesis
 from diagnosis.results.vocabulary import Tier
@@ -113,3 +114,25 @@ def test_two_losses_of_different_sizes_far_apart_are_no_gain_that_fades() -> Non
     y = np.where(T < 12.0, 0.0, np.where(T > 20.0, 0.6, 1.0)) * X
     near = pieces(((1000, 1200, FaultMode.NO_SIGNAL), (2000, 2400, FaultMode.INEFFICIENT)))
     assert with_one_cause(near, measured(lambda _: y)) == near
+
+
+def test_where_nothing_moves_a_loss_and_an_offset_are_alike() -> None:
+    x = 0.5 + 0.0005 * np.sin(T)
+    one = Measured(0.6 * x, x, np.ones(SIZE, np.bool_), DT, ("a", "b"), "m/s", NOISE, 0.02)
+    (found,) = with_one_cause(pieces(((1000, 2400, FaultMode.NOISY),)), one)
+    assert (found.mode, found.probability) == (FaultMode.INEFFICIENT, 0.5)
+    assert {h.mode: h.p for h in found.hypotheses}[FaultMode.OUTSIDE_TABLE] == pytest.approx(0.4)
+    assert sum(h.p for h in found.hypotheses) == pytest.approx(1.0)
+
+
+def test_a_piece_that_began_too_early_does_not_hide_a_loss() -> None:
+    one = measured(lambda x: np.where(T > 16.0, 0.5, 1.0) * x)
+    (found,) = with_one_cause(pieces(((1000, 2400, FaultMode.NOISY),)), one)
+    assert found.mode is FaultMode.INEFFICIENT
+    assert found.start == pytest.approx(1600, abs=60)
+
+
+def test_noise_beside_a_loss_is_noise() -> None:
+    disturbed = 0.015 * np.convolve(RNG.standard_normal(SIZE), np.exp(-np.arange(200) / 40.0), "same") / 4.5
+    near = pieces(((1000, 2400, FaultMode.NOISY),))
+    assert with_one_cause(near, measured(lambda x: 0.6 * x + disturbed)) == near

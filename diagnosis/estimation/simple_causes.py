@@ -1,0 +1,161 @@
+"""Simple causes of a channel's deviation from its reference: an offset, a loss, a gain that fades, a drift, a delay."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from diagnosis.results.result import Epsilon
+from diagnosis.results.sizes import amount
+from replay.faults import FaultMode
+
+Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+_ABOUT = 0.03  # by which a gain is uncertain, and may be beyond the table
+_LATEST_S, _DELAYS = 1.0, 41
+_USUAL = 0.9  # of the samples
+_OWN = 1.5  # times the noise: a healthy channel's own deviation
+
+
+@dataclass(frozen=True)
+class Measured:
+    """A channel beside its reference, each of shape (n,).
+
+    Attributes
+    ----------
+    y, x : Array
+        Channel and reference [unit].
+    use : NDArray[np.bool_]
+        Steps with both.
+    dt : float
+        Step [s].
+    names : tuple[str, str]
+        Of both.
+    unit : str
+        Of both.
+    noise : float
+        Root mean square of a healthy deviation [unit].
+    least : float
+        Smallest offset that counts [unit].
+    """
+
+    y: Array
+    x: Array
+    use: Flags
+    dt: float
+    names: tuple[str, str]
+    unit: str
+    noise: float
+    least: float
+
+
+@dataclass(frozen=True)
+class Cause:
+    """A cause of a deviation.
+
+    Attributes
+    ----------
+    mode : FaultMode
+        Its row.
+    left : float
+        Share of the deviation's power that it leaves [1].
+    words : str
+        What it is.
+    epsilon : Epsilon or None
+        What is lost; None: it is no loss.
+    changes, late : bool
+        Whether it changes with time; whether it is a delay.
+    alone : bool
+        Whether no other one explains as much.
+    start : int or None
+        Step where it begins, if later than the pieces.
+    """
+
+    mode: FaultMode
+    left: float
+    words: str
+    epsilon: Epsilon | None = None
+    changes: bool = False
+    late: bool = False
+    alone: bool = True
+    start: int | None = None
+
+
+def causes(y: Array, x: Array, at: NDArray[np.intp], measured: Measured) -> Iterator[Cause]:
+    """Every simple cause, with what it leaves of y beside x.
+
+    Parameters
+    ----------
+    y, x : Array, shape (k,)
+        Channel and reference [unit] at some steps.
+    at : NDArray[np.intp], shape (k,)
+        These steps.
+    measured : Measured
+        Channel and reference whole.
+    """
+    off = y - x
+    whole = max(power(off, measured), 1e-30)
+    reference = measured.names[1]
+    offset = float(np.mean(off))
+    if abs(offset) >= measured.least:
+        more = "more" if offset > 0.0 else "less"
+        yield Cause(
+            FaultMode.OUTSIDE_TABLE,
+            power(off - offset, measured) / whole,
+            f"It reads {amount(abs(offset), measured.unit, 2)} {more} than {reference} all through it, whatever that is: an offset.",
+        )
+    gain = float(x @ y) / float(x @ x)
+    yield _loss(power(y - gain * x, measured) / whole, (gain, gain), measured)
+    when = (at - at[0]) * measured.dt
+    shapes = np.column_stack([x, x * when])
+    (start, slope), *_ = np.linalg.lstsq(shapes, y, rcond=None)
+    ends = (float(start), float(start + slope * when[-1]))
+    yield _loss(power(y - shapes @ np.array([start, slope]), measured) / whole, ends, measured)
+    line = np.column_stack([np.ones(at.size), when])
+    drift, *_ = np.linalg.lstsq(line, off, rcond=None)
+    yield Cause(
+        FaultMode.OUTSIDE_TABLE,
+        power(off - line @ drift, measured) / whole,
+        f"It departs from {reference} by {amount(float(drift[1]), measured.unit, 2)} a second, whatever that is: a drift.",
+        changes=True,
+    )
+    late = []
+    for delay in np.linspace(0.0, _LATEST_S, _DELAYS)[1:]:
+        before = measured.x[np.maximum(at - round(delay / measured.dt), 0)]
+        late.append((power(y - np.where(np.isfinite(before), before, x), measured) / whole, float(delay)))
+    left, delay = min(late)
+    yield Cause(
+        FaultMode.OUTSIDE_TABLE,
+        left,
+        f"It comes {1e3 * delay:.0f} ms after {reference}: a delay.",
+        changes=True,
+        late=True,
+    )
+
+
+def _loss(left: float, gains: tuple[float, float], measured: Measured) -> Cause:
+    """A gain that is steady or changes from the one to the other."""
+    channel, reference = measured.names
+    table = all(-_ABOUT <= g <= 1.0 + _ABOUT for g in gains)
+    mode = FaultMode.INEFFICIENT if table else FaultMode.OUTSIDE_TABLE
+    low, high = sorted(1.0 - g for g in gains)
+    steady = gains[0] == gains[1]
+    share = f"{gains[0]:.2f}" if steady else f"{gains[0]:.2f} at first and {gains[1]:.2f} at last"
+    return Cause(
+        mode,
+        left,
+        f"{channel} is {share} of {reference} all through it.",
+        Epsilon(0.5 * (low + high), low - _ABOUT, high + _ABOUT),
+        changes=not steady,
+    )
+
+
+def power(off: Array, measured: Measured) -> float:
+    """Mean square of a deviation, shape (k,), beyond what healthy noise has, but for its largest, which the timing of a move makes [unit²]."""
+    squared = off**2
+    most = int(_USUAL * squared.size)
+    return max(float(np.mean(np.partition(squared, most)[:most])) - (_OWN * measured.noise) ** 2, 0.0)
