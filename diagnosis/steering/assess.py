@@ -175,7 +175,7 @@ def _found(
         found = weighed(found, blocks.length, inputs.timeline.dt)
     else:
         found = paired(found)
-    found = not_denied(found, inputs, blocks)
+    found = not_denied(found, inputs, blocks, machine.max_steer)
     found = {side: acquitted(side, found[side], inputs, blocks, believed=not otherwise) for side in _SIDES}
     found = {side: of_one_cause(side, found[side], inputs, machine.limits.min_opening) for side in _SIDES}
     return _Found(axle, path, found, valve_judged)

@@ -1,4 +1,4 @@
-"""What a steering model alone claims and the readings deny: noise that shakes nothing, stuck sensors that tremble, stuck valves that obey.
+"""What a steering model alone claims and the readings deny: noise that shakes nothing, stuck sensors that tremble, valves that obey or meet a stop.
 
 To the filters everything that their plant leaves unexplained for a while looks like noise of one side, and an angle that stays
 like a stuck sensor, whoever holds it.
@@ -21,6 +21,11 @@ _SHAKEN = 2.0  # times the usual power of what changes from reading to reading
 _RESTLESS = 0.1  # share of changing readings from which on a sensor lives
 _MOTION_S, _LATEST_S, _FEW_MOTIONS = 0.5, 0.3, 6  # of an angle, and by how much it may be later than its command
 _OBEYS = 0.8  # correlation
+_AT_END, _REACHED, _STAYS = (
+    0.97,
+    0.5,
+    0.9,
+)  # of the largest angle to that side, which is so much of the machine's; of the time
 _READ = 0.5  # of a finding: what delivers less is silent
 _LEAST_USUAL_S = 5.0  # for which a reading must be known without its fault
 _DISTURBED = 0.6  # probability of noise behind an opening that nobody measured: none of 10 was right on tuning seeds
@@ -30,7 +35,7 @@ _UNSEEN = "Where no opening is logged, a disturbance of the {valve} looks like w
 
 
 def not_denied(
-    found: Mapping[Side, SideFindings], inputs: AxleInputs, blocks: SteeringBlocks
+    found: Mapping[Side, SideFindings], inputs: AxleInputs, blocks: SteeringBlocks, max_steer: float
 ) -> dict[Side, SideFindings]:
     """Findings of both sides; what a sensor's own readings deny is left unexplained, noise of an unmeasured valve uncertain.
 
@@ -42,6 +47,8 @@ def not_denied(
         The axle's channels.
     blocks : SteeringBlocks
         The same in blocks.
+    max_steer : float
+        Largest angle of the machine's axles [rad].
     """
     out = dict(found)
     sensor, valve = found[Side.SENSOR], found[Side.ACTUATOR]
@@ -56,7 +63,7 @@ def not_denied(
         kept = tuple(f for f in sensor.findings if f not in denied)
         out[Side.SENSOR] = SideFindings(kept, (*sensor.unexplained, *(_span(f, blocks) for f in denied)))
     if not inputs.valve_redundant:
-        obeyed = [f for f in valve.findings if f.mode.total and _obeys(*_span(f, blocks), blocks)]
+        obeyed = [f for f in valve.findings if f.mode.total and _denies(*_span(f, blocks), blocks, max_steer)]
         kept = tuple(f for f in valve.findings if f not in obeyed)
         valve = valve._replace(findings=kept, unexplained=(*valve.unexplained, *(_span(f, blocks) for f in obeyed)))
         findings = tuple(limited(f, _DISTURBED, _UNSEEN) if f.mode is FaultMode.NOISY else f for f in valve.findings)
@@ -80,6 +87,24 @@ def _trembles(finding: Finding, inputs: AxleInputs) -> bool:
     known = np.isfinite(inputs.angle[part])
     y = inputs.angle[part][known & inputs.fresh[part]]
     return bool(y.size > 1 and np.mean(known) > _READ and np.mean(np.diff(y) != 0.0) > _RESTLESS)
+
+
+def _denies(a: int, b: int, blocks: SteeringBlocks, max_steer: float) -> bool:
+    return _obeys(a, b, blocks) or _at_stop(a, b, blocks, _REACHED * max_steer)
+
+
+def _at_stop(a: int, b: int, blocks: SteeringBlocks, least: float) -> bool:
+    """Whether an axle stands at the largest angle of the mission in blocks [a, b) and is told to go on, as against an end stop."""
+    angle = np.where(blocks.count > 0, blocks.mean, np.nan)
+    known = np.isfinite(angle[a:b])
+    if not known.any():
+        return False
+    sign = np.sign(np.nanmedian(angle[a:b]))
+    largest = float(np.nanmax(sign * angle))
+    there = (sign * angle[a:b] >= _AT_END * largest)[known]
+    return bool(
+        largest >= least and np.mean(there) > _STAYS and np.mean(sign * blocks.u[a:b][known][there] > 0.0) > _STAYS
+    )
 
 
 def _obeys(a: int, b: int, blocks: SteeringBlocks) -> bool:

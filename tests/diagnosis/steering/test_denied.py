@@ -18,6 +18,7 @@ from diagnosis.steering.findings import SideFindings
 from replay.faults import FaultMode, Side
 
 DT, SIZE = 0.01, 4000
+MOST = 0.785  # rad
 ALWAYS = np.ones(SIZE, np.bool_)
 NOTHING = SideFindings((), ())
 
@@ -59,24 +60,24 @@ def inputs(*, angle: bool = False, valve: bool = False, reading: np.ndarray | No
 
 def test_noise_of_a_sensor_shakes_its_reading() -> None:
     claimed = {Side.SENSOR: noise(Side.SENSOR), Side.ACTUATOR: NOTHING}
-    smooth = not_denied(claimed, inputs(), axle(None))[Side.SENSOR]
+    smooth = not_denied(claimed, inputs(), axle(None), MOST)[Side.SENSOR]
     assert not smooth.findings
     assert smooth.unexplained == ((1000, 2000),)
-    assert not_denied(claimed, inputs(), axle(slice(1000, 2000)))[Side.SENSOR].findings
+    assert not_denied(claimed, inputs(), axle(slice(1000, 2000)), MOST)[Side.SENSOR].findings
 
 
 def test_noise_of_a_valve_is_uncertain_unless_its_opening_is_measured() -> None:
     claimed = {Side.SENSOR: NOTHING, Side.ACTUATOR: noise(Side.ACTUATOR)}
-    (unseen,) = not_denied(claimed, inputs(), axle(None))[Side.ACTUATOR].findings
+    (unseen,) = not_denied(claimed, inputs(), axle(None), MOST)[Side.ACTUATOR].findings
     assert unseen.probability == pytest.approx(0.6, abs=0.01)
     assert sum(h.p for h in unseen.hypotheses) == pytest.approx(1.0)
-    (seen,) = not_denied(claimed, inputs(valve=True), axle(None))[Side.ACTUATOR].findings
+    (seen,) = not_denied(claimed, inputs(valve=True), axle(None), MOST)[Side.ACTUATOR].findings
     assert seen.probability > 0.98
 
 
 def test_a_burst_is_less_probable_than_lasting_noise() -> None:
     claimed = {Side.SENSOR: NOTHING, Side.ACTUATOR: noise(Side.ACTUATOR, 1000, 1060)}
-    (brief,) = not_denied(claimed, inputs(valve=True), axle(None))[Side.ACTUATOR].findings
+    (brief,) = not_denied(claimed, inputs(valve=True), axle(None), MOST)[Side.ACTUATOR].findings
     assert brief.probability == pytest.approx(0.495)
 
 
@@ -85,7 +86,9 @@ def test_a_sensor_whose_last_digit_changes_is_not_stuck(trembles: bool) -> None:
     reading = np.round(np.random.default_rng(5).normal(0.01, 4e-4 if trembles else 0.0, SIZE), 4)
     (claimed,) = noise(Side.SENSOR).findings
     stuck = SideFindings((replace(claimed, mode=FaultMode.STUCK),), ())
-    out = not_denied({Side.SENSOR: stuck, Side.ACTUATOR: NOTHING}, inputs(reading=reading), axle(None))[Side.SENSOR]
+    out = not_denied({Side.SENSOR: stuck, Side.ACTUATOR: NOTHING}, inputs(reading=reading), axle(None), MOST)[
+        Side.SENSOR
+    ]
     assert bool(out.findings) is not trembles
 
 
@@ -98,6 +101,21 @@ def test_a_valve_that_moves_its_axle_as_it_is_told_is_not_stuck(obeys: bool) -> 
     of = blocks_of(angle, command, ALWAYS, ALWAYS, DT)
     (claimed,) = noise(Side.ACTUATOR).findings
     stuck = SideFindings((replace(claimed, mode=FaultMode.STUCK),), ())
-    out = not_denied({Side.SENSOR: NOTHING, Side.ACTUATOR: stuck}, inputs(), of)[Side.ACTUATOR]
+    out = not_denied({Side.SENSOR: NOTHING, Side.ACTUATOR: stuck}, inputs(), of, MOST)[Side.ACTUATOR]
     assert bool(out.findings) is not obeys
     assert bool(out.unexplained) is obeys
+
+
+@pytest.mark.parametrize(("level", "command", "stops"), [(0.5, 0.1, True), (0.5, -0.1, False), (0.2, 0.1, False)])
+def test_a_valve_that_pushes_its_axle_against_the_stop_is_not_dead(level: float, command: float, stops: bool) -> None:
+    """Told to go back, or nowhere near the end of its travel, an axle that stands still has no stop."""
+    t = np.arange(SIZE) * DT
+    angle = level * np.clip(1.4 * np.sin(0.3 * t - 1.5), -1.0, 1.0)
+    here = slice(*np.flatnonzero((angle >= level - 1e-9) & (t < 20.0))[[0, -1]])
+    u = 0.1 * np.cos(0.3 * t - 1.5)
+    u[here] = command
+    (claimed,) = noise(Side.ACTUATOR, here.start, here.stop).findings
+    dead = SideFindings((replace(claimed, mode=FaultMode.NO_SIGNAL),), ())
+    of = blocks_of(angle + np.random.default_rng(7).normal(0.0, 3e-4, SIZE), u, ALWAYS, ALWAYS, DT)
+    out = not_denied({Side.SENSOR: NOTHING, Side.ACTUATOR: dead}, inputs(), of, MOST)[Side.ACTUATOR]
+    assert bool(out.findings) is not stops
