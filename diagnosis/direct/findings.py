@@ -21,6 +21,7 @@ from diagnosis.estimation.fault_models import HEALTHY, INEFFICIENT, STUCK, VARYI
 from diagnosis.estimation.one_cause import with_one_cause
 from diagnosis.estimation.segments import Run, with_leads
 from diagnosis.estimation.simple_causes import Measured
+from diagnosis.estimation.spikes import with_spikes
 from diagnosis.estimation.viterbi import ModePath
 from diagnosis.results.assessment import Finding
 from diagnosis.results.fault_rows import ROWS, codes_of
@@ -108,7 +109,8 @@ def find_faults(path: ModePath, found: IdentifiedPair, limits: Limits) -> Faults
             )
             findings.append(_widened(finding, run, whole, dt, _detected(path, whole, dt, shortest, found.lag)))
     beside = [_as_beside(f, findings, found) for f in findings]
-    return FaultsFound(with_one_cause(beside, _measured(found, limits)), timing, below)
+    measured = _measured(found, limits)
+    return FaultsFound(with_one_cause(with_spikes(beside, measured), measured), timing, below)
 
 
 def _measured(found: IdentifiedPair, limits: Limits) -> Measured:
