@@ -30,6 +30,8 @@ _READ = 0.5  # of a finding: what delivers less is silent
 _LEAST_USUAL_S = 5.0  # for which a reading must be known without its fault
 _DISTURBED = 0.6  # probability of noise behind an opening that nobody measured: none of 10 was right on tuning seeds
 _BURST_S = 0.6  # length at which half of the bursts of noise are what a model leaves out of a motion
+_PAUSE_S = 0.12  # likewise of a side that does nothing: a reading that did not change, a valve about its middle
+_PAUSE = "As brief as this, it may be a reading that did not change, or what the model leaves out, which makes it less probable."
 _BURST = "Noise as brief as this may be what the model leaves out of a motion, which makes it less probable."
 _UNSEEN = "Where no opening is logged, a disturbance of the {valve} looks like what the model leaves out, which makes it less probable."
 
@@ -68,16 +70,23 @@ def not_denied(
         valve = valve._replace(findings=kept, unexplained=(*valve.unexplained, *(_span(f, blocks) for f in obeyed)))
         findings = tuple(limited(f, _DISTURBED, _UNSEEN) if f.mode is FaultMode.NOISY else f for f in valve.findings)
         out[Side.ACTUATOR] = valve._replace(findings=findings)
-    return {side: one._replace(findings=_not_brief(one.findings, inputs.timeline.dt)) for side, one in out.items()}
+    twice = {Side.SENSOR: inputs.angle_redundant, Side.ACTUATOR: inputs.valve_redundant}
+    return {
+        side: one._replace(findings=_not_brief(one.findings, inputs.timeline.dt, twice=twice[side]))
+        for side, one in out.items()
+    }
 
 
-def _not_brief(findings: tuple[Finding, ...], dt: float) -> tuple[Finding, ...]:
-    """Findings; brief noise is no more probable than it is elsewhere."""
+def _not_brief(findings: tuple[Finding, ...], dt: float, *, twice: bool) -> tuple[Finding, ...]:
+    """Findings; brief noise is no more probable than it is elsewhere, nor is a brief pause of what is not measured `twice`."""
     out = []
     for f in findings:
         seconds = (f.stop - f.start) * dt
-        brief = seconds**2 / (seconds**2 + _BURST_S**2)
-        out.append(limited(f, f.probability * brief, _BURST) if f.mode is FaultMode.NOISY else f)
+        half, why = (_BURST_S, _BURST) if f.mode is FaultMode.NOISY else (_PAUSE_S, _PAUSE)
+        brief = seconds**2 / (seconds**2 + half**2)
+        out.append(
+            limited(f, f.probability * brief, why) if f.mode is FaultMode.NOISY or (f.mode.total and not twice) else f
+        )
     return tuple(out)
 
 
