@@ -57,7 +57,7 @@ def what_stands_out(checks: Sequence[Checked], cells: Cells, words: MachineWords
     found |= {check.component: fault_of_axle(check, cells) for check in checks if _does_not_answer(check, cells)}
     if (wheel := _alone(checks, cells)) is not None:
         found[wheel.component] = fault_of_wheel(wheel, cells, alone=True)
-    elif (wheel := _alone_not_following(checks, cells)) is not None:
+    elif not _stated(cells) and (wheel := _alone_not_following(checks, cells)) is not None:
         found[wheel.component] = fault_of_wheel(wheel, cells, alone=False)
     return {
         component: replace(f, evidence=tuple(words.fill(text) for text in f.evidence)) for component, f in found.items()
@@ -108,11 +108,15 @@ def _off_second_angle(check: Checked) -> bool:
     )
 
 
+def _stated(cells: Cells) -> bool:
+    return any(cells.stated.get(part) for part in (*cells.machine.wheels, *cells.machine.axles))
+
+
 def _alone(checks: Sequence[Checked], cells: Cells) -> Checked | None:
     """The check of the one wheel that deviates, by far; None where there is no such wheel, or another part explains it."""
     if any(c.check is Check.STILL and _times(c) >= _DRAGS for c in checks):
         return None
-    if any(cells.stated.get(part) for part in (*cells.machine.wheels, *cells.machine.axles)):
+    if _stated(cells):
         return None
     worst: dict[str, Checked] = {}
     twice = dict(zip(cells.machine.wheels, measured_twice(cells), strict=True))

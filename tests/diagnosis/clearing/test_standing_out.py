@@ -77,6 +77,8 @@ def test_the_wheel_that_does_not_follow_is_blamed_and_not_the_one_that_drags_it_
     after = without_followers(before, checks, cells)
     assert after["FR", "actuator"].findings == (loss,)
     assert after["RR", "actuator"] is before["RR", "actuator"]
+    explained = replace(cells, stated={"RL": [(5.0, 50.0)]})  # by what is measured twice, say
+    assert what_stands_out(checks, explained, HYDRAULIC) == {}
     drags = [c if c.component != "FR" else replace(c, worst=1.0) for c in checks]  # it does not follow either
     assert without_followers(before, drags, cells) == before
 
