@@ -14,6 +14,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from diagnosis.channels.noise import moving_sum
 from diagnosis.channels.noise_growth import NoiseGrowth, noise_growth
 from diagnosis.results.assessment import Finding
 from diagnosis.steering.blocks import SteeringBlocks
@@ -33,6 +34,7 @@ _FEW = 8  # windows
 _BEST = 0.3  # quantile of windows
 _SCATTER = 0.0045  # of a motion: machines that move as their model says are below
 _MOTION_S = 0.05  # to either side
+_EVEN_S = 1.0  # over which a command that switches to and fro is its mean
 _BEYOND = 2.5  # times what is usual at such motion
 _MOSTLY = 0.4  # of a finding: its ends may come late
 _READ = 0.5  # of a finding: what delivers less is silent
@@ -163,7 +165,16 @@ def _shown(finding: Finding, apart: Array, by: Array, limit: Array, dt: float, *
     if np.count_nonzero(telling) < _TELLING_S / dt:
         return False
     left = float(np.sum((apart - should)[telling] ** 2))
+    if finding.side is Side.ACTUATOR and not _mostly(_evened(apart, dt)[telling] ** 2 > limit[telling]):
+        return False  # a valve is slower than a command that switches to and fro, and rests at its mean
     return _mostly(apart[telling] ** 2 > limit[telling]) and left < _LEFT * float(np.sum(apart[telling] ** 2))
+
+
+def _evened(apart: Array, dt: float) -> Array:
+    """Mean over `_EVEN_S` of what is known, shape (n,)."""
+    width = max(1, round(_EVEN_S / dt))
+    known = np.isfinite(apart)
+    return moving_sum(np.where(known, apart, 0.0), width) / np.maximum(moving_sum(known, width), 1)
 
 
 def _puts_between(finding: Finding, by: Array) -> Array:

@@ -194,3 +194,14 @@ def test_a_sensor_that_shakes_far_more_than_elsewhere_is_noisy_whatever_the_mode
     noisy = SideFindings((finding(Side.SENSOR, FaultMode.NOISY, 4000, 5000),), ())
     found = acquitted(Side.SENSOR, noisy, inputs, blocks(u, reading), believed=False)
     assert bool(found.findings) is named
+
+
+def test_an_opening_at_the_mean_of_a_command_that_switches_to_and_fro_is_not_stuck() -> None:
+    """Slower than its command, a valve stands between the two; one that sticks elsewhere does not."""
+    at = np.arange(SIZE) * DT
+    rng = np.random.default_rng(8)
+    u = np.where(at < 20.0, 0.4 * np.sin(0.6 * at), np.where(rng.random(SIZE) < 0.5, 0.1, 0.0))
+    for level, named in ((0.05, False), (-0.1, True)):
+        opening = np.where(at < 20.0, u, level)
+        stuck = finding(Side.ACTUATOR, FaultMode.STUCK, round(20.0 / DT), SIZE, 1.0, level)
+        assert kept(Side.ACTUATOR, stuck, valve(opening, u)) is named
