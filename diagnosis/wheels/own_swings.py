@@ -19,7 +19,7 @@ from replay.faults import FaultMode, Side, State
 Array = NDArray[np.float64]
 
 _LEAST_HZ, _CYCLES = 1.0, 8
-_BAND, _FLAT = 0.25, 3.0  # about a frequency, to either side; times what lies there of white noise
+_BAND, _FLAT = 0.25, 2.2  # about a frequency, to either side; times what lies there of white noise
 _SHARE, _OF_ALL = 0.5, 0.35  # of the power that lies there: of what is not slower than the least, and of all
 _PIECE = 16  # cycles of the slowest swing, that are looked at together: it may wander
 _P = 0.85  # that it is a fault, and no way of the machine
