@@ -244,7 +244,8 @@ def _times(fault: Mapping[str, Any], report: Mapping[str, Any]) -> Iterator[str]
 def _words(fault: Mapping[str, Any]) -> Iterator[str]:
     for text in fault["evidence"]:
         found = re.search(r"it was this in (\d+) of 100 cases", text)
-        if found and abs(int(found.group(1)) - 100 * fault["probability"]) > 1.6:
+        told = any("less probable" in e for e in fault["evidence"])  # something else limits it, and that is said
+        if found and not told and abs(int(found.group(1)) - 100 * fault["probability"]) > 1.6:
             yield f"{found.group(0)!r} beside a probability of {fault['probability']:.3f}"
     all_words = " ".join(fault["evidence"])
     if "hardly moved" in all_words and " moved over " in all_words:

@@ -180,8 +180,10 @@ def _judge(run: _Run) -> Judged:
         return Judged(run.start, run.stop, None)
     epsilon, sat = estimate_size(choice.side, choice.row, run.start, run.stop, run.axle, run.path)
     stuck_valve = choice.side is Side.ACTUATOR and choice.mode is FaultMode.STUCK
+    hypotheses = tuple(_hypothesis(fault, p) for fault, p in ranked if p >= _LEAST_LISTED)
     if stuck_valve and sat is not None and abs(sat.mean) < limits.min_opening:
-        choice, sat = choice._replace(mode=FaultMode.NO_SIGNAL), None
+        hypotheses = _at_zero(hypotheses)
+        choice, sat = choice._replace(mode=FaultMode.NO_SIGNAL, probability=hypotheses[0].p), None
     start, stop = run.start, run.stop
     if choice.needs_motion and not run.axle.model.opening_measured:
         first, last, seconds = asked(run.axle, start, stop)
@@ -197,13 +199,22 @@ def _judge(run: _Run) -> Judged:
         side=choice.stated,
         mode=choice.mode,
         probability=min(1.0, choice.probability),
-        hypotheses=tuple(_hypothesis(fault, p) for fault, p in ranked if p >= _LEAST_LISTED),
+        hypotheses=hypotheses,
         epsilon=epsilon,
         sat=sat,
         evidence=_sentences(choice, gain, ranked, run),
         tier=Tier.SIGNAL if choice.dead_sensor else Tier.MODEL,
     )
     return Judged(start, stop, finding)
+
+
+def _at_zero(hypotheses: Sequence[Hypothesis]) -> tuple[Hypothesis, ...]:
+    """Hypotheses of a valve that is stuck where it lets nothing through: it has no signal."""
+    row = (Side.ACTUATOR.value, FaultMode.NO_SIGNAL.value)
+    alike = {(Side.ACTUATOR.value, FaultMode.STUCK.value), row}
+    rest = [h for h in hypotheses if (h.side, h.mode) not in alike]
+    dead = Hypothesis(*row, sum(h.p for h in hypotheses if (h.side, h.mode) in alike))
+    return tuple(sorted([dead, *rest], key=lambda h: -h.p))
 
 
 def _ranked(evidence: Mapping[Explanation, float], run: _Run) -> list[tuple[Fault, float]]:
