@@ -47,6 +47,6 @@ def _findings(assessments: Mapping[Part, Assessment], part: Part) -> tuple[Findi
 
 
 def _doubtful(f: Finding, wrong: Sequence[Finding]) -> bool:
-    if f.tier is not Tier.MODEL or f.mode.total:
-        return False
+    if f.tier is not Tier.MODEL or f.mode.total or f.mode.varying:
+        return False  # nothing dies or shakes by a wrong angle
     return any(min(f.stop, w.stop) - max(f.start, w.start) > _INSIDE * (f.stop - f.start) for w in wrong)

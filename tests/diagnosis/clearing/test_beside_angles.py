@@ -35,7 +35,7 @@ def beside(wheel: Finding, angle: Finding) -> Finding:
     return found
 
 
-@pytest.mark.parametrize("mode", [FaultMode.INEFFICIENT, FaultMode.NOISY])
+@pytest.mark.parametrize("mode", [FaultMode.INEFFICIENT, FaultMode.OUTSIDE_TABLE])
 def test_a_loss_beside_a_wrong_angle_is_less_sure(mode: FaultMode) -> None:
     found = beside(fault(1000, 1500, mode=mode), fault(0, 3000, mode=FaultMode.NO_SIGNAL))
     assert found.probability == pytest.approx(0.65)
@@ -48,10 +48,11 @@ def test_a_loss_beside_a_wrong_angle_is_less_sure(mode: FaultMode) -> None:
     [
         (fault(1000, 1500, tier=Tier.DIRECT), fault(0, 3000)),
         (fault(1000, 1500, mode=FaultMode.NO_SIGNAL), fault(0, 3000)),
+        (fault(1000, 1500, mode=FaultMode.NOISY), fault(0, 3000)),
         (fault(1000, 1500), fault(1300, 3000)),
         (fault(1000, 1500), fault(0, 3000, side=Side.ACTUATOR)),
     ],
-    ids=["measured twice", "nothing comes", "at another time", "an angle that is right"],
+    ids=["measured twice", "nothing comes", "it shakes", "at another time", "an angle that is right"],
 )
 def test_what_the_angle_does_not_explain_is_as_sure_as_before(wheel: Finding, angle: Finding) -> None:
     assert beside(wheel, angle) is wheel
