@@ -24,7 +24,8 @@ def of_coverage(report: Mapping[str, Any]) -> Iterator[str]:
         if fault["probability"] < _SURE or fault["severity"] == "info":
             continue
         resting = [_resting(fault, side, report) for side in sides]
-        if min(resting) > 0.5:
+        parted = any("stretches" in e for e in fault["evidence"])  # and says so
+        if min(resting) > (0.8 if parted else 0.5):
             yield f"{name}: its part is not excited for {100 * min(resting):.0f} % of it"
 
 

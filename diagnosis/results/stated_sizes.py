@@ -100,6 +100,8 @@ def known_probability(
 ) -> dict[str, NDArray[Any]]:
     """The columns ``evidence.<component>.<side>.probability`` without what was not decided, which is NaN; see `size_columns`.
 
+    A fault of either side, which may rest on other evidence than these columns, has half of its probability on each at least.
+
     Columns and `t` [s] of shape (n,).
     """
     out = {}
@@ -107,14 +109,17 @@ def known_probability(
         name = f"evidence.{component}.{side}.probability"
         if name not in columns:
             continue
-        known = np.zeros(t.size, np.bool_)
+        known, values = np.zeros(t.size, np.bool_), columns[name].copy()
         for s in report["states"]:
             if (s["component"], s["side"]) == (component, side) and s["state"] in DECIDED:
                 known[_rows(t, step, s["start_s"], s["stop_s"])] = True
         for fault in report["intervals"]:
             if fault["component"] == component and side in Side(fault["side"]).sides:
-                known[_rows(t, step, fault["start_s"], fault["stop_s"])] = True
-        values = columns[name]
+                rows = _rows(t, step, fault["start_s"], fault["stop_s"])
+                known[rows] = True
+                if fault["side"] == Side.SENSOR_OR_ACTUATOR:
+                    faulty = 1.0 - sum(h["p"] for h in fault["hypotheses"] if h["mode"] == State.HEALTHY)
+                    values[rows] = np.fmax(values[rows], 0.5 * faulty)
         out[name] = np.where(known, values, values.dtype.type(np.nan))
     return out
 
