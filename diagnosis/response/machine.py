@@ -154,7 +154,7 @@ def unlike_others(judged: Mapping[str, Judged]) -> dict[str, float]:
 
 def _made(judged: Mapping[str, Judged]) -> dict[str, float]:
     """What each wheel makes of its command [1]."""
-    return {w: abs(float(j.response.weights[0])) for w, j in judged.items() if j.response.answered}
+    return {w: abs(float(j.response.left(j.data.commands)[0])) for w, j in judged.items() if j.response.answered}
 
 
 def lasting_losses(judged: Mapping[str, Judged]) -> dict[str, float]:

@@ -181,7 +181,7 @@ def align(signals: Signals, start_s: float | None = None, stop_s: float | None =
     if size > MAX_STEPS:
         raise LogError(
             f"stamps span {(last - first) * 1e-9:.0f} s in steps of {step * 1e-6:g} ms: more than {MAX_STEPS} steps; "
-            'the clock probably jumps: choose another one ([sources] stamp = "log") or a part (--start, --end)'
+            'the clock probably jumps: choose another one (under [sources] "*" = { stamp = "log" }) or a part (--start, --end)'
         )
     values: dict[str, NDArray[np.float64]] = {}
     fresh: dict[str, NDArray[np.bool_]] = {}
