@@ -102,8 +102,12 @@ def driven(seed: int, faults: tuple[FaultSpec, ...], duration: float) -> tuple[A
     noise = rng.standard_normal((speed.size, 2)) * 5e-4 + rng.uniform(-0.003, 0.003, 2)
     first = rng.uniform(0.2, 0.5) * duration  # a payload is taken, and left
     t = np.arange(speed.size) * STEP_S
-    loaded = np.clip((t - first) / 2.0, 0.0, 1.0) - np.clip((t - first - rng.uniform(0.2, 0.4) * duration) / 2.0, 0.0, 1.0)
-    return drive(speed, angle, loss, sat, noise, loaded, rng.uniform(0, 6.3, 4), parts, float(rng.uniform(15.0, 60.0)), made)
+    loaded = np.clip((t - first) / 2.0, 0.0, 1.0) - np.clip(
+        (t - first - rng.uniform(0.2, 0.4) * duration) / 2.0, 0.0, 1.0
+    )
+    return drive(
+        speed, angle, loss, sat, noise, loaded, rng.uniform(0, 6.3, 4), parts, float(rng.uniform(15.0, 60.0)), made
+    )
 
 
 def signals(seed: int, faults: Sequence[FaultSpec], duration: float, tier: str) -> Signals:

@@ -133,10 +133,24 @@ def drive(
 ) -> tuple[Array, Array, Array, Array, Array, Array]:  # fmt: skip
     """References, true values, measured values, commands, openings (n, 6) and body (v, side, r, asked v, curvature, engine, max p, oil, ratio)."""
     n = asked_v.size
-    ref, true, read, given, done = np.zeros((n, 6)), np.zeros((n, 6)), np.zeros((n, 6)), np.zeros((n, 6)), np.zeros((n, 6))
+    ref, true, read, given, done = (
+        np.zeros((n, 6)),
+        np.zeros((n, 6)),
+        np.zeros((n, 6)),
+        np.zeros((n, 6)),
+        np.zeros((n, 6)),
+    )
     body, w, held, at = np.zeros((n, 9)), np.zeros((4, 12)), np.zeros(12), places(b)
     w[:, PA] = w[:, PB] = b.charge
-    angles, turning, rod, rod_v, spool, us, rates = np.zeros(2), np.zeros(2), np.zeros(2), np.zeros(2), np.zeros(2), np.zeros(2), np.zeros(2)
+    angles, turning, rod, rod_v, spool, us, rates = (
+        np.zeros(2),
+        np.zeros(2),
+        np.zeros(2),
+        np.zeros(2),
+        np.zeros(2),
+        np.zeros(2),
+        np.zeros(2),
+    )
     refs, said, load = np.zeros(4), np.zeros(6), np.full(4, b.mass * 9.81 / 4)
     v = side = r = th = px = py = slow_v = ax = ay = quiet = bend = 0.0
     engine, ratio, low = 1.0, 1.0, True
@@ -155,7 +169,11 @@ def drive(
                 said[4 + a] = hit(good, loss[m, 4 + a], sat[m, 4 + a], held, 4 + a)
                 wrong = angles[a] - said[4 + a]
                 line = b.steer_gain * wrong + 0.9 * turning[a] / b.steer_rate
-                us[a] = line + 0.9 * b.steer_dead * min(max(line / 0.02, -1.0), 1.0) if abs(wrong) > 0.006 or step != 0.0 else 0.0
+                us[a] = (
+                    line + 0.9 * b.steer_dead * min(max(line / 0.02, -1.0), 1.0)
+                    if abs(wrong) > 0.006 or step != 0.0
+                    else 0.0
+                )
                 us[a] = min(max(us[a], -1.0), 1.0)
             bend = (math.tan(angles[0]) - math.tan(angles[1])) / b.base
             refs_of(slow_v, bend, turning, angles, b, refs)
@@ -175,7 +193,9 @@ def drive(
             size = max(abs(spool[a]) - b.steer_dead, 0.0) / (1.0 - b.steer_dead)
             hand = math.copysign(1.0, spool[a])
             rates[a] = hand * b.steer_rate * (1.0 + hand * b.asymmetry) * size * (1.0 - 0.15 * math.exp(-abs(v) / 0.2))
-        share = min(1.0, 1.5 * b.steer_rate * engine / max(abs(rates[0]) + abs(rates[1]), 1e-6))  # priority valve's flow
+        share = min(
+            1.0, 1.5 * b.steer_rate * engine / max(abs(rates[0]) + abs(rates[1]), 1e-6)
+        )  # priority valve's flow
         taken = fx = fy = moment = 0.0
         for a in range(2):
             rod_v[a] += H / 0.05 * (rates[a] * share - rod_v[a])
@@ -201,7 +221,10 @@ def drive(
             w[i, ROLLED] += H * w[i, TURN]
             bx, by = gx * c - gy * s, gx * s + gy * c
             fx, fy, moment = fx + bx, fy + by, moment + lx * by - ly * bx - gx * off
-        hx, hy = b.hill * math.tanh(2 * math.sin(px / b.waves + field[2])), 0.6 * b.hill * math.sin(py / b.waves + field[3])
+        hx, hy = (
+            b.hill * math.tanh(2 * math.sin(px / b.waves + field[2])),
+            0.6 * b.hill * math.sin(py / b.waves + field[3]),
+        )
         v += H * (fx / mass - 9.81 * (hx * math.cos(th) + hy * math.sin(th)) + side * r)
         side += H * (fy / mass - 9.81 * (hy * math.cos(th) - hx * math.sin(th)) - v * r)
         r += H * moment / (mass * (b.base**2 + b.track**2) / 10)
