@@ -113,7 +113,9 @@ def plate_of(spool: float, part: Array, oil: float, b: Build) -> float:
 def circuit(w: Array, part: Array, s: Array, b: Build) -> tuple[float, float]:
     """Move swash plate, pressures and hose of a wheel; return its motor's torque without friction [N·m] and the engine's power [W]."""
     goal = plate_of(w[SPOOL], part, s[OIL], b)
-    cut = min(max((abs(w[P1]) - 0.95 * b.relief) / (0.1 * b.relief), 0.0), 1.0)  # pressure cut-off of a pump that pushes
+    cut = min(
+        max((abs(w[P1]) - 0.95 * b.relief) / (0.1 * b.relief), 0.0), 1.0
+    )  # pressure cut-off of a pump that pushes
     if goal * w[P1] > 0.0:
         goal *= 1.0 - 0.9 * cut
     w[SWASH] += min(max(H / b.lag * (goal - w[SWASH]), -b.rate * H), b.rate * H)
@@ -132,7 +134,9 @@ def circuit(w: Array, part: Array, s: Array, b: Build) -> tuple[float, float]:
 def roll(w: Array, part: Array, torque: float, force: float, load: float, brake: float, b: Build) -> None:
     """Move a wheel by motor and tyre against friction with a Stribeck part, rolling resistance and the parking brake."""
     slow = math.exp(-((w[TURN] / b.stribeck) ** 2))
-    rub = part[RUB] * b.friction * (1.0 + (b.stiction - 1.0) * slow) + b.loss * abs(torque) + b.roll * load * part[RADIUS]
+    rub = (
+        part[RUB] * b.friction * (1.0 + (b.stiction - 1.0) * slow) + b.loss * abs(torque) + b.roll * load * part[RADIUS]
+    )
     rub += brake * 1.5 * b.small * b.ratio * b.most
     push = torque - force * part[RADIUS] - 0.1 * b.friction * w[TURN]
     w[TURN] = dry(w[TURN], H / b.inertia * push, H / b.inertia * rub)
