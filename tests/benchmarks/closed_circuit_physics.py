@@ -1,8 +1,6 @@
-"""What `closed_circuit.py` moves: engine, pumps, hoses, motors, brakes, steering and loads, in SI units, step by step.
+"""What `closed_circuit.py` moves: a pump per wheel in a closed circuit on one engine, motors of two displacements, tyres, steering, body.
 
-Written from first principles: a pump of variable displacement for every wheel on one diesel whose throttle an operator moves; its
-control spool overlaps and its gain differs by direction and falls as the oil warms; oil gives way at both ends of a hose that has
-a mass of its own, so that every circuit rings; motors of two displacements; relief valves across. Tyres are `flow_sharing_physics`.
+Flow is set by the pumps' swash plates, not by valves: a pump at rest blocks its wheel hydraulically, until a relief opens.
 """
 
 from __future__ import annotations
@@ -13,182 +11,243 @@ from typing import NamedTuple
 import numba as nb
 import numpy as np
 from electric_physics import dry
+from electrohydraulic_physics import hit, places, refs_of
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 H = 0.0005
-#: State of a wheel: pilot pressure, control spool and swash plate (−1 … 1), pressure across [Pa] at pump and motor, speed [rad/s], way
-#: [rad], deflections of the tyre [m], integral of its law, command, flow in the hose [m³/s]; 5, 7 and 8 are where `tyre` looks.
-PILOT, SPOOL, SWASH, P1, P2, TURN, ROLLED, ZX, ZY, TOTAL, ASKED, HOSE = range(12)
-#: What differs between wheels: radius [m], dead band, gain of either direction, zero of the spool, leakage, friction, spool sensor.
-RADIUS, DEAD, PLUS, MINUS, ZERO, LEAK, RUB, GAIN, OFFSET = range(9)
-#: State of the machine: engine's speed [of rated], oil [°C], displacement of the motors [of the small one].
-ENGINE, OIL, RANGE = range(3)
-#: State of an axle's steering: pilot, spool, speed of the rod [rad/s], rod [rad], angle [rad].
-A_PILOT, A_SPOOL, ROD_V, ROD, ANGLE = range(5)
+#: State of a wheel: control spool, swash, pressures of both lines [Pa], speed [rad/s], way [rad], tyre's deflections [m],
+#: integral of its law, command, pulses at the last count, filtered speed.
+SPOOL, SWASH, PA, PB, TURN, ROLLED, ZX, ZY, TOTAL, ASKED, COUNT, SMOOTH = range(12)
+#: What differs between wheels: radius [m], dead band, gain forward, gain backward, leakage, friction, zero of the spool.
+RADIUS, DEAD, PLUS, MINUS, LEAK, RUB, ZERO = range(7)
 
 
 class Build(NamedTuple):
-    """What a seed draws."""
+    """What a seed draws, in SI units; `flow`: of one pump at full swash."""
 
     top: float
-    cycle: int
-    frame: int
-    windows: int
     mass: float
+    load: float
     height: float
     cg: float
     radius: float
     lateral: float
     base: float
     track: float
+    middle: float
     inertia: float
-    small: float
+    motor: float
     ratio: float
-    pump: float
-    give: float
-    hose: float
-    damping: float
+    flow: float
+    volume: float
     most: float
-    relief: float
+    charge: float
     leakage: float
+    heat: float
     friction: float
-    stiction: float
-    stribeck: float
-    loss: float
+    lag: float
+    swing: float
+    rate: float
+    dead: float
+    hysteresis: float
+    known: float
     power: float
     droop: float
-    governor: float
-    cold: float
-    warming: float
-    fade: float
-    coil: float
-    lag: float
-    rate: float
-    hysteresis: float
-    dead: float
-    known: float
     forward: float
     proportional: float
     integral: float
-    authority: float
     slew: float
     ramp: float
-    brake_ramp: float
-    pitch: float
-    stiffness: float
-    shape: float
-    relaxation: float
+    teeth: float
+    cycle: int
     grip: float
+    stiffness: float
+    relaxation: float
     roll: float
     hill: float
-    hill_length: float
-    ackermann: float
+    waves: float
     steer_rate: float
-    asymmetry: float
-    mirrored: float
     steer_gain: float
     steer_dead: float
-    tolerance: float
-    play: float
-    rear: float
+    asymmetry: float
 
 
 @nb.njit(cache=True)
-def spool_of(pilot: float, spool: float, want: float, zero: float, b: Build) -> tuple[float, float]:
-    """Pilot pressure and spool a step later: a lag, then friction that leaves a hysteresis."""
-    pilot += H / b.coil * (want + zero - pilot)
-    return pilot, min(max(min(max(spool, pilot - b.hysteresis), pilot + b.hysteresis), -1.0), 1.0)
+def pump(w: Array, part: Array, want: float, engine: float, oil: float, ratio: float, b: Build) -> tuple[float, float]:
+    """Move control spool, swash plate and both lines; return the motor's torque [N·m] and the power taken [W]."""
+    w[SPOOL] += H / b.lag * (min(max(want + part[ZERO] - w[SPOOL], -1.0), 1.0))
+    size = max(abs(w[SPOOL]) - part[DEAD], 0.0) / (1.0 - part[DEAD])
+    goal = math.copysign(size * (part[PLUS] if w[SPOOL] > 0 else part[MINUS]), w[SPOOL])
+    across = w[PA] - w[PB]
+    over = max(across * math.copysign(1.0, goal) - 0.9 * b.most, 0.0) / (0.1 * b.most)  # pressure override
+    goal *= 1.0 - min(over, 1.0)
+    if abs(goal - w[SWASH]) > b.hysteresis:
+        move = goal - math.copysign(b.hysteresis, goal - w[SWASH]) - w[SWASH]
+        w[SWASH] += min(max(H / b.swing * move, -b.rate * H), b.rate * H)
+    disp, q = b.motor * ratio, b.flow * w[SWASH] * engine
+    leak = b.leakage * part[LEAK] * math.exp(b.heat * (oil - 45.0))
+    stiff = 0.9e9 / b.volume
+    net = q - disp * w[TURN] - leak * across
+    case = 0.3 * leak
+    relief = b.flow / (0.03 * b.most)
+    over_a, over_b = max(w[PA] - b.most, 0.0), max(w[PB] - b.most, 0.0)
+    w[PA] = max(w[PA] + H * stiff * (net - case * w[PA] - relief * (over_a - over_b)), b.charge)
+    w[PB] = max(w[PB] + H * stiff * (-net - case * w[PB] + relief * (over_a - over_b)), b.charge)
+    return disp * (w[PA] - w[PB]), q * across
 
 
 @nb.njit(cache=True)
-def plate_of(spool: float, part: Array, oil: float, b: Build) -> float:
-    """Displacement that a control spool asks of its pump [of the greatest]: dead band, a gain of either direction, warm oil gives less."""
-    size = max(abs(spool) - part[DEAD], 0.0) / (1.0 - part[DEAD])
-    warm = min(max((oil - b.cold) / b.warming, 0.0), 1.2)
-    return math.copysign((part[PLUS] if spool > 0 else part[MINUS]) * size * (1.0 - b.fade * warm), spool)
+def tyre(w: Array, part: Array, along: float, across: float, load: float, grip: float, b: Build) -> tuple[float, float]:
+    """Forces of a tyre [N], forward and left, brush model with relaxation; its contact moves by `along`, `across` [m/s]."""
+    rim = w[TURN] * part[RADIUS]
+    slip, roll, end = rim - along, abs(rim) / b.relaxation, 1.5 * b.relaxation
+    w[ZX] = min(max(w[ZX] + H * (slip - roll * w[ZX]), -end), end)
+    w[ZY] = min(max(w[ZY] + H * (-across - roll * w[ZY]), -end), end)
+    kx, ky = w[ZX] / b.relaxation + 0.03 * slip, w[ZY] / b.relaxation - 0.03 * across
+    size = math.hypot(kx, ky)
+    if size < 1e-9:
+        return 0.0, 0.0
+    force = load * grip * math.tanh(b.stiffness * size / grip) / size
+    return force * kx, 0.8 * force * ky
 
 
 @nb.njit(cache=True)
-def circuit(w: Array, part: Array, s: Array, b: Build) -> tuple[float, float]:
-    """Move swash plate, pressures and hose of a wheel; return its motor's torque without friction [N·m] and the engine's power [W]."""
-    goal = plate_of(w[SPOOL], part, s[OIL], b)
-    cut = min(
-        max((abs(w[P1]) - 0.95 * b.relief) / (0.1 * b.relief), 0.0), 1.0
-    )  # pressure cut-off of a pump that pushes
-    if goal * w[P1] > 0.0:
-        goal *= 1.0 - 0.9 * cut
-    w[SWASH] += min(max(H / b.lag * (goal - w[SWASH]), -b.rate * H), b.rate * H)
-    thin = b.leakage * part[LEAK] * math.exp(0.02 * (s[OIL] - 45.0))
-    made = b.pump * w[SWASH] * s[ENGINE]
-    over = w[P1] - math.copysign(min(abs(w[P1]), b.relief), w[P1])
-    w[P1] += H / b.give * (made - w[HOSE] - thin * w[P1] - over * b.pump / (0.06 * b.most))
-    w[HOSE] += H / b.hose * (w[P1] - w[P2] - b.damping * w[HOSE])
-    disp = b.small * s[RANGE]
-    over = w[P2] - math.copysign(min(abs(w[P2]), b.relief), w[P2])
-    w[P2] += H / b.give * (w[HOSE] - disp * w[TURN] - thin * w[P2] - over * b.pump / (0.06 * b.most))
-    return disp * w[P2], made * w[P1]
+def law(w: Array, ref: float, y: float, ratio: float, room: float, rest: bool, b: Build) -> None:
+    """Command of a pump: feed-forward by displacement, PI, dead band made up for, slew limit, anti-stall `room`."""
+    t, wrong = b.cycle * H, (ref - y) / b.top
+    line = b.forward * ref / b.radius * b.motor * ratio / b.flow + b.proportional * wrong + w[TOTAL]
+    u = (line + b.known * b.dead * min(max(line / 0.02, -1.0), 1.0)) * room
+    given = min(max(u, w[ASKED] - b.slew * t, -1.0), w[ASKED] + b.slew * t, 1.0)
+    if abs(u - given) < 1e-9:
+        w[TOTAL] = min(max(w[TOTAL] + t * b.integral * wrong, -0.3), 0.3)
+    if rest:
+        w[TOTAL] = given = 0.0
+    w[ASKED] = math.floor(given * 500 + 0.5) / 500
 
 
 @nb.njit(cache=True)
-def roll(w: Array, part: Array, torque: float, force: float, load: float, brake: float, b: Build) -> None:
-    """Move a wheel by motor and tyre against friction with a Stribeck part, rolling resistance and the parking brake."""
-    slow = math.exp(-((w[TURN] / b.stribeck) ** 2))
-    rub = (
-        part[RUB] * b.friction * (1.0 + (b.stiction - 1.0) * slow) + b.loss * abs(torque) + b.roll * load * part[RADIUS]
+def drive(
+    asked_v: Array, asked_angle: Array, loss: Array, sat: Array, noise: Array, loaded: Array, field: Array, parts: Array,
+    oil: float, b: Build,
+) -> tuple[Array, Array, Array, Array, Array, Array]:  # fmt: skip
+    """References, true values, measured values, commands, openings (n, 6) and body (v, side, r, asked v, curvature, engine, max p, oil, ratio)."""
+    n = asked_v.size
+    ref, true, read, given, done = (
+        np.zeros((n, 6)),
+        np.zeros((n, 6)),
+        np.zeros((n, 6)),
+        np.zeros((n, 6)),
+        np.zeros((n, 6)),
     )
-    rub += brake * 1.5 * b.small * b.ratio * b.most
-    push = torque - force * part[RADIUS] - 0.1 * b.friction * w[TURN]
-    w[TURN] = dry(w[TURN], H / b.inertia * push, H / b.inertia * rub)
-    w[ROLLED] += H * w[TURN]
+    body, w, held, at = np.zeros((n, 9)), np.zeros((4, 12)), np.zeros(12), places(b)
+    w[:, PA] = w[:, PB] = b.charge
+    angles, turning, rod, rod_v, spool, us, rates = (
+        np.zeros(2),
+        np.zeros(2),
+        np.zeros(2),
+        np.zeros(2),
+        np.zeros(2),
+        np.zeros(2),
+        np.zeros(2),
+    )
+    refs, said, load = np.zeros(4), np.zeros(6), np.full(4, b.mass * 9.81 / 4)
+    v = side = r = th = px = py = slow_v = ax = ay = quiet = bend = 0.0
+    engine, ratio, low = 1.0, 1.0, True
+    for k in range(2 * n):
+        m = k // 2
+        mass = b.mass + b.load * loaded[m]
+        if k % b.cycle == 0:
+            t = b.cycle * H
+            slow_v += min(max(asked_v[m] - slow_v, -b.ramp * t), b.ramp * t)
+            low = abs(slow_v) < (0.6 if low else 0.5) * b.top
+            for a in range(2):
+                step = min(max(asked_angle[m, a] - angles[a], -0.8 * b.steer_rate * t), 0.8 * b.steer_rate * t)
+                angles[a] += step
+                turning[a] = step / t
+                good = math.floor((rod[a] + noise[m, a]) / 1e-3 + 0.5) * 1e-3
+                said[4 + a] = hit(good, loss[m, 4 + a], sat[m, 4 + a], held, 4 + a)
+                wrong = angles[a] - said[4 + a]
+                line = b.steer_gain * wrong + 0.9 * turning[a] / b.steer_rate
+                us[a] = (
+                    line + 0.9 * b.steer_dead * min(max(line / 0.02, -1.0), 1.0)
+                    if abs(wrong) > 0.006 or step != 0.0
+                    else 0.0
+                )
+                us[a] = min(max(us[a], -1.0), 1.0)
+            bend = (math.tan(angles[0]) - math.tan(angles[1])) / b.base
+            refs_of(slow_v, bend, turning, angles, b, refs)
+            quiet = quiet + t if slow_v == 0.0 and asked_v[m] == 0.0 else 0.0
+            room = min(max((engine - 0.75) / 0.1, 0.3), 1.0)
+            for i in range(4):
+                pulses = math.floor(w[i, ROLLED] * b.teeth / (2 * math.pi))
+                raw = (pulses - w[i, COUNT]) * 2 * math.pi * b.radius / b.teeth / t
+                w[i, COUNT] = pulses
+                w[i, SMOOTH] += min(t / 0.05, 1.0) * (raw - w[i, SMOOTH])
+                said[i] = hit(w[i, SMOOTH], loss[m, i], sat[m, i], held, i)
+                law(w[i], refs[i], said[i], 1.0 if low else b.ratio, room, quiet > 1.2, b)
+        ratio += min(max((1.0 if low else b.ratio) - ratio, -H / 0.3), H / 0.3)
+        for a in range(2):
+            want = hit(us[a], loss[m, 10 + a], sat[m, 10 + a], held, 10 + a)
+            spool[a] += H / 0.04 * (want - spool[a])
+            size = max(abs(spool[a]) - b.steer_dead, 0.0) / (1.0 - b.steer_dead)
+            hand = math.copysign(1.0, spool[a])
+            rates[a] = hand * b.steer_rate * (1.0 + hand * b.asymmetry) * size * (1.0 - 0.15 * math.exp(-abs(v) / 0.2))
+        share = min(
+            1.0, 1.5 * b.steer_rate * engine / max(abs(rates[0]) + abs(rates[1]), 1e-6)
+        )  # priority valve's flow
+        taken = fx = fy = moment = 0.0
+        for a in range(2):
+            rod_v[a] += H / 0.05 * (rates[a] * share - rod_v[a])
+            before = rod[a]
+            rod[a] = min(max(rod[a] + H * rod_v[a], -0.6), 0.6)
+            taken += 0.04 * b.power * abs(rod_v[a]) / b.steer_rate
+            rates[a] = (rod[a] - before) / H
+        for i in range(4):
+            want = hit(w[i, ASKED], loss[m, 6 + i], sat[m, 6 + i], held, 6 + i)
+            torque, power = pump(w[i], parts[i], want, engine, oil, ratio, b)
+            taken += power
+            (lx, ly, off), angle = at[i], rod[i // 2]
+            c, s = math.cos(angle), math.sin(angle)
+            vx, vy = v - r * ly, side + r * lx
+            along, across = vx * c + vy * s - (r + rates[i // 2]) * off, vy * c - vx * s
+            wx = px + math.cos(th) * lx - math.sin(th) * ly
+            wy = py + math.sin(th) * lx + math.cos(th) * ly
+            wet = min(max(1.4 * (math.sin(wx / 4.1 + field[0]) * math.sin(wy / 3.3 + field[1]) - 0.6), 0.0), 0.6)
+            gx, gy = tyre(w[i], parts[i], along, across, load[i], b.grip * (1.0 - wet), b)
+            rub = part_rub(parts[i], w[i, TURN], load[i], wet, b) + 0.04 * abs(torque)
+            rub += 1.5 * b.motor * b.most if quiet > 1.2 else 0.0
+            w[i, TURN] = dry(w[i, TURN], H / b.inertia * (torque - gx * parts[i, RADIUS]), H / b.inertia * rub)
+            w[i, ROLLED] += H * w[i, TURN]
+            bx, by = gx * c - gy * s, gx * s + gy * c
+            fx, fy, moment = fx + bx, fy + by, moment + lx * by - ly * bx - gx * off
+        hx, hy = (
+            b.hill * math.tanh(2 * math.sin(px / b.waves + field[2])),
+            0.6 * b.hill * math.sin(py / b.waves + field[3]),
+        )
+        v += H * (fx / mass - 9.81 * (hx * math.cos(th) + hy * math.sin(th)) + side * r)
+        side += H * (fy / mass - 9.81 * (hy * math.cos(th) - hx * math.sin(th)) - v * r)
+        r += H * moment / (mass * (b.base**2 + b.track**2) / 10)
+        th += H * r
+        px, py = px + H * (v * math.cos(th) - side * math.sin(th)), py + H * (v * math.sin(th) + side * math.cos(th))
+        ax, ay = ax + H / 0.2 * (fx / mass - ax), ay + H / 0.2 * (fy / mass - ay)
+        front = 0.5 + b.cg - 0.12 * loaded[m] - b.height / b.base * ax / 9.81
+        left = 0.5 - b.height / b.track * ay / 9.81
+        for i in range(4):
+            share_y = left if i % 2 else 1.0 - left
+            load[i] = mass * 9.81 * min(max((front if i < 2 else 1.0 - front) * share_y, 0.03), 0.6)
+        engine += H / 0.5 * (1.0 + b.droop * (0.5 - max(taken, 0.0) / b.power) - engine)
+        oil += H * (0.35 * min(max(taken, 0.0) / b.power, 1.0) - 0.001 * (oil - 20.0))
+        if k % 2 == 0:
+            ref[m, :4], ref[m, 4:], given[m, :4], given[m, 4:] = refs, angles, w[:, ASKED], us
+            true[m, :4], true[m, 4:], read[m] = w[:, TURN] * b.radius, rod, said
+            done[m, :4], done[m, 4:] = w[:, SPOOL], spool
+            body[m] = v, side, r, slow_v, bend, engine, max(w[:, PA].max(), w[:, PB].max()), oil, ratio
+    return ref, true, read, given, done, body
 
 
 @nb.njit(cache=True)
-def machine(s: Array, throttle: float, power: float, steering: float, low: bool, b: Build) -> None:
-    """Move engine, oil and displacement by the throttle [of rated speed], the power that pumps take [W] and the gear."""
-    load = max(power, 0.0) / b.power + 0.15 * steering + 0.06
-    given = min(max((throttle * (1.0 + b.droop) - s[ENGINE]) / (2.0 * b.droop * throttle), 0.0), 1.1)
-    s[ENGINE] = max(s[ENGINE] + H / b.governor * (given - load), 0.4)
-    s[OIL] += H * b.warming / 70.0 * (0.6 + min(load, 1.0))
-    step = H / 0.35 * (b.ratio - 1.0)
-    s[RANGE] += min(max((b.ratio if low else 1.0) - s[RANGE], -step), step)
-
-
-@nb.njit(cache=True)
-def steer(x: Array, a: int, want: float, speed: float, engine: float, b: Build) -> float:
-    """Move an axle's valve, rod and wheels; return its flow. A fixed pump on the engine feeds it; wheels that stand scrub."""
-    x[A_PILOT], x[A_SPOOL] = spool_of(x[A_PILOT], x[A_SPOOL], want, 0.0, b)
-    size = max(abs(x[A_SPOOL]) - b.steer_dead, 0.0) / (1.0 - b.steer_dead)
-    hand = math.copysign(1.0, x[A_SPOOL]) * (b.mirrored if a else 1.0)
-    scrub = 0.12 * math.exp(-abs(speed) / 0.2)
-    rate = b.steer_rate * (1.0 + hand * b.asymmetry) * size * min(engine / 0.8, 1.15) * (1.0 - scrub)
-    x[ROD_V] += H / 0.05 * (math.copysign(rate, x[A_SPOOL]) - x[ROD_V])
-    x[ROD] = min(max(x[ROD] + H * x[ROD_V], -0.55), 0.55)
-    x[ANGLE] = min(max(x[ANGLE], x[ROD] - b.play), x[ROD] + b.play)
-    return size
-
-
-@nb.njit(cache=True)
-def rise_of(x: float, y: float, field: Array, b: Build) -> tuple[float, float]:
-    """Slope of the ground along x and y: level stretches, ramps, undulation."""
-    ramp = math.sin(x / b.hill_length + field[0]) + 0.5 * math.sin(y / b.hill_length + field[1])
-    steep = math.copysign(min(max(2.0 * (abs(ramp) - 0.4), 0.0), 1.0), ramp)
-    return b.hill * (0.85 * steep + 0.15 * math.sin(x / 1.3 + field[2])), b.hill * 0.5 * math.sin(y / 3.7 + field[3])
-
-
-@nb.njit(cache=True)
-def ground_of(x: float, y: float, field: Array) -> tuple[float, float]:
-    """How soft and how slick the ground under a wheel is, 0 … 0.7."""
-    wet = math.sin(x / 2.7 + field[4]) + math.sin((x + 2 * y) / 1.9 + field[5]) - 1.1
-    ice = math.sin((x - y) / 4.3 + field[2]) + math.sin((2 * y - x) / 1.4 + field[0]) - 1.3
-    return min(max(wet, 0.0), 0.7), min(max(ice, 0.0), 0.7)
-
-
-@nb.njit(cache=True)
-def loads_of(mass: float, ax: float, ay: float, ahead: float, b: Build, out: Array) -> None:
-    """Loads of the wheels [N] by payload (`ahead` of the middle, of base), accelerations and slopes [m/s²]."""
-    front = 0.5 + b.cg + ahead - b.height / b.base * ax / 9.81
-    left = 0.5 - b.height / b.track * ay / 9.81
-    for i in range(4):
-        share = (front if i < 2 else 1.0 - front) * (left if i % 2 else 1.0 - left)
-        out[i] = mass * 9.81 * min(max(share, 0.02), 0.65)
+def part_rub(part: Array, turn: float, load: float, wet: float, b: Build) -> float:
+    """Friction of motor, bearings and ground [N·m], more at rest than turning."""
+    slow = math.exp(-((turn / 0.1) ** 2))
+    return part[RUB] * b.friction * (1.0 + 0.6 * slow) + b.roll * (1.0 + 2.0 * wet) * load * part[RADIUS]

@@ -1,4 +1,4 @@
-"""What drives the machine of `closed_circuit.py`: encoders counted in windows, frames on a bus, the controller's cycle, and a mission."""
+"""What drives the machine of `geared_circuit.py`: encoders counted in windows, frames on a bus, the controller's cycle, and a mission."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import math
 
 import numba as nb
 import numpy as np
-from closed_circuit_physics import (
+from geared_circuit_physics import (
     A_SPOOL,
     ANGLE,
     ASKED,
