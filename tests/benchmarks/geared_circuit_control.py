@@ -6,6 +6,10 @@ import math
 
 import numba as nb
 import numpy as np
+from electric_control import refs_of
+from electric_physics import angle_of
+from electrohydraulic_physics import hit, places
+from flow_sharing_physics import tyre
 from geared_circuit_physics import (
     A_SPOOL,
     ANGLE,
@@ -32,10 +36,6 @@ from geared_circuit_physics import (
     spool_of,
     steer,
 )  # fmt: skip
-from electric_control import refs_of
-from electric_physics import angle_of
-from electrohydraulic_physics import hit, places
-from flow_sharing_physics import tyre
 
 _REST_S, _RELEASE_S = 1.5, 0.3
 
