@@ -20,16 +20,19 @@ _STILL, _STILL_S = 0.01, 1.0  # m/s; at rest for this long, a gyro shows its bia
 _MOVING = 0.25  # of the top speed
 OFF, LASTING_OFF = 0.06, 0.04  # rad
 _STRAIGHT, _SHORTEST = 0.08, 0.1  # rad, m
-_LEAST_S = 6.0  # of driving straight
+_LEAST_S = 6.0  # of driving straight, or of driving
+_OF_TURN = 0.15  # of a turn, by which its path may be off that by the angles
 ANSWERED = 0.7  # of an angle by which one axle alone is off: tyres give way sideways
 
 
 def yaw_checks(cells: Cells) -> Iterator[Checked]:
-    """Checks of both ends of a machine together; none without a yaw rate, two axles of which one is steered at least, and some driving straight.
+    """Checks of both ends of a machine together; none without a yaw rate, two axles of which one is steered at least, and some driving.
 
-    In turns tyres and the wheels' offsets make the angles an approximation.
+    In turns tyres and the wheels' offsets make the angles an approximation: by a share of the turn that counts for nothing. They are looked
+    at where a mission has hardly any driving straight.
     """
     straight, part = off_straight(cells), Side.SENSOR_OR_ACTUATOR
+    straight = _off_in_turns(cells) if straight is None else straight
     if straight is None:
         return
     windows, lasting = np.abs(cells.frame.mean(straight)), abs(float(np.nanmedian(straight)))
@@ -49,6 +52,14 @@ def off_straight(cells: Cells) -> Array | None:
     return straight if np.count_nonzero(np.isfinite(straight)) * cells.dt >= _LEAST_S else None
 
 
+def _off_in_turns(cells: Cells) -> Array | None:
+    """The same wherever the machine moves, less what a turn may put in, shape (cells,); None for too little."""
+    off = _off_angles(cells)
+    if off is None or np.count_nonzero(np.isfinite(off.angle)) * cells.dt < _LEAST_S:
+        return None
+    return np.asarray(np.sign(off.angle) * np.maximum(np.abs(off.angle) - _OF_TURN * np.abs(off.turn), 0.0))
+
+
 def _ends(machine: Machine) -> dict[float, list[str]]:
     """Axles by their place [m]: wheels that are steered one by one are one where they stand side by side."""
     ends: dict[float, list[str]] = {}
@@ -60,9 +71,10 @@ def _ends(machine: Machine) -> dict[float, list[str]]:
 
 
 class _Off(NamedTuple):
-    """By how much the path is off that by the angles, as an angle of one axle [rad], and where they point straight, shape (cells,)."""
+    """By how much the path is off that by the angles, as an angle of one axle [rad], their turn likewise, and where they point straight, shape (cells,)."""
 
     angle: Array
+    turn: Array
     straight: NDArray[np.bool_]
 
 
@@ -89,4 +101,4 @@ def _off_angles(cells: Cells) -> _Off | None:
     turn = np.tan(angle[:, 0]) - np.tan(angle[:, 1])
     with np.errstate(divide="ignore", invalid="ignore"):
         off = np.where(moving, (yaw - bias) / speed * length - turn, np.nan)
-    return _Off(off, np.abs(turn) < _STRAIGHT)
+    return _Off(off, turn, np.abs(turn) < _STRAIGHT)

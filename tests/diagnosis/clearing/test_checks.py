@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from diagnosis.clearing import yaw
 from diagnosis.clearing.axles import dead_bands
 from diagnosis.clearing.checks import checks_of
 from diagnosis.clearing.measure import off_commands
@@ -114,6 +115,17 @@ def test_an_angle_that_is_off_turns_the_machine() -> None:
     assert not off.passed
     assert "° off its measured angle" in off.text
     assert key not in checks_by_part(driven[0], base=True)
+
+
+def test_an_angle_that_is_off_turns_a_machine_that_never_drives_straight(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(yaw, "_STRAIGHT", 0.0)
+    fault = FaultSpec("rear", Side.SENSOR, FaultMode.OUTSIDE_TABLE, 0.0, LENGTH, 0.02, 7.5)
+    for faults, passed in (((), True), ((fault,), False)):
+        mission = simulate_mission(
+            SimulationOptions(scenario="random", seed=5, duration_s=LENGTH, rate_hz=100.0, faults=faults, imu=True)
+        )
+        found = checks_by_part(_with_yaw_rate(mission), base=False)
+        assert found["rear", "sensor_or_actuator", Check.LASTING_YAW].passed is passed
 
 
 def _with_yaw_rate(mission: SimulatedMission) -> SimulatedMission:
