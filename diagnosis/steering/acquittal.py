@@ -51,6 +51,9 @@ _FAR_MORE = 16.0  # times the usual power of what changes from reading to readin
 _CALM = 0.1  # quantile of stretches of so many readings: in the others they change more often
 _LEFT = 0.5  # of the power between two measurements: what a fault that is believed leaves of it, at most
 _LEAST = {Side.SENSOR: 0.012, Side.ACTUATOR: 0.02}  # rad and of full opening: less is nobody's fault
+_LEAST_NOISE = (
+    0.065  # of full opening: a spool that is slow, or has play, differs by as much from a command that moves fast
+)
 _BELIEVED = 0.5  # of these, where axles move as their model says
 
 
@@ -159,7 +162,8 @@ def _shown(finding: Finding, apart: Array, by: Array, limit: Array, dt: float, *
     if not known.any() or (finding.mode.total and np.mean(known) < _READ):
         return believed or (finding.side is Side.SENSOR and finding.mode is FaultMode.NO_SIGNAL)
     if finding.mode.varying:
-        return _mostly(apart[known] ** 2 > limit[known])
+        small = finding.side is Side.ACTUATOR and not believed and float(np.mean(apart[known] ** 2)) < _LEAST_NOISE**2
+        return not small and _mostly(apart[known] ** 2 > limit[known])
     should = _puts_between(finding, by)
     telling = known & (should**2 > limit)
     if np.count_nonzero(telling) < _TELLING_S / dt:

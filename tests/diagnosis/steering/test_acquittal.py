@@ -205,3 +205,17 @@ def test_an_opening_at_the_mean_of_a_command_that_switches_to_and_fro_is_not_stu
         opening = np.where(at < 20.0, u, level)
         stuck = finding(Side.ACTUATOR, FaultMode.STUCK, round(20.0 / DT), SIZE, 1.0, level)
         assert kept(Side.ACTUATOR, stuck, valve(opening, u)) is named
+
+
+@pytest.mark.parametrize(
+    ("noise", "believed", "named"), [(0.04, False, False), (0.12, False, True), (0.04, True, True)]
+)
+def test_a_spool_that_wanders_little_is_not_disturbed_where_axles_move_otherwise(
+    noise: float, believed: bool, named: bool
+) -> None:
+    u, _ = moved(0.0)
+    part = np.arange(SIZE) >= SIZE // 2
+    opening = u + np.where(part, noise * np.random.default_rng(4).standard_normal(SIZE), 0.0)
+    shaken = finding(Side.ACTUATOR, FaultMode.NOISY, SIZE // 2, SIZE, 0.2)
+    slowly = np.convolve(opening - u, np.ones(20) / 20, "same") * 20**0.5 + u  # slower than a block
+    assert kept(Side.ACTUATOR, shaken, valve(slowly, u), believed=believed) is named
