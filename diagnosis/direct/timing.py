@@ -23,6 +23,11 @@ _FALSE_RESTS = 1e-6  # expected number of such runs in a healthy mission, at mos
 _ROUNDED = 0.8  # of the rounding step: by as much is a coarse reading off what it shows
 _LEAST_SHOWN = 0.02  # quantile of what a channel shows beside 0
 _ALIKE, _HOLDS = 1.5, 20  # speeds that are alike; holds that make a habit
+_STEPS, _OF_VALUE, _FURTHER = (
+    4.0,
+    0.2,
+    6.0,
+)  # rounding steps, share of a reading, times the usual way in a hold: no habit beyond
 _LONG_HOLDS, _BEYOND_HOLDS = 0.98, 2.0  # quantile of holds that is long; times as long as that is no habit
 _SETTLING_LAGS, _OVERSHOOT, _NOISES = 6.0, 0.3, 3.0  # of a valve of higher order; share of its move; times the noise
 _AT_REST = 0.02  # of the largest plausible speed
@@ -149,9 +154,23 @@ def _held_by_habit(found: IdentifiedPair, run: Run) -> bool:
     apart = (start + length <= run.start) | (start >= run.stop)
     size = np.abs(y[start])
     near = length[apart & (size > value / _ALIKE) & (size < value * _ALIKE)]
-    if near.size < _HOLDS:
+    if near.size < _HOLDS or _further(found, run, value, apart):
         return False
     return bool((run.stop - run.start) < _BEYOND_HOLDS * float(np.quantile(near, _LONG_HOLDS)))
+
+
+def _further(found: IdentifiedPair, run: Run, value: float, apart: NDArray[np.bool_]) -> bool:
+    """Whether a wheel turns further, at another speed than its held reading says, than from one reading to the next.
+
+    `value` is that reading, `apart` the other holds: at steady speed a coarse sensor repeats its reading, but that is right.
+    """
+    start, length = found.holds
+    way = np.r_[0.0, np.cumsum(np.abs(np.nan_to_num(found.samples.x)))]
+    others = (way[start + length] - way[start])[apart]
+    moved = others[others > 0.0]
+    off = float(np.nanmedian(np.abs(found.pair.y - found.samples.x)[run.start : run.stop]))
+    away = off > max(_STEPS * found.texture.lsb, _OF_VALUE * value)
+    return away and bool(moved.size) and way[run.stop] - way[run.start] > _FURTHER * float(np.median(moved))
 
 
 def _near_rest(found: IdentifiedPair, run: Run) -> bool:

@@ -123,3 +123,16 @@ def test_what_a_sensors_own_lag_damps_of_a_wheel_that_swings_is_no_noise(noise: 
     samples = Samples.even(y, late, np.full(N, PAIR, dtype=np.int8), p.quiet)
     found = IdentifiedPair(p, Relation(delay=45.0), samples, MODEL, 0.0015, ~p.alive, 0.0)
     assert timing_explains(found, Run(A, A + 2000, 1), FaultMode.NOISY) is expected
+
+
+@pytest.mark.parametrize(("faster", "expected"), [(1.0, True), (1.8, False)])
+def test_a_coarse_reading_is_repeated_at_its_own_speed_alone(faster: float, expected: bool) -> None:
+    """At steady speed a sensor that counts repeats its reading for long; beside a wheel at another speed it does not."""
+    t = np.arange(N) * DT
+    true = 0.4 + 0.15 * np.sin(0.9 * t)
+    steady = (t % 4.0) < 1.2
+    true[steady] = 0.4
+    y = np.round(true / 0.02) * 0.02
+    start, stop = 12_050, 13_150  # of a steady second
+    true[start:stop] *= faster
+    assert explained(pair(Side.SENSOR, y, true), FaultMode.STUCK, start, stop) is expected
