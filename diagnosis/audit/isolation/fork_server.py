@@ -186,16 +186,26 @@ def main(descriptor: int, parent: int, *, warmed: bool) -> None:
     """Entry of the server's process."""
     for number in (signal.SIGINT, signal.SIGHUP):
         signal.signal(number, signal.SIG_IGN)  # the audit decides when it ends
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit(TERMINATED))
+    asked: list[int] = []
+
+    def end(number: int, _: object) -> None:
+        asked.append(number)
+        sys.exit(TERMINATED)
+
+    signal.signal(signal.SIGTERM, end)
     follow(signal.SIGTERM)  # while it does not listen to its socket
     if os.getppid() != parent:
         os._exit(1)
-    importlib.import_module("diagnosis.pipeline")
-    importlib.import_module("diagnosis.output")
-    importlib.import_module("replay.readers.registry").load_readers()
-    if warmed:
-        with suppress(Exception):  # each child then loads what it needs; what is wrong shows there
-            warm()
+    try:
+        importlib.import_module("diagnosis.pipeline")
+        importlib.import_module("diagnosis.output")
+        importlib.import_module("replay.readers.registry").load_readers()
+        if warmed:
+            with suppress(Exception):  # each child then loads what it needs; what is wrong shows there
+                warm()
+    finally:
+        if asked:  # a compiled module that is being imported makes an error of its own of that exit
+            sys.exit(TERMINATED)
     signal.signal(signal.SIGTERM, signal.SIG_IGN)
     follow(0)
     gc.collect()
