@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnosis.estimation.simple_causes import Cause, Measured, causes, power
+from diagnosis.estimation.simple_causes import Cause, Measured, causes, every_power, power
 from diagnosis.results.assessment import Finding
 from diagnosis.results.result import Hypothesis
 from replay.faults import FaultMode, State
@@ -89,6 +89,8 @@ def _cause_of(near: Sequence[Finding], measured: Measured) -> Cause | None:
     at = np.flatnonzero(inside)
     at = at[:: -(-at.size // _MOST)]
     y, x, at = y[at], x[at], first + at
+    if all(f.mode.total for f in near) and _rests(y, np.searchsorted([f.start for f in near], at, "right"), measured):
+        return None
     off = np.abs(y - x)
     big = np.flatnonzero(off > max(_BEYOND * measured.noise, _MARKED * float(np.sqrt(np.mean(off**2)))))
     part = slice(big[0], big[-1] + 1) if big.size else slice(0, 0)
@@ -99,6 +101,13 @@ def _cause_of(near: Sequence[Finding], measured: Measured) -> Cause | None:
         return None
     cause = _explanation(y[part], x[part], at[part], measured)  # a piece that began too early hides what it is
     return replace(cause, start=int(at[part][0])) if cause is not None and cause.alone and not cause.changes else None
+
+
+def _rests(y: Array, piece: NDArray[np.intp], measured: Measured) -> bool:
+    """Whether a channel stays where it is in every piece: it sticks, wherever that is."""
+    number = np.maximum(np.bincount(piece), 1)
+    mean = np.bincount(piece, weights=y) / number
+    return every_power(y - mean[piece], measured) <= measured.noise**2
 
 
 def _from_where_it_shows(cause: Cause, off: Array, x: Array, at: NDArray[np.intp], k: int, measured: Measured) -> Cause:
@@ -119,8 +128,10 @@ def _explanation(y: Array, x: Array, at: NDArray[np.intp], measured: Measured) -
     # what changes with time explains more than what does not, always
     clearly = changing.left <= _NOTHING and steady.left > max(_FAR * changing.left, _FAR_LEFT)
     best = changing if clearly or (steady.left > _LEFT and changing.left < steady.left) else steady
-    others = min((c.left for c in found if c.mode is not best.mode), default=np.inf)
-    stuck = power(y - np.mean(y), measured) / max(power(y - x, measured), 1e-30)
+    # what a rival leaves where something moves counts, beyond what the best cause leaves there
+    others = min((max(c.left, c.moves - best.moves) for c in found if c.mode is not best.mode), default=np.inf)
+    rests = every_power(y - np.mean(y), measured) / max(every_power(y - x, measured), 1e-30)
+    stuck = max(power(y - np.mean(y), measured) / max(power(y - x, measured), 1e-30), rests - best.moves)
     if best.left <= _NOTHING and not best.changes and others <= _NOTHING:
         losses = [c for c in found if c.mode is FaultMode.INEFFICIENT and not c.changes and c.left <= _NOTHING]
         return replace(losses[0], alone=False) if losses else None

@@ -63,6 +63,8 @@ class Cause:
         Its row.
     left : float
         Share of the deviation's power that it leaves [1].
+    moves : float
+        The same with the largest deviations, which the timing of moves makes [1].
     words : str
         What it is.
     epsilon : Epsilon or None
@@ -77,6 +79,7 @@ class Cause:
 
     mode: FaultMode
     left: float
+    moves: float
     words: str
     epsilon: Epsilon | None = None
     changes: bool = False
@@ -98,46 +101,50 @@ def causes(y: Array, x: Array, at: NDArray[np.intp], measured: Measured) -> Iter
         Channel and reference whole.
     """
     off = y - x
-    whole = max(power(off, measured), 1e-30)
+    whole, every = max(power(off, measured), 1e-30), max(every_power(off, measured), 1e-30)
+
+    def left(rest: Array) -> tuple[float, float]:
+        return power(rest, measured) / whole, every_power(rest, measured) / every
+
     reference = measured.names[1]
     offset = float(np.mean(off))
     if abs(offset) >= measured.least:
         more = "more" if offset > 0.0 else "less"
         yield Cause(
             FaultMode.OUTSIDE_TABLE,
-            power(off - offset, measured) / whole,
+            *left(off - offset),
             f"It reads {amount(abs(offset), measured.unit, 2)} {more} than {reference} all through it, whatever that is: an offset.",
         )
     gain = float(x @ y) / float(x @ x)
-    yield _loss(power(y - gain * x, measured) / whole, (gain, gain), measured)
+    yield _loss(left(y - gain * x), (gain, gain), measured)
     when = (at - at[0]) * measured.dt
     shapes = np.column_stack([x, x * when])
     (start, slope), *_ = np.linalg.lstsq(shapes, y, rcond=None)
     ends = (float(start), float(start + slope * when[-1]))
-    yield _loss(power(y - shapes @ np.array([start, slope]), measured) / whole, ends, measured)
+    yield _loss(left(y - shapes @ np.array([start, slope])), ends, measured)
     line = np.column_stack([np.ones(at.size), when])
     drift, *_ = np.linalg.lstsq(line, off, rcond=None)
     yield Cause(
         FaultMode.OUTSIDE_TABLE,
-        power(off - line @ drift, measured) / whole,
+        *left(off - line @ drift),
         f"It departs from {reference} by {amount(float(drift[1]), measured.unit, 2)} a second, whatever that is: a drift.",
         changes=True,
     )
     late = []
     for delay in np.linspace(0.0, _LATEST_S, _DELAYS)[1:]:
         before = measured.x[np.maximum(at - round(delay / measured.dt), 0)]
-        late.append((power(y - np.where(np.isfinite(before), before, x), measured) / whole, float(delay)))
-    left, delay = min(late)
+        late.append((*left(y - np.where(np.isfinite(before), before, x)), float(delay)))
+    *least, delay = min(late)
     yield Cause(
         FaultMode.OUTSIDE_TABLE,
-        left,
+        *least,
         f"It comes {1e3 * delay:.0f} ms after {reference}: a delay.",
         changes=True,
         late=True,
     )
 
 
-def _loss(left: float, gains: tuple[float, float], measured: Measured) -> Cause:
+def _loss(left: tuple[float, float], gains: tuple[float, float], measured: Measured) -> Cause:
     """A gain that is steady or changes from the one to the other."""
     channel, reference = measured.names
     table = all(-_ABOUT <= g <= 1.0 + _ABOUT for g in gains)
@@ -147,7 +154,7 @@ def _loss(left: float, gains: tuple[float, float], measured: Measured) -> Cause:
     share = f"{gains[0]:.2f}" if steady else f"{gains[0]:.2f} at first and {gains[1]:.2f} at last"
     return Cause(
         mode,
-        left,
+        *left,
         f"{channel} is {share} of {reference} all through it.",
         Epsilon(0.5 * (low + high), low - _ABOUT, high + _ABOUT),
         changes=not steady,
@@ -159,3 +166,8 @@ def power(off: Array, measured: Measured) -> float:
     squared = off**2
     most = int(_USUAL * squared.size)
     return max(float(np.mean(np.partition(squared, most)[:most])) - (_OWN * measured.noise) ** 2, 0.0)
+
+
+def every_power(off: Array, measured: Measured) -> float:
+    """Mean square of a deviation, shape (k,), beyond what healthy noise has, with its largest [unit²]."""
+    return max(float(np.mean(off**2)) - (_OWN * measured.noise) ** 2, 0.0)

@@ -136,3 +136,13 @@ def test_noise_beside_a_loss_is_noise() -> None:
     disturbed = 0.015 * np.convolve(RNG.standard_normal(SIZE), np.exp(-np.arange(200) / 40.0), "same") / 4.5
     near = pieces(((1000, 2400, FaultMode.NOISY),))
     assert with_one_cause(near, measured(lambda x: 0.6 * x + disturbed)) == near
+
+
+def test_a_channel_that_is_held_again_and_again_is_stuck_each_time() -> None:
+    spans = [(k, k + 300) for k in (500, 1400, 2300, 3200)]
+    y = X.copy()
+    for a, b in spans:
+        y[a:b] = X[a]
+    near = pieces([(a, b, FaultMode.STUCK) for a, b in spans])
+    one = Measured(y, X, np.ones(SIZE, np.bool_), DT, ("a", "b"), "m/s", NOISE, 0.02)
+    assert with_one_cause(near, one) == near
