@@ -134,10 +134,11 @@ def causes(y: Array, x: Array, at: NDArray[np.intp], measured: Measured) -> Iter
     for delay in np.linspace(0.0, _LATEST_S, _DELAYS)[1:]:
         before = measured.x[np.maximum(at - round(delay / measured.dt), 0)]
         late.append((*left(y - np.where(np.isfinite(before), before, x)), float(delay)))
-    *least, delay = min(late)
+    least, moves, delay = min(late)
     yield Cause(
         FaultMode.OUTSIDE_TABLE,
-        *least,
+        least,
+        moves,
         f"It comes {1e3 * delay:.0f} ms after {reference}: a delay.",
         changes=True,
         late=True,
