@@ -8,6 +8,7 @@ from dataclasses import replace
 
 from diagnosis.clearing.axles import axle_checks
 from diagnosis.clearing.cells import Cells
+from diagnosis.clearing.jumps import jump_checks
 from diagnosis.clearing.wheels import wheel_checks
 from diagnosis.clearing.yaw import yaw_checks
 from diagnosis.results.clearing import Checked
@@ -52,5 +53,10 @@ def checks_of(cells: Cells, words: MachineWords) -> tuple[Checked, ...]:
     clear_at = cells.machine.limits.clear_at
     with warnings.catch_warnings():  # windows without any value
         warnings.simplefilter("ignore", RuntimeWarning)
-        found = (*wheel_checks(cells, clear_at), *axle_checks(cells, clear_at), *yaw_checks(cells))
+        found = (
+            *wheel_checks(cells, clear_at),
+            *axle_checks(cells, clear_at),
+            *yaw_checks(cells),
+            *jump_checks(cells, clear_at),
+        )
     return tuple(replace(c, words=words) for c in found)

@@ -4,7 +4,7 @@ What a part does per opening is compared with the other wheels without any model
 deviation of several times what stands against an all-clear, of one wheel alone, is a fault of its sensor or its valve. Where several
 deviate, the one that does not follow its command, which all others do, is what they drag along; else nobody knows which of them
 are healthy. An axle that stands still while it is commanded is one likewise. A steering
-angle that is far off its second measurement is its sensor's fault, whatever the kind.
+angle that is far off its second measurement, or jumps, is its sensor's fault, whatever the kind.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ import numpy as np
 
 from diagnosis.clearing.backwards import without_findings
 from diagnosis.clearing.cells import Cells
+from diagnosis.clearing.jumps import fault_of_jumps
 from diagnosis.clearing.responses import Limits, measured_twice, speeds_follow_openings, usual_limits
 from diagnosis.clearing.untold_faults import fault_of_angle, fault_of_axle, fault_of_wheel
 from diagnosis.results.assessment import CODE, Assessment, Finding
@@ -55,6 +56,8 @@ def what_stands_out(checks: Sequence[Checked], cells: Cells, words: MachineWords
     """
     found = {check.component: fault_of_angle(check, cells) for check in checks if _off_second_angle(check)}
     found |= {check.component: fault_of_axle(check, cells) for check in checks if _does_not_answer(check, cells)}
+    jumping = {c.component: fault_of_jumps(c, cells) for c in checks if c.check is Check.JUMP and not c.passed}
+    found |= {component: fault for component, fault in jumping.items() if fault is not None}
     if (wheel := _alone(checks, cells)) is not None:
         found[wheel.component] = fault_of_wheel(wheel, cells, alone=True)
     elif not _stated(cells) and (wheel := _alone_not_following(checks, cells)) is not None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,6 +19,7 @@ from diagnosis.results.vocabulary import Tier
 from replay.faults import FaultMode, Side, State
 
 _P = 0.93  # on tuning missions of nine machines 23 of 24 were faults of the part that is named, ...
+_P_ABOVE = 0.75  # of a wheel that is too quick: all others may be too slow instead
 # ... of which these shares were of the row that it looks like, and of others
 _ROWS = {
     FaultMode.INEFFICIENT: {
@@ -79,7 +81,7 @@ def fault_of_wheel(check: Checked, cells: Cells, *, alone: bool) -> Finding:
         )
     )
     sizes = Epsilon(float(middle), float(min(low, high)), float(max(low, high)))
-    return _finding((start, stop), mode, sizes, (text, _UNTOLD))
+    return finding_of((start, stop), mode, sizes, (text, _UNTOLD), p=_P if below else _P_ABOVE)
 
 
 _UNTOLD = (
@@ -98,7 +100,7 @@ def fault_of_axle(check: Checked, cells: Cells) -> Finding:
         f"moves from {100 * check.limit:.0f}{{percent}} on."
     )
     least = max(0.0, 1.0 - check.limit / check.worst)  # what is left of the command moves no axle
-    return _finding((start, stop), FaultMode.NO_SIGNAL, Epsilon(1.0, least, 1.0), (text, _UNTOLD))
+    return finding_of((start, stop), FaultMode.NO_SIGNAL, Epsilon(1.0, least, 1.0), (text, _UNTOLD))
 
 
 def fault_of_angle(check: Checked, cells: Cells) -> Finding:
@@ -117,28 +119,49 @@ def fault_of_angle(check: Checked, cells: Cells) -> Finding:
         if constant
         else f"by {amount(float(np.sqrt(np.nanmean(apart**2))), 'rad', 2)} (root mean square)."
     )
-    found = _finding((start, stop), FaultMode.OUTSIDE_TABLE, None, (text, _NO_ROW), side=Side.SENSOR)
+    found = finding_of((start, stop), FaultMode.OUTSIDE_TABLE, None, (text, _NO_ROW), side=Side.SENSOR)
     return replace(found, tier=Tier.DIRECT)
 
 
 _NO_ROW = "No row of the tables explains that: an offset, a wrong scale, or both."
 
 
-def _finding(
+def finding_of(
     span: tuple[int, int],
     mode: FaultMode,
     size: Epsilon | None,
     evidence: tuple[str, ...],
     side: Side = Side.SENSOR_OR_ACTUATOR,
+    rows_by: Mapping[FaultMode, float] | None = None,
+    p: float = _P,
 ) -> Finding:
-    rows = tuple(Hypothesis(side.value, row.value, _P * share) for row, share in _ROWS[mode].items())
+    """A fault that no model found.
+
+    Parameters
+    ----------
+    span : tuple[int, int]
+        Samples [start, stop).
+    mode : FaultMode
+        The row that it looks like.
+    size : Epsilon or None
+        Loss [1].
+    evidence : tuple[str, ...]
+        Sentences, with the machine's words to fill in.
+    side : Side
+        Of which it is.
+    rows_by : Mapping[FaultMode, float] or None
+        How its probability is shared among rows, that of `mode` first; None: as is usual for such a mode.
+    p : float
+        Of a fault of that side.
+    """
+    rows = tuple(Hypothesis(side.value, row.value, p * share) for row, share in (rows_by or _ROWS[mode]).items())
     return Finding(
         start=span[0],
         stop=span[1],
         side=side,
         mode=mode,
         probability=rows[0].p,
-        hypotheses=(*rows, Hypothesis("none", State.HEALTHY.value, 1.0 - _P)),
+        hypotheses=(*rows, Hypothesis("none", State.HEALTHY.value, 1.0 - p)),
         epsilon=size,
         sat=None,
         evidence=evidence,

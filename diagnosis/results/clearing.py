@@ -31,6 +31,7 @@ class Check(StrEnum):
     PLANT_RATE = "plant_rate"
     YAW = "yaw"
     LASTING_YAW = "lasting_yaw"
+    JUMP = "jump"
 
 
 #: What a check compares, and what is said where it is beyond its limit; ``{part}`` and ``{value}`` are filled in, and the
@@ -93,6 +94,10 @@ CHECK_WORDS: dict[Check, tuple[str, str]] = {
         "yaw rate against that by the steering angles, over the mission",
         "the machine turns as if the {part} axle were {value} off its measured angle over the mission",
     ),
+    Check.JUMP: (
+        "jumps of the angle",
+        "the angle of the {part} axle jumps by {value}, quicker than it can be steered",
+    ),
 }
 
 
@@ -113,7 +118,7 @@ class Checked:
     check : Check
         What was asked.
     worst : float or None
-        Largest value [1, seconds for `Check.DELAY`, radians for the yaw rate]; None: the mission does not show it.
+        Largest value [1, seconds for `Check.DELAY`, radians for the yaw rate and jumps]; None: the mission does not show it.
     limit : float
         From here on the part is not cleared.
     start_s, stop_s : float or None
@@ -182,7 +187,7 @@ def share_covered(start_s: float, stop_s: float, fault: tuple[float, float]) -> 
 
 def size_words(check: str, value: float) -> str:
     """A value of a check in its unit. By the check: a share [1], rad, rad/s or m/s."""
-    if check in (Check.YAW, Check.LASTING_YAW):
+    if check in (Check.YAW, Check.LASTING_YAW, Check.JUMP):
         return f"{math.degrees(value):.1f}°"
     return f"{value:.2f} s" if check == Check.DELAY else f"{100 * min(value, 9.99):.0f} %"
 

@@ -15,6 +15,7 @@ from diagnosis.results.limited import limited
 from diagnosis.steering.blocks import SteeringBlocks
 from diagnosis.steering.findings import SideFindings
 from diagnosis.steering.inputs import AxleInputs
+from diagnosis.steering.jumps import as_sensors, of_sensor
 from replay.faults import FaultMode, Side
 
 _SHAKEN = 2.0  # times the usual power of what changes from reading to reading
@@ -31,6 +32,7 @@ _LEAST_USUAL_S = 5.0  # for which a reading must be known without its fault
 _DISTURBED = 0.6  # probability of noise behind an opening that nobody measured: none of 10 was right on tuning seeds
 _BURST_S = 0.6  # length at which half of the bursts of noise are what a model leaves out of a motion
 _PAUSE_S = 0.12  # likewise of a side that does nothing: a reading that did not change, a valve about its middle
+_HABIT_S, _OFTEN, _HABIT = 1.0, 3, 0.4  # pauses no longer than this, more than so many, are a habit of this probability
 _PAUSE = "As brief as this, it may be a reading that did not change, or what the model leaves out, which makes it less probable."
 _BURST = "Noise as brief as this may be what the model leaves out of a motion, which makes it less probable."
 _UNSEEN = "Where no opening is logged, a disturbance of the {valve} looks like what the model leaves out, which makes it less probable."
@@ -68,6 +70,12 @@ def not_denied(
         obeyed = [f for f in valve.findings if f.mode.total and _denies(*_span(f, blocks), blocks, max_steer)]
         kept = tuple(f for f in valve.findings if f not in obeyed)
         valve = valve._replace(findings=kept, unexplained=(*valve.unexplained, *(_span(f, blocks) for f in obeyed)))
+        jumping = of_sensor(valve.findings, inputs.angle, inputs.fresh, inputs.timeline.dt)
+        if jumping and not inputs.angle_redundant:
+            valve = valve._replace(findings=tuple(f for f in valve.findings if f not in jumping))
+            own = out[Side.SENSOR]
+            moved = sorted((*own.findings, *(as_sensors(f) for f in jumping)), key=lambda f: f.start)
+            out[Side.SENSOR] = own._replace(findings=tuple(moved))
         findings = tuple(limited(f, _DISTURBED, _UNSEEN) if f.mode is FaultMode.NOISY else f for f in valve.findings)
         out[Side.ACTUATOR] = valve._replace(findings=findings)
     twice = {Side.SENSOR: inputs.angle_redundant, Side.ACTUATOR: inputs.valve_redundant}
@@ -80,12 +88,23 @@ def not_denied(
 def _not_brief(findings: tuple[Finding, ...], dt: float, *, twice: bool) -> tuple[Finding, ...]:
     """Findings; brief noise is no more probable than it is elsewhere, nor is a brief pause of what is not measured `twice`."""
     out = []
+    pauses = [
+        f
+        for f in findings
+        if f.mode is FaultMode.STUCK and f.side is Side.SENSOR and (f.stop - f.start) * dt < _HABIT_S
+    ]
     for f in findings:
         seconds = (f.stop - f.start) * dt
         half, why = (_BURST_S, _BURST) if f.mode is FaultMode.NOISY else (_PAUSE_S, _PAUSE)
         brief = seconds**2 / (seconds**2 + half**2)
-        out.append(
+        told = (
             limited(f, f.probability * brief, why) if f.mode is FaultMode.NOISY or (f.mode.total and not twice) else f
+        )
+        often = not twice and len(pauses) > _OFTEN and any(f is p for p in pauses)
+        out.append(
+            limited(told, _HABIT, f"The reading pauses {len(pauses)} times in this mission: that is its habit.")
+            if often
+            else told
         )
     return tuple(out)
 

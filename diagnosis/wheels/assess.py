@@ -21,11 +21,13 @@ from diagnosis.wheels.filter_identification import joint_model
 from diagnosis.wheels.findings import Weighed, WheelFindings, WheelPath, findings_of
 from diagnosis.wheels.following import Following, follow
 from diagnosis.wheels.frames.features import mission_features
+from diagnosis.wheels.frozen import with_frozen
 from diagnosis.wheels.inputs import WheelsData
 from diagnosis.wheels.looks import second_look
 from diagnosis.wheels.many_weak import without_many_weak
 from diagnosis.wheels.models import ODD, JointModel, WheelFilterModel
 from diagnosis.wheels.own_swings import with_open_side
+from diagnosis.wheels.quick_noise import with_shaken
 from diagnosis.wheels.readings import with_readings
 from diagnosis.wheels.run_kernel import evidence_of_runs
 from diagnosis.wheels.shared_swings import without_shared
@@ -74,8 +76,9 @@ def assess_wheels(data: WheelsData, limits: Limits, *, gains: bool) -> WheelsJud
         for i, wheel in enumerate(model.wheels)
         if wheel is not None
     }
-    swings = without_shared(paths, {i: with_open_side(path, findings_of(path, limits)) for i, path in paths.items()})
-    doubted = without_many_weak(swings.found)
+    found = {i: with_open_side(path, findings_of(path, limits)) for i, path in paths.items()}
+    swings = without_shared(paths, with_shaken(paths, found))
+    doubted = without_many_weak(with_frozen(data, swings.found))
     out = {}
     for i, path in paths.items():
         sensor, actuator = _assessments(data, i, path, doubted.found[i], gains=gains)

@@ -18,10 +18,15 @@ from replay.faults import FaultMode, Side, State
 
 Array = NDArray[np.float64]
 
-_LEAST_HZ, _CYCLES = 1.0, 8
+_LEAST_HZ = 1.0
+_PIECE_S, _ENOUGH = 2.5, 0.8  # looked at by itself, for a frequency may wander; share of it that is enough
 _BAND, _FLAT = 0.25, 2.2  # about a frequency, to either side; times what lies there of white noise
-_SHARE, _OF_ALL = 0.5, 0.35  # of the power that lies there: of what is not slower than the least, and of all
-_PIECE = 16  # cycles of the slowest swing, that are looked at together: it may wander
+_SHARE, _SHARE_OF_FEW, _OF_ALL = (
+    0.58,
+    0.65,
+    0.3,
+)  # of the power that lies there: of what is not slower than the least, and of all
+_FEW = 4  # pieces
 _P = 0.85  # that it is a fault, and no way of the machine
 
 
@@ -35,21 +40,32 @@ def swing_hz(off: Array, dt: float) -> float | None:
     dt : float
         Step [s].
     """
-    length = min(off.size, round(_PIECE / (_LEAST_HZ * dt)))
-    if length * dt * _LEAST_HZ < _CYCLES / 4:
+    length = round(_PIECE_S / dt)
+    if off.size < _ENOUGH * length or length * dt * _LEAST_HZ < 2.0:
         return None
-    n = off.size // length
-    pieces = np.nan_to_num(off[: n * length]).reshape(n, length)
-    t = np.linspace(-1.0, 1.0, length)
-    pieces = pieces - pieces.mean(axis=1, keepdims=True) - np.outer(pieces @ t / (t @ t), t)
-    power = np.mean(np.abs(np.fft.rfft(pieces * np.hanning(length), axis=1)) ** 2, axis=0)
-    f = np.fft.rfftfreq(length, dt)
-    whole = float(power.sum())
-    power[f < _LEAST_HZ] = 0.0
+    length = min(length, off.size)
+    off = np.nan_to_num(off)
+    found = np.array(
+        [_strongest(off[k : k + length], dt) for k in range(0, off.size - length + 1, max(1, length // 2))]
+    )
+    hz, share, of_all, of_white = np.median(found, axis=0)
+    least = max(_SHARE if len(found) >= _FEW else _SHARE_OF_FEW, _FLAT * of_white)
+    return float(hz) if hz > _LEAST_HZ and share > least and of_all > _OF_ALL else None
+
+
+def _strongest(piece: Array, dt: float) -> tuple[float, float, float, float]:
+    """The strongest frequency [Hz], and the share of the power about it: of what is not slower than the least, of all, and of white noise [1]."""
+    t = np.linspace(-1.0, 1.0, piece.size)
+    piece = piece - piece.mean() - t * float(piece @ t) / float(t @ t)
+    power, f = np.abs(np.fft.rfft(piece * np.hanning(piece.size))) ** 2, np.fft.rfftfreq(piece.size, dt)
+    whole, quick = float(power.sum()), f >= _LEAST_HZ
+    power = np.where(quick, power, 0.0)
+    total = float(power.sum())
+    if total <= 0.0:
+        return 0.0, 0.0, 0.0, 0.0
     at = float(f[int(np.argmax(power))])
-    near = np.abs(f - at) <= _BAND * at
-    least = max(max(_SHARE, _FLAT * float(np.mean(near))) * float(power.sum()), _OF_ALL * whole)
-    return at if at * length * dt >= _CYCLES and float(power[near].sum()) > least else None
+    near = quick & (np.abs(f - at) <= _BAND * at)
+    return at, float(power[near].sum()) / total, float(power[near].sum()) / whole, float(near.sum() / quick.sum())
 
 
 def with_open_side(path: WheelPath, found: WheelFindings) -> WheelFindings:
@@ -75,16 +91,21 @@ def _opened(finding: Finding, path: WheelPath, expected: Array) -> Finding:
     hz = swing_hz(path.y[part] - expected[part], path.dt)
     if hz is None:
         return finding
+    return opened(
+        finding,
+        f"It swings at {hz:.2g} Hz: the {{wheel}} may really do so, as where a loop, a tyre or a valve hunts, or its sensor may read so.",
+    )
+
+
+def opened(finding: Finding, why: str) -> Finding:
+    """A noisy finding whose side is left open, with the sentence that says why."""
     p = min(_P, sum(h.p for h in finding.hypotheses if h.mode != State.HEALTHY.value))
     return replace(
         finding,
         side=Side.SENSOR_OR_ACTUATOR,
         probability=p,
         hypotheses=_hypotheses(p),
-        evidence=(
-            f"It swings at {hz:.2g} Hz: the {{wheel}} may really do so, as where a loop, a tyre or a valve hunts, or its sensor may read so.",
-            *finding.evidence,
-        ),
+        evidence=(why, *finding.evidence),
     )
 
 

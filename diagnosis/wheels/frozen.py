@@ -1,0 +1,143 @@
+"""A speed that stays at one value to the last digit while the machine moves on: its sensor is frozen, whatever a model makes of it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from diagnosis.results.assessment import Finding
+from diagnosis.results.result import Epsilon, Hypothesis, Sat
+from diagnosis.results.vocabulary import Tier
+from diagnosis.wheels.findings import WheelFindings
+from diagnosis.wheels.inputs import WheelsData
+from replay.faults import FaultMode, Side, State
+
+Array = NDArray[np.float64]
+
+_LEAST_S, _READINGS = 0.5, 20  # of one value, and readings at the channel's usual rate
+_LONGER = 2.5  # times the longest other run of one value, that is not this value
+_TURNS, _OF_MOST = (
+    0.02,
+    0.97,
+)  # of the largest speed: a reading of a wheel that turns; of its own largest: an end of its range
+_OPENED, _MOVED = 0.1, 0.05  # of full opening, of the largest speed: something else changes meanwhile
+_STEPS = 4.0  # of the reading, by which others move at least
+_INSIDE = 0.5  # of a finding's time
+_P, _VALVE = 0.96, 0.02  # that the sensor is frozen, and that its valve is
+
+
+class Frozen(NamedTuple):
+    """Samples [start, stop) in which a speed stays at a value [m/s], and the longest other run of one value [s]."""
+
+    start: int
+    stop: int
+    value: float
+    usual_s: float
+
+
+def frozen_of(y: Array, span: float, dt: float) -> list[Frozen]:
+    """Runs of one value that are far longer than the channel's own.
+
+    Parameters
+    ----------
+    y : Array, shape (n,)
+        Speed [m/s]; NaN where unknown.
+    span : float
+        Largest plausible speed [m/s].
+    dt : float
+        Step [s].
+    """
+    same = np.diff(y) == 0.0
+    edge = np.flatnonzero(np.diff(np.r_[False, same, False].astype(np.int8)))
+    starts, stops = edge[::2], edge[1::2] + 1
+    if not starts.size:
+        return []
+    value, length = y[starts], (stops - starts) * dt
+    turns = np.abs(value) > _TURNS * span
+    size = np.abs(y)
+    changes = np.flatnonzero(np.diff(y) != 0.0)
+    usual = float(np.median(np.diff(changes))) * dt if changes.size > 1 else dt
+    out = []
+    for k in np.flatnonzero(turns & (length >= max(_LEAST_S, _READINGS * usual))):
+        beside = np.r_[size[: starts[k]], size[stops[k] :]]
+        if np.abs(value[k]) >= _OF_MOST * float(np.nanmax(beside, initial=-1.0)) >= 0.0:
+            continue  # the end of its range
+        longest = float(np.max(length[turns & (value != value[k])], initial=usual))
+        if length[k] >= _LONGER * longest:
+            out.append(Frozen(int(starts[k]), int(stops[k]), float(value[k]), longest))
+    return out
+
+
+def with_frozen(data: WheelsData, found: Mapping[int, WheelFindings]) -> dict[int, WheelFindings]:
+    """Findings in which frozen sensors are told as such; what models say of such a time instead is left out.
+
+    Parameters
+    ----------
+    data : WheelsData
+        Channels.
+    found : Mapping[int, WheelFindings]
+        By wheel.
+    """
+    held = {i: frozen_of(data.y[:, i], data.span, data.dt) for i in found}
+    out = {}
+    for i, wheel in found.items():
+        own = [r for r in held[i] if _moves_on(data, i, r) and not _all_held(held, i, r)]
+        findings = [f for f in wheel.findings if not any(_inside(f, r) for r in own)] + [_told(data, i, r) for r in own]
+        out[i] = replace(wheel, findings=sorted(findings, key=lambda f: f.start)) if own else wheel
+    return out
+
+
+def _moves_on(data: WheelsData, i: int, r: Frozen) -> bool:
+    """Whether the valve's opening, or the speed of most other wheels, changes meanwhile."""
+    part = slice(r.start, r.stop)
+    steps = np.abs(np.diff(data.y[:, i]))
+    step = float(np.min(steps[steps > 0.0], initial=np.inf))
+    others = np.delete(data.y[part], i, axis=1)
+    with np.errstate(invalid="ignore"):
+        moved = [float(np.nanquantile(c, 0.95) - np.nanquantile(c, 0.05)) for c in others.T if np.isfinite(c).any()]
+    opening = data.u[part, i]
+    opening = opening[np.isfinite(opening)]
+    opened = float(np.quantile(opening, 0.95) - np.quantile(opening, 0.05)) if opening.size else 0.0
+    far = max(_MOVED * data.span, _STEPS * step if np.isfinite(step) else 0.0)
+    return opened > _OPENED or bool(moved and float(np.median(moved)) > far)
+
+
+def _all_held(held: Mapping[int, list[Frozen]], i: int, r: Frozen) -> bool:
+    """Whether most other wheels stay at one value meanwhile, too: their log does."""
+    others = [any(_common(r, o) > _INSIDE * (r.stop - r.start) for o in held[j]) for j in held if j != i]
+    return bool(others) and sum(others) >= len(others) / 2
+
+
+def _common(a: Frozen, b: Frozen) -> int:
+    return min(a.stop, b.stop) - max(a.start, b.start)
+
+
+def _inside(f: Finding, r: Frozen) -> bool:
+    return min(f.stop, r.stop) - max(f.start, r.start) > _INSIDE * (f.stop - f.start)
+
+
+def _told(data: WheelsData, i: int, r: Frozen) -> Finding:
+    name = data.names[i][0]
+    return Finding(
+        start=r.start,
+        stop=r.stop,
+        side=Side.SENSOR,
+        mode=FaultMode.STUCK,
+        probability=_P,
+        hypotheses=(
+            Hypothesis(Side.SENSOR.value, FaultMode.STUCK.value, _P),
+            Hypothesis(Side.ACTUATOR.value, FaultMode.STUCK.value, _VALVE),
+            Hypothesis("none", State.HEALTHY.value, 1.0 - _P - _VALVE),
+        ),
+        epsilon=Epsilon(1.0, 1.0, 1.0),
+        sat=Sat(r.value, abs(r.value), r.value, r.value, "m/s"),
+        evidence=(
+            f"{name} stays at {r.value:.3g} m/s to the last digit for {(r.stop - r.start) * data.dt:.2f} s; the longest that it "
+            f"stays at another value is {r.usual_s:.2f} s.",
+        ),
+        tier=Tier.MODEL,
+    )
