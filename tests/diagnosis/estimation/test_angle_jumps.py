@@ -1,0 +1,77 @@
+"""A steering angle jumps where it changes quicker than any axle turns for a while: not where it is noisy, rare, held, or late."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from diagnosis.estimation.angle_jumps import Jumps, jumps_of, quickest_of, readings
+
+DT, N = 0.01, 6_000
+T = np.arange(N) * DT
+FRESH = np.ones(N, dtype=np.bool_)
+
+
+def turned(seed: int = 1, noise: float = 5e-4) -> np.ndarray:
+    """An axle that is turned to and fro at 0.3 rad/s at most."""
+    target = 0.4 * np.sign(np.sin(2 * np.pi * T / 20.0))
+    angle = np.zeros(N)
+    for k in range(1, N):
+        angle[k] = angle[k - 1] + np.clip(target[k] - angle[k - 1], -0.3 * DT, 0.3 * DT)
+    return angle + noise * np.random.default_rng(seed).standard_normal(N)
+
+
+def found(angle: np.ndarray, fresh: np.ndarray = FRESH, dt: float = DT) -> Jumps:
+    quickest = quickest_of(readings(angle, fresh, dt))
+    assert quickest is not None
+    return jumps_of(readings(angle, fresh, dt), quickest)
+
+
+def test_a_loss_jumps_where_it_begins_and_ends() -> None:
+    angle = turned()
+    angle[3500:3900] *= 0.6
+    jumps = found(angle)
+    assert {round(t, 1) for t in jumps.at_s} == {35.0, 39.0}
+    assert jumps.size.max() == pytest.approx(0.16, rel=0.1)
+    assert (jumps.of == 0.24).all()
+
+
+@pytest.mark.parametrize("noise", [0.0, 5e-4, 5e-3])
+def test_an_axle_that_turns_does_not(noise: float) -> None:
+    assert found(turned(noise=noise)).size.size == 0
+
+
+def test_single_wild_readings_are_none() -> None:
+    angle = turned()
+    angle[[1000, 2500, 4000]] += 0.3
+    assert found(angle).size.size == 0
+
+
+def test_held_and_rounded_readings_are_none() -> None:
+    angle = np.round(turned(noise=0.0)[np.arange(N) // 2 * 2] / 0.002) * 0.002
+    assert found(angle).size.size == 0
+
+
+def test_what_happened_in_a_gap_is_not_known() -> None:
+    angle, fresh = turned(), FRESH.copy()
+    fresh[3450:3500] = False
+    angle[3500:] += 0.2
+    assert found(angle, fresh).size.size == 0
+
+
+def test_a_whole_turn_is_the_same_angle() -> None:
+    angle = turned()
+    angle[3500:] += 2 * np.pi
+    assert found(angle).size.size == 0
+
+
+def test_rare_readings_show_nothing() -> None:
+    assert quickest_of(readings(turned(), FRESH, 0.1)) is None
+
+
+def test_blocks_do_not_hide_a_jump(monkeypatch: pytest.MonkeyPatch) -> None:
+    angle = turned()
+    angle[3000:3300] *= 0.6
+    whole = found(angle)
+    monkeypatch.setattr("replay.arrays.blocks.BLOCK", 1500)
+    assert {round(t, 2) for t in found(angle).at_s} == {round(t, 2) for t in whole.at_s}

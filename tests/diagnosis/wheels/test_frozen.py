@@ -1,0 +1,92 @@
+"""A speed that stays at one value to the last digit, far longer than it ever does, is frozen."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from diagnosis.results.assessment import Finding
+from diagnosis.results.result import Hypothesis
+from diagnosis.results.vocabulary import Tier
+from diagnosis.wheels.findings import WheelFindings
+from diagnosis.wheels.frozen import frozen_of, with_frozen
+from replay.faults import FaultMode, Side
+
+DT, N, SPAN = 0.01, 6_000, 3.0
+T = np.arange(N) * DT
+
+
+def speeds(seed: int = 1) -> np.ndarray:
+    """Four wheels that speed up and slow down, to 5 mm/s."""
+    rng = np.random.default_rng(seed)
+    v = 1.0 + 0.6 * np.sin(2 * np.pi * T / 15.0)[:, np.newaxis] + 0.004 * rng.standard_normal((N, 4))
+    return np.asarray(np.round(v / 0.005) * 0.005)
+
+
+def data(y: np.ndarray) -> Any:
+    return SimpleNamespace(y=y, u=0.3 * y, span=SPAN, dt=DT, names=[(f"wheel.{w}.v", "u") for w in "abcd"])
+
+
+def found(y: np.ndarray, *findings: Finding) -> list[Finding]:
+    """What is told of the first wheel."""
+    before = {i: WheelFindings(findings=list(findings) if i == 0 else []) for i in range(4)}
+    after = with_frozen(data(y), before)
+    assert all(after[i] is before[i] for i in range(1, 4)) or findings == ()
+    return after[0].findings
+
+
+def valve(start: int, stop: int) -> Finding:
+    rows = (Hypothesis("actuator", FaultMode.STUCK, 0.9), Hypothesis("none", "healthy", 0.1))
+    return Finding(start, stop, Side.ACTUATOR, FaultMode.STUCK, 0.9, rows, None, None, (), Tier.MODEL)
+
+
+@pytest.mark.parametrize("spells", [1, 5])
+def test_a_frozen_speed_is_told_as_the_sensors_whatever_a_model_says(spells: int) -> None:
+    y, starts = speeds(), [100 + 750 * k for k in range(spells)]
+    for start in starts:
+        y[start : start + 300, 0] = 0.7
+    told = found(y, valve(starts[0] + 10, starts[0] + 290), valve(5800, 5900))
+    assert [(f.side, f.mode) for f in told[:-1]] == [(Side.SENSOR, FaultMode.STUCK)] * spells
+    assert [f.start for f in told[:-1]] == starts
+    assert told[-1].side is Side.ACTUATOR
+    assert sum(h.p for h in told[0].hypotheses) == pytest.approx(1.0)
+
+
+def test_coarse_readings_at_a_steady_speed_are_a_habit() -> None:
+    y = np.repeat(np.round((1.0 + 0.6 * np.sin(2 * np.pi * T[::100] / 15.0))[:, np.newaxis], 2), 100, axis=0)
+    assert found(np.repeat(y, 4, axis=1)[:N]) == []
+
+
+def test_a_speed_at_the_end_of_its_range_or_at_rest_is_not_frozen() -> None:
+    y = speeds()
+    y[:, 0] = np.minimum(y[:, 0], 1.3)
+    y[2000:2400, 0] = 0.0
+    assert found(y) == []
+
+
+def test_where_all_are_held_the_log_is() -> None:
+    y = speeds()
+    y[2000:2400] = y[2000]
+    assert found(y) == []
+
+
+def test_where_nothing_else_moves_nothing_is_told() -> None:
+    y = speeds()
+    y[2000:2400] = y[2000] + 0.005 * np.round(np.random.default_rng(2).standard_normal((400, 4)))
+    y[2000:2400, 0] = 0.8
+    assert found(y) == []
+
+
+def test_a_sensor_that_is_frozen_for_the_whole_mission() -> None:
+    y = speeds()
+    y[:, 0] = 0.7
+    assert [(r.start, r.stop) for r in frozen_of(y[:, 0], SPAN, DT)] == [(0, N)]
+    assert found(y)[0].stop == N
+
+
+def test_gaps_and_nothing() -> None:
+    assert frozen_of(np.full(N, np.nan), SPAN, DT) == []
+    assert frozen_of(np.zeros(0), SPAN, DT) == []
