@@ -86,7 +86,8 @@ def with_frozen(data: WheelsData, found: Mapping[int, WheelFindings]) -> dict[in
     out = {}
     for i, wheel in found.items():
         own = [r for r in held[i] if _moves_on(data, i, r) and not _all_held(held, i, r)]
-        findings = [f for f in wheel.findings if not any(_inside(f, r) for r in own)] + [_told(data, i, r) for r in own]
+        findings = [f for f in wheel.findings if not any(_inside(f, r) for r in own)]
+        findings += [_told(data, i, r) for r in own if not any(_says_so(f, r) for f in findings)]
         out[i] = replace(wheel, findings=sorted(findings, key=lambda f: f.start)) if own else wheel
     return out
 
@@ -118,6 +119,12 @@ def _common(a: Frozen, b: Frozen) -> int:
 
 def _inside(f: Finding, r: Frozen) -> bool:
     return min(f.stop, r.stop) - max(f.start, r.start) > _INSIDE * (f.stop - f.start)
+
+
+def _says_so(f: Finding, r: Frozen) -> bool:
+    """Whether a longer finding says already that the sensor is stuck."""
+    same = (f.side, f.mode) == (Side.SENSOR, FaultMode.STUCK)
+    return same and min(f.stop, r.stop) - max(f.start, r.start) > _INSIDE * (r.stop - r.start)
 
 
 def _told(data: WheelsData, i: int, r: Frozen) -> Finding:
