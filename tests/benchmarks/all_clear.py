@@ -32,6 +32,7 @@ import closed_circuit
 import electric
 import electrohydraulic
 import flow_sharing
+import forwarder
 import geared_circuit
 import hydrostatic
 import numpy as np
@@ -52,7 +53,10 @@ from replay.simulation.structures import STRUCTURES, StructureOptions
 TIERS = ("base", "spool", "direct")
 FIRST = {"tuning": 0, "reporting": 2000}
 DEFAULT = "default"
-OTHERS = {m.NAME: m for m in (hydrostatic, electrohydraulic, electric, flow_sharing, closed_circuit, geared_circuit)}
+OTHERS = {
+    m.NAME: m
+    for m in (hydrostatic, electrohydraulic, electric, flow_sharing, closed_circuit, geared_circuit, forwarder)
+}
 _SURE = 0.9
 _DRIVEN, _STEERED = 0.06, 0.02  # m/s, rad/s
 _DRIVEN_S, _STEERED_S = 3.0, 1.0
@@ -282,7 +286,7 @@ def main() -> None:
         "--machine",
         nargs="+",
         default=None,
-        help="default, structures, foreign, hydrostatic, electrohydraulic, electric, flow_sharing, closed_circuit, geared_circuit",
+        help="default, structures, foreign, hydrostatic, electrohydraulic, electric, flow_sharing, closed_circuit, geared_circuit, forwarder",
     )
     parser.add_argument("--duration", type=float, default=75.0, help="length of a mission [s]")
     parser.add_argument("--every", type=int, default=1, help="one of so many kinds of trouble")
