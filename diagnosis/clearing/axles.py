@@ -20,7 +20,7 @@ Flags = NDArray[np.bool_]
 
 FLOOR_RAD, OPENING = 0.06, 0.03  # deviations are shares of at least this angle and opening
 _STILL_S, _STILL, _ANSWERED = 1.0, 0.015, 0.06  # s, rad/s, and of full opening
-_OVERLAP, _ALIKE = 0.13, 1.4  # of full opening: healthy valves open by then; times what another axle needs
+_OVERLAP, _ALIKE = 0.18, 1.4  # of full opening: healthy valves open by then; times what another axle needs
 _HYSTERESIS = 0.03  # of full opening: by as much a valve opens later than it closes
 _END, _REACHED = 0.97, 0.5  # of the largest angle: an end stop, where that is as much of the machine's
 _RATE_S = 8.0
@@ -28,7 +28,7 @@ _STEERED = 0.01  # of full opening beyond the dead band: below it, an axle is no
 _LEAST_S = 0.5  # of a window, in which it is steered
 _WRONG_WAY = 5.0  # for an axle that turns against its opening
 _UNSURE, _EDGE = 0.02, 0.5  # by how much a dead band is not known: of full opening, and of itself
-_STEPS = 14  # dead bands that are tried
+_STEPS = 19  # dead bands that are tried
 VALVE = 1.4  # dead band and hysteresis of a healthy valve: its limit, likewise
 #: Limits of the rate in windows and over the mission, as multiples of the loss that counts, by whether angle and opening are measured twice.
 RATE = {False: (2.0, 1.0), True: (3.0, 2.0)}

@@ -28,7 +28,9 @@ FLOOR = 0.16  # of the top speed: a deviation is a share of at least this
 OPENING = 0.03  # of full opening: likewise
 ROUGH, _ROUGHER = 0.15, 5.0  # quick changes: share of the speed, times those of the other wheels
 LATE_S = 0.2
-CARRIED = float(np.exp(-LEAST_SEEN))  # of its speed: a wheel that the ground gives more shows no loss of its valve
+CARRIED = float(
+    np.exp(-2.0 * LEAST_SEEN)
+)  # of its speed: the ground gives a wheel more, and a partial loss of its valve stays hidden
 _TRACKING, _TRACKING_ALONE = 0.35, 0.12  # at most, and at least where the other wheels follow much better
 _SLOWER = 3.0  # times the deviation of the others' valves, or speeds: a slow one
 VALVE = 1.4  # dead band and hysteresis of a healthy valve: the limit as a multiple of the loss that counts

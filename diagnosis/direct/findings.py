@@ -42,6 +42,8 @@ _LEFT_S = (
 )
 _AS_TRUE = 0.03  # of what a sensor measures: as far off may a healthy one be
 _LOST = 0.03  # of the span: as far from its command a healthy valve rests within its dead band
+_HYSTERESIS, _RESTS_S = 0.025, 10.0  # of the span, off a healthy valve's command, for no longer than this
+_MIDDLE, _MOSTLY = 0.04, 0.98  # of the span: about its middle a valve opens nothing; of the time
 _ZERO = 0.01  # of the span: as far apart may two healthy instruments have their zero
 _ALIKE_P = 0.3  # probability of each of two rows that a constant cannot tell
 _ONE_GAIN, _SAME_P = 0.05, 0.95  # of a gain; that a share which is lost elsewhere too is one
@@ -134,7 +136,7 @@ def finding_of(run: Run, found: IdentifiedPair, limits: Limits) -> Finding | Non
     if mode is None:
         return None
     pair, run, p = found.pair, isolated.run, isolated.p
-    if p[HEALTHY] > p[run.row]:
+    if p[HEALTHY] > p[run.row] or _hysteresis(isolated, found):
         return None
     epsilon, sat, _ = isolated.estimate
     if epsilon is not None and mode is not FaultMode.OUTSIDE_TABLE:
@@ -165,6 +167,17 @@ def finding_of(run: Run, found: IdentifiedPair, limits: Limits) -> Finding | Non
         evidence=lines,
         tier=Tier.DIRECT,
     )
+
+
+def _hysteresis(isolated: Isolated, found: IdentifiedPair) -> bool:
+    """Whether a valve rests about its middle where it is told to, or is off its command by no more than its hysteresis for a while."""
+    pair, run, seen = found.pair, isolated.run, isolated.seen
+    if pair.side is not Side.ACTUATOR or not seen.use.any():
+        return False
+    brief = (run.stop - run.start) * pair.dt < _RESTS_S
+    both = np.maximum(np.abs(seen.y[seen.use]), np.abs(seen.x[seen.use]))
+    rests = float(np.nanquantile(both, _MOSTLY)) < _MIDDLE * pair.span
+    return rests or (brief and seen.deviation < _HYSTERESIS * pair.span)
 
 
 def _as_beside(finding: Finding, all_of_them: Sequence[Finding], found: IdentifiedPair) -> Finding:

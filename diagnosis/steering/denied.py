@@ -32,6 +32,8 @@ _LEAST_USUAL_S = 5.0  # for which a reading must be known without its fault
 _DISTURBED = 0.6  # probability of noise behind an opening that nobody measured: none of 10 was right on tuning seeds
 _BURST_S = 0.6  # length at which half of the bursts of noise are what a model leaves out of a motion
 _PAUSE_S = 0.12  # likewise of a side that does nothing: a reading that did not change, a valve about its middle
+_TREMOR = 0.004  # rad: noise of less is no fault
+_MIDDLE, _MOSTLY = 0.04, 0.98  # of full opening: about its middle a valve opens nothing; of the time
 _HABIT_S, _OFTEN, _HABIT = 1.0, 3, 0.4  # pauses no longer than this, more than so many, are a habit of this probability
 _PAUSE = "As brief as this, it may be a reading that did not change, or what the model leaves out, which makes it less probable."
 _BURST = "Noise as brief as this may be what the model leaves out of a motion, which makes it less probable."
@@ -61,11 +63,15 @@ def not_denied(
         denied = [
             f
             for f in sensor.findings
-            if (f.mode is FaultMode.NOISY and shaken_power(blocks, *_span(f, blocks)) < _SHAKEN * usual)
+            if (
+                f.mode is FaultMode.NOISY and shaken_power(blocks, *_span(f, blocks)) < max(_SHAKEN * usual, _TREMOR**2)
+            )
             or (f.mode.total and _trembles(f, inputs))
         ]
         kept = tuple(f for f in sensor.findings if f not in denied)
         out[Side.SENSOR] = SideFindings(kept, (*sensor.unexplained, *(_span(f, blocks) for f in denied)))
+    valve = _asked(valve, inputs, blocks)
+    out[Side.ACTUATOR] = valve
     if not inputs.valve_redundant:
         obeyed = [f for f in valve.findings if f.mode.total and _denies(*_span(f, blocks), blocks, max_steer)]
         kept = tuple(f for f in valve.findings if f not in obeyed)
@@ -83,6 +89,19 @@ def not_denied(
         side: one._replace(findings=_not_brief(one.findings, inputs.timeline.dt, twice=twice[side]))
         for side, one in out.items()
     }
+
+
+def _asked(valve: SideFindings, inputs: AxleInputs, blocks: SteeringBlocks) -> SideFindings:
+    """A valve's findings without those of times in which it rests about its middle, as it is told to."""
+    resting = [f for f in valve.findings if f.mode.total and _rests(f, inputs)]
+    kept = tuple(f for f in valve.findings if f not in resting)
+    return valve._replace(findings=kept, unexplained=(*valve.unexplained, *(_span(f, blocks) for f in resting)))
+
+
+def _rests(f: Finding, inputs: AxleInputs) -> bool:
+    every = [inputs.values(leaf)[f.start : f.stop] for leaf in ("u", "u_applied") if leaf in inputs.logged]
+    largest = [float(np.nanquantile(np.abs(u), _MOSTLY)) for u in every if np.isfinite(u).any()]
+    return bool(largest) and max(largest) < _MIDDLE
 
 
 def _not_brief(findings: tuple[Finding, ...], dt: float, *, twice: bool) -> tuple[Finding, ...]:

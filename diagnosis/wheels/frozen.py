@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.results.assessment import Finding
+from diagnosis.results.limited import limited
 from diagnosis.results.result import Epsilon, Hypothesis, Sat
 from diagnosis.results.vocabulary import Tier
 from diagnosis.wheels.findings import WheelFindings
@@ -27,6 +28,8 @@ _TURNS, _OF_MOST = (
 _OPENED, _MOVED = 0.1, 0.05  # of full opening, of the largest speed: something else changes meanwhile
 _STEPS = 4.0  # of the reading, by which others move at least
 _INSIDE = 0.5  # of a finding's time
+_CHANGING, _CERTAIN, _TREMBLING = 0.1, 0.9, 0.45  # of the readings; a finding as sure stays, others are no surer
+_TREMBLES = "Its last digits go on changing, which those of a stuck sensor rarely do."
 _P, _VALVE = 0.96, 0.02  # that the sensor is frozen, and that its valve is
 
 
@@ -86,9 +89,9 @@ def with_frozen(data: WheelsData, found: Mapping[int, WheelFindings]) -> dict[in
     out = {}
     for i, wheel in found.items():
         own = [r for r in held[i] if _moves_on(data, i, r) and not _all_held(held, i, r)]
-        findings = [f for f in wheel.findings if not any(_inside(f, r) for r in own)]
+        findings = [_alive(f, data.y[:, i]) for f in wheel.findings if not any(_inside(f, r) for r in own)]
         findings += [_told(data, i, r) for r in own if not any(_says_so(f, r) for f in findings)]
-        out[i] = replace(wheel, findings=sorted(findings, key=lambda f: f.start)) if own else wheel
+        out[i] = replace(wheel, findings=sorted(findings, key=lambda f: f.start))
     return out
 
 
@@ -119,6 +122,15 @@ def _common(a: Frozen, b: Frozen) -> int:
 
 def _inside(f: Finding, r: Frozen) -> bool:
     return min(f.stop, r.stop) - max(f.start, r.start) > _INSIDE * (f.stop - f.start)
+
+
+def _alive(f: Finding, y: Array) -> Finding:
+    """A stuck sensor is less sure where its last digits go on changing."""
+    if (f.side, f.mode) != (Side.SENSOR, FaultMode.STUCK) or f.probability >= _CERTAIN:
+        return f
+    known = y[f.start : f.stop]
+    changes = np.diff(known[np.isfinite(known)]) != 0.0
+    return limited(f, _TREMBLING, _TREMBLES) if changes.size and float(np.mean(changes)) > _CHANGING else f
 
 
 def _says_so(f: Finding, r: Frozen) -> bool:

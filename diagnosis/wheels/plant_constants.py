@@ -20,6 +20,7 @@ _TRIMMED = 3.0  # by which what believed windows leave stands for all healthy on
 _OWN_WINDOWS = 12.0  # that weigh as much as the machine's map when a wheel's own is fitted
 _MOST_GRIP = 60.0
 _SEEN = 0.99
+_LEAST_GAIN = 1e-3  # of the largest speed, at full opening
 _LEAST_SHARE = 0.03  # of the body in a wheel's speed: below, it runs free
 
 
@@ -124,7 +125,7 @@ def _plant(
     speeds = np.r_[-sides[1][0][:0:-1], sides[0][0]]
     unseen = np.r_[-sides[1][1][:0:-1], sides[0][1]]
     K = 0.5 * float(np.interp(seen, openings, speeds) - np.interp(-seen, openings, speeds)) / seen
-    if K <= 0:
+    if not _LEAST_GAIN * span <= K:  # a reading that is held goes with no opening
         return None
     lag = best.lag * (1.0 + grip)
     load, wander = _unexplained(drives, i, values, best, healthy=healthy)

@@ -34,7 +34,7 @@ def found(y: np.ndarray, *findings: Finding) -> list[Finding]:
     """What is told of the first wheel."""
     before = {i: WheelFindings(findings=list(findings) if i == 0 else []) for i in range(4)}
     after = with_frozen(data(y), before)
-    assert all(after[i] is before[i] for i in range(1, 4)) or findings == ()
+    assert all(after[i].findings == [] for i in range(1, 4))
     return after[0].findings
 
 

@@ -11,14 +11,14 @@ import pytest
 from diagnosis.results.result import Hypothesis
 from diagnosis.wheels.findings import WheelFindings
 from diagnosis.wheels.many_weak import without_many_weak
-from replay.faults import Side
+from replay.faults import FaultMode, Side
 
 PART = slice(200, 400)
 
 
-def finding(healthy: float) -> Any:
+def finding(healthy: float, side: Side = Side.ACTUATOR) -> Any:
     said = (Hypothesis("actuator", "stuck", 1.0 - healthy), Hypothesis("none", "healthy", healthy))
-    return SimpleNamespace(start=PART.start, stop=PART.stop, hypotheses=said)
+    return SimpleNamespace(start=PART.start, stop=PART.stop, hypotheses=said, side=side, mode=FaultMode.STUCK)
 
 
 def wheels(*healthy: float | None) -> dict[int, WheelFindings]:
@@ -48,9 +48,21 @@ def test_a_certain_finding_stays_where_the_others_may_respond_to_it() -> None:
     assert [len(w.findings) for w in got.found.values()] == [1, 0, 0, 0]
 
 
-@pytest.mark.parametrize("healthy", [(0.1, 0.2, None, None), (0.1, 0.1, 0.1, None, None, None), (0.0, 0.0, 0.1, 0.1)])
+@pytest.mark.parametrize("healthy", [(0.1, None, None, None), (0.0, 0.1, None, None), (0.0, 0.0, 0.1, 0.1)])
 def test_fewer_weak_ones_or_several_certain_ones_stay(healthy: tuple[float | None, ...]) -> None:
     before = wheels(*healthy)
     got = without_many_weak(before)
     assert got.found == before
     assert got.sentence == ""
+
+
+def test_two_weak_ones_of_the_same_time_share_a_cause() -> None:
+    got = without_many_weak(wheels(0.1, 0.2, None, None))
+    assert got.wheels == 2
+    assert [len(w.findings) for w in got.found.values()] == [0, 0, 0, 0]
+
+
+def test_two_weak_ones_of_other_sides_stay() -> None:
+    before = wheels(0.1, 0.2, None, None)
+    before[1].findings[0] = finding(0.2, Side.SENSOR)
+    assert without_many_weak(before).found == before
