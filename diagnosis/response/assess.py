@@ -57,7 +57,7 @@ Flags = NDArray[np.bool_]
 _AT_A_JUMP = 0.1, 0.3  # probability that a fault begins, or ends, where the channel jumps
 _MOVES = 0.4  # of the driving speed: enough to see whether a channel lives
 _OWN, _OTHERS = 4, 2  # holds of a channel that may be faults: of the one in question, and of each other
-_LEAST_S = 1.0
+_LEAST_S, _TURNS_S = 1.0, 10.0
 _LEAST_OTHERS = 2  # wheels that answer, beside one that does not
 _BODY_COMMANDS = 2  # speed and yaw rate
 
@@ -137,7 +137,8 @@ def assess_response(
     asked = {w: _asked(j, limits) for w, j in judged.items()}
     kept = {w: where_asked(spells, asked[w], least) for w, spells in kept.items()}
     kept = {w: until_back(spells, judged[w].wheel.blocks.dead, asked[w]) for w, spells in kept.items()}
-    kept = {w: [s for s in spells if not stands_with_all(s, w, judged, asked)] for w, spells in kept.items()}
+    meant = {w: asked[w] | _commanded(j, limits, width) for w, j in judged.items()}
+    kept = {w: [s for s in spells if not stands_with_all(s, w, judged, meant)] for w, spells in kept.items()}
     turning = turning_of(judged, geometry, bodies.yaw if not sideways else None)
     kept = {w: [s._replace(turns=turns_with(w, s, judged, turning)) for s in spells] for w, spells in kept.items()}
     together = held_back_together(judged)
@@ -171,7 +172,8 @@ def assess_response(
         powers = powers._replace(rows=(*powers.rows, delay))
         parts[w] = replace(sensor, powers=powers, notes=(*sensor.notes, told, *remarks)), drive
     gyro = wrong_gyro(judged, kept, turning, width * dt)
-    return Judgement(parts, (*standstills(idle, dt), *(astray if lasts else ())), gyro)
+    ignored = () if any(j.response.answered for j in judged.values()) else unexplained(drives, limits, dt)
+    return Judgement(parts, (*standstills(idle, dt), *(astray if lasts else ()), *ignored), gyro)
 
 
 def _turned_by(wheel: str, found: Mapping[str, Judged]) -> bool:
@@ -209,9 +211,10 @@ def _wheels(
         y, (samples, found) = d.y, channels[w]
         if found is None and not several:  # of two wheels the other one shows what a command makes
             found = as_a_peer(w, d.commands, answers, geometry, cell * dt)
-        if found is None and not several and np.isfinite(d.commands).any():
+        ignored = not answers and len(data) > 1 and _turns(y, limits, dt)
+        if found is None and not several and not ignored and np.isfinite(d.commands).any():
             continue
-        # a wheel that alone makes nothing of its command is judged by the others, and by its channel
+        # a wheel that makes nothing of its command, alone or as all do, is judged by the others, and by its channel
         response = without_command(-(-y.size // cell)) if found is None else found
         if response.answered and samples.wild.any():
             around = response.reach(d.commands, cell, dt, y.size)
@@ -221,10 +224,15 @@ def _wheels(
         if response.answered:
             moves = np.maximum(np.maximum(np.abs(blocks.low), np.abs(blocks.high)), moves)
         driving = moves > _MOVES * limits.driving_speed
-        jumps, calm = jumps_of(samples, blocks, width)
+        jumps, calm = jumps_of(samples, blocks, width, dt)
         wheel = Wheel(d.name, samples, blocks, jumps, dt, "")
         out[w] = Judged(d, response, wheel, driving, np.zeros((0, STATES)), [], None, calm, alone=len(data) == 1)
     return out
+
+
+def _turns(y: Array, limits: Limits, dt: float) -> bool:
+    """Whether a wheel turns for long enough to show how its channel reads."""
+    return bool(np.count_nonzero(np.abs(np.nan_to_num(y)) > limits.driving_speed) * dt >= _TURNS_S)
 
 
 def _response(y: Array, samples: Samples, data: FollowerData, cell: int, limits: Limits, dt: float) -> Response | None:
@@ -279,6 +287,11 @@ def _habit(wheel: str, holds: Mapping[str, Array]) -> float:
     """How long healthy channels stay at one value [s]: some holds may be faults, fewer of them another wheel's."""
     longest = [x[k] for w, x in holds.items() if x.size > (k := _OWN if w == wheel else _OTHERS)]
     return float(max(longest, default=0.0))
+
+
+def _commanded(one: Judged, limits: Limits, width: int) -> Flags:
+    """Blocks in which the log itself asks the wheel to move, whatever the drive makes of that elsewhere, shape (b,)."""
+    return np.asarray(np.abs(np.nan_to_num(cells(one.data.asked, width))) > _MOVES * limits.driving_speed)
 
 
 def _asked(one: Judged, limits: Limits) -> Flags:

@@ -12,28 +12,63 @@ from diagnosis.results.assessment import Finding
 from diagnosis.results.result import Epsilon
 from replay.faults import FaultMode
 
+Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 _SPIKE_GAP_S, _LEAST_SPIKES = 10.0, 3
+_BEYOND, _LEAP = (
+    3.0,
+    100.0,
+)  # times the largest speed of the driving; m/s² there and back: no wheel does that, be it once
+_IMPOSSIBLE_P = 0.97, 0.99  # that the sensor is at fault, by one such reading and by two
 _LOST_DRIVING_S = 1.0
 
 
-def spikes_of(wheel: Wheel) -> list[Finding]:
-    """Findings of wild readings that come again and again; none where those of the other wheels do, too."""
+def spikes_of(wheel: Wheel, y: Array, driving_speed: float) -> list[Finding]:
+    """Findings of wild readings that come again and again, or that no wheel can make; none where those of the other wheels do, too.
+
+    Parameters
+    ----------
+    wheel : Wheel
+        The wheel.
+    y : Array, shape (n,)
+        Its readings, the wild ones too [m/s].
+    driving_speed : float
+        Speed from which a wheel drives [m/s].
+    """
     if not wheel.spiky:
         return []
     places = wheel.samples.step[wheel.samples.wild]
+    beyond = _impossible(wheel, y, driving_speed)
     groups = np.split(places, np.flatnonzero(np.diff(places) * wheel.dt > _SPIKE_GAP_S) + 1) if places.size else []
     out = []
     for group in groups:
-        if group.size < _LEAST_SPIKES:
+        few = int(np.count_nonzero(np.isin(group, beyond)))
+        if group.size >= _LEAST_SPIKES:
+            p, why = 0.97, "and no machine moves like that"
+        elif few:
+            p, why = _IMPOSSIBLE_P[few - 1], "further than any wheel can be set going and stopped between two readings"
+        else:
             continue
+        number = "1 reading" if group.size == 1 else f"{group.size} readings"
         text = (
-            f"Spikes: {group.size} readings of {wheel.name} within {(group[-1] - group[0]) * wheel.dt:.1f} s are far off those "
-            "before and after them, and no machine moves like that."
+            f"Spikes: {number} of {wheel.name} within {(group[-1] - group[0] + 1) * wheel.dt:.1f} s "
+            f"{'is' if group.size == 1 else 'are'} far off those before and after, {why}."
         )
-        out.append(sensor_finding(int(group[0]), int(group[-1]) + 1, FaultMode.NOISY, 0.97, None, None, (text,)))
+        out.append(sensor_finding(int(group[0]), int(group[-1]) + 1, FaultMode.NOISY, p, None, None, (text,)))
     return out
+
+
+def _impossible(wheel: Wheel, y: Array, driving_speed: float) -> NDArray[np.intp]:
+    """Steps of wild readings far beyond all others, reached and left by an acceleration that no wheel has; shape (k,)."""
+    samples = wheel.samples
+    value = y[samples.step]
+    top = float(np.nanmax(np.abs(samples.value), initial=0.0)) if np.isfinite(samples.value).any() else 0.0
+    pause = np.diff(samples.step) * wheel.dt
+    change = np.abs(np.diff(value)) / pause
+    leap = np.minimum(np.r_[np.inf, change], np.r_[change, np.inf])
+    least = _BEYOND * max(top, driving_speed)
+    return np.asarray(samples.step[samples.wild & (np.abs(value) > least) & (leap > _LEAP)])
 
 
 def lost_of(wheel: Wheel, lost: Sequence[tuple[int, int]], driving: Flags) -> list[Finding]:

@@ -16,6 +16,10 @@ _SEARCH_S = 2.5
 _CALM = 0.15  # of the top speed: by as much may the expected speed change around a calm moment
 _STRONG, _LEAST = 2.0, 0.08  # times what a calm sample changes by (99 of 100); of the top speed
 _DEAD_S, _DEAD, _SUDDEN = 0.8, 5, 3.0  # around a beginning; readings; times what its readings change by (99 of 100)
+_RAMP_S, _SHARE = (
+    0.6,
+    0.6,
+)  # around a jump, and of the change in that time that it makes: less is a step of a ramp, read now and then
 _ALIKE = 1.35  # by which the ratio of a jump may differ from the deviation's
 
 
@@ -34,17 +38,30 @@ class Jumps(NamedTuple):
     ratio: Array
 
 
-def jumps_of(samples: Samples, blocks: Blocks, width: int) -> tuple[Jumps, NDArray[np.bool_]]:
-    """Jumps in calm moments, and which blocks are calm, shape (b,)."""
+def jumps_of(samples: Samples, blocks: Blocks, width: int, dt: float) -> tuple[Jumps, NDArray[np.bool_]]:
+    """Jumps in calm moments, and which blocks are calm, shape (b,). `width` are the steps of a block, `dt` is a step [s]."""
     top = float(np.nanquantile(np.abs(samples.value), 0.99)) if samples.value.size else 0.0
     calm = (blocks.high - blocks.low) < _CALM * top
     there = calm[np.minimum(samples.step // width, calm.size - 1)]
     size = np.abs(np.nan_to_num(samples.change))
     usual = float(np.quantile(size[there], 0.99)) if there.any() else top
     place = np.flatnonzero(there & (size > max(_STRONG * usual, _LEAST * top)))
+    place = place[_alone(samples, place, dt)]
     before = samples.value[place] - samples.change[place]
     with np.errstate(divide="ignore", invalid="ignore"):
         return Jumps(place, np.where(before != 0.0, samples.value[place] / before, np.inf)), calm
+
+
+def _alone(samples: Samples, place: NDArray[np.intp], dt: float) -> NDArray[np.bool_]:
+    """Which jumps, shape (k,), are most of how the readings change around them, rather than one step of a ramp."""
+    out = np.ones(place.size, np.bool_)
+    for i, k in enumerate(place.tolist()):
+        first, last = np.searchsorted(samples.step, samples.step[k] + np.array([-1, 1]) * round(_RAMP_S / dt))
+        before, after = samples.value[first:k], samples.value[k : last + 1]
+        if np.isfinite(before).any() and np.isfinite(after).any():
+            whole = np.nanmedian(after[-3:]) - np.nanmedian(before[:3])
+            out[i] = samples.change[k] * whole <= 0.0 or abs(samples.change[k]) >= _SHARE * abs(whole)
+    return out
 
 
 def onset_of(jumps: Jumps, samples: Samples, at: int, ratio: float, dt: float) -> int | None:

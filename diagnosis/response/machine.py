@@ -20,7 +20,10 @@ Flags = NDArray[np.bool_]
 
 _LASTING = 0.8  # of what the other wheels make of the same command: over a whole mission no slip or load does that
 _NEAR = 0.5, 2.0  # of its command: what any healthy drive makes of it
-_UNMADE, _UNMADE_S = 0.6, 10.0  # of its command, and commanded time, below which nothing is made of a command
+_UNMADE, _UNMADE_S = (
+    0.6,
+    10.0,
+)  # of its command, or it of that, and commanded time: nothing like the command is made of it
 _ELSEWHERE, _ELSEWHERE_S = 0.35, 1.5  # of the top speed: all drives that far off their commands, for so long
 _STATE_S = 4.0  # of that, from which on it is worth a verdict
 
@@ -99,7 +102,8 @@ def unexplained(drives: Sequence[FollowerData], limits: Limits, dt: float) -> tu
             return ()
         asked.append(float(np.median(np.abs(d.asked[driven]))))
         made.append(float(np.median(np.abs(d.y[driven]))))
-    if not made or max(m / a for m, a in zip(made, asked, strict=True)) > _UNMADE:
+    shares = [m / a for m, a in zip(made, asked, strict=True)]
+    if not shares or not (max(shares) <= _UNMADE or min(shares) >= 1.0 / _UNMADE):
         return ()
     return (
         f"The drives were commanded to {np.median(asked):.2g} {{speed_unit}} and made {np.median(made):.2g} {{speed_unit}} of it (medians), and "
