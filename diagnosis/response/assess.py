@@ -57,7 +57,7 @@ Flags = NDArray[np.bool_]
 _AT_A_JUMP = 0.1, 0.3  # probability that a fault begins, or ends, where the channel jumps
 _MOVES = 0.4  # of the driving speed: enough to see whether a channel lives
 _OWN, _OTHERS = 4, 2  # holds of a channel that may be faults: of the one in question, and of each other
-_LEAST_S, _TURNS_S = 1.0, 10.0
+_LEAST_S, _TURNS_S = 1.0, 5.0
 _LEAST_OTHERS = 2  # wheels that answer, beside one that does not
 _BODY_COMMANDS = 2  # speed and yaw rate
 
@@ -211,7 +211,8 @@ def _wheels(
         y, (samples, found) = d.y, channels[w]
         if found is None and not several:  # of two wheels the other one shows what a command makes
             found = as_a_peer(w, d.commands, answers, geometry, cell * dt)
-        ignored = not answers and len(data) > 1 and _turns(y, limits, dt)
+        # wheels of one body, that is: joints which are each commanded by themselves have nothing to do with each other
+        ignored = not answers and len(data) > 1 and d.commands.shape[1] >= _BODY_COMMANDS and _turns(y, limits, dt)
         if found is None and not several and not ignored and np.isfinite(d.commands).any():
             continue
         # a wheel that makes nothing of its command, alone or as all do, is judged by the others, and by its channel
@@ -226,7 +227,9 @@ def _wheels(
         driving = moves > _MOVES * limits.driving_speed
         jumps, calm = jumps_of(samples, blocks, width, dt)
         wheel = Wheel(d.name, samples, blocks, jumps, dt, "")
-        out[w] = Judged(d, response, wheel, driving, np.zeros((0, STATES)), [], None, calm, alone=len(data) == 1)
+        others = tuple(o.y for k, o in data.items() if k != w)
+        start = np.zeros((0, STATES))
+        out[w] = Judged(d, response, wheel, driving, start, [], None, calm, alone=not others, others=others)
     return out
 
 

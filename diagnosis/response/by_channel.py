@@ -1,4 +1,4 @@
-"""What a channel shows by its readings alone: wild ones, and none."""
+"""What a channel shows by its readings alone: wild ones, none, and a fall to 0 that no wheel makes."""
 
 from __future__ import annotations
 
@@ -22,6 +22,13 @@ _BEYOND, _LEAP = (
 )  # times the largest speed of the driving; m/s² there and back: no wheel does that, be it once
 _IMPOSSIBLE_P = 0.97, 0.99  # that the sensor is at fault, by one such reading and by two
 _LOST_DRIVING_S = 1.0
+_DEAD_S, _OTHERS_MOVE = 2.0, 0.7  # of one reading of 0, and of that time in which another wheel turns
+_TURNING, _SUDDEN = (
+    2.0,
+    3.0,
+)  # driving speeds before it; times what readings change by while the wheel turns (99 of 100)
+_LEAST_TURNING = 100  # readings of a turning wheel
+_BREAKS_OFF_P = 0.85, 0.93  # that something is wrong, by one end of it that comes at once and by both
 
 
 def spikes_of(wheel: Wheel, y: Array, driving_speed: float) -> list[Finding]:
@@ -91,4 +98,46 @@ def lost_of(wheel: Wheel, lost: Sequence[tuple[int, int]], driving: Flags) -> li
         out.append(
             sensor_finding(first, last, FaultMode.NO_SIGNAL, SENSOR_SHARE, Epsilon(1.0, 1.0, 1.0), None, (text,))
         )
+    return out
+
+
+def broken_off(wheel: Wheel, others: Sequence[Array], driving_speed: float) -> list[Finding]:
+    """Findings of a speed that falls to 0 from one reading to the next, and stays there, while another wheel goes on turning.
+
+    For wheels of which no command says what they should do: a drive takes its time to stop.
+
+    Parameters
+    ----------
+    wheel : Wheel
+        The wheel.
+    others : Sequence[Array], each of shape (n,)
+        Readings of the other wheels [m/s].
+    driving_speed : float
+        Speed from which a wheel drives [m/s].
+    """
+    step, value = wheel.samples.step, np.nan_to_num(wheel.samples.value)
+    size = np.abs(np.nan_to_num(wheel.samples.change))
+    edge = np.flatnonzero(np.diff(np.r_[False, value == 0.0, False].astype(np.int8)))
+    spans = [(a, b) for a, b in zip(edge[::2].tolist(), edge[1::2].tolist(), strict=True) if a > 0]
+    ends = np.r_[[a for a, _ in spans], [b for _, b in spans if b < value.size]].astype(np.intp)
+    turning = size[(value != 0.0) & ~np.isin(np.arange(value.size), ends)]
+    if not others or turning.size < _LEAST_TURNING:
+        return []
+    least = max(_SUDDEN * float(np.quantile(turning, 0.99)), _TURNING * driving_speed)
+    out = []
+    for a, b in spans:
+        first, last = int(step[a]), int(step[b]) if b < step.size else int(step[-1]) + 1
+        at_once = [size[a] > least, b < size.size and size[b] > least]
+        if (last - first) * wheel.dt < _DEAD_S or not any(at_once):
+            continue
+        moves = np.max([np.abs(np.nan_to_num(y[first:last])) for y in others], axis=0) > driving_speed
+        if np.mean(moves) < _OTHERS_MOVE:
+            continue
+        text = (
+            f"{wheel.name} {'fell to 0' if at_once[0] else 'rose from 0'} from one reading to the next and read 0 for "
+            f"{(last - first) * wheel.dt:.1f} s while another {{wheel}} went on turning; nothing says what it should have done."
+        )
+        p = _BREAKS_OFF_P[all(at_once)]
+        sensor = SENSOR_SHARE if wheel.sharp else 0.5
+        out.append(sensor_finding(first, last, FaultMode.NO_SIGNAL, p, Epsilon(1.0, 1.0, 1.0), None, (text,), sensor))
     return out

@@ -26,7 +26,7 @@ _MOSTLY, _MOSTLY_NOISE = 0.8, 1.3  # share of the driving that is sound, and its
 _BOUND = 0.6  # of the largest command of a column: where the search for its limit begins
 _LEAST_MISFIT = 0.15  # of a sample by the Cauchy misfit: below the plain response explains the driving
 _EXPLAINS = 0.9  # of the misfit that is left: a limit of each column must explain so much
-_USELESS = 1.0  # of what is expected: a usual misfit as large as that says nothing
+_USELESS = 1.0  # of what is expected: a usual misfit larger than that in a quarter of the driving leaves nothing to compare with
 _UNEXPLAINED = 0.35  # of the usual speed: more misfit in half of the driving is no response at all
 
 
@@ -186,7 +186,7 @@ def identify_response(y: Array, commands: Array, h: float, driving_speed: float)
         gain = -np.expm1(-h / max(np.exp(lag), 1e-3))
         made = np.sqrt((by_column(asked, (weights, bounds, rates), delay / h, gain, h) ** 2).sum(axis=1))
     noise = _noise(y, expected, made, low, high, driving)
-    if float(np.median(noise[some] / np.maximum(made[some], 0.2 * usual))) > _USELESS:
+    if float(np.quantile(noise[some] / np.maximum(made[some], 0.2 * usual), 0.75)) > _USELESS:
         return None
     fastest = float(rates.sum()) if np.isfinite(bounds).any() else float(np.exp(rate))
     out = Response(

@@ -55,6 +55,8 @@ class Judged(NamedTuple):
         Whether its effort is nothing from end to end while others pull, as that of a wheel without a drive.
     yaw : Array or None, shape (n,)
         Measured yaw rate of the body [rad/s].
+    others : tuple[Array, ...], each of shape (n,)
+        Readings of all other wheels [m/s].
     """
 
     data: FollowerData
@@ -70,6 +72,7 @@ class Judged(NamedTuple):
     across: Array | None = None
     rolls: bool = False
     yaw: Array | None = None
+    others: tuple[Array, ...] = ()
 
 
 def standstills(idle: Sequence[tuple[int, int]], dt: float) -> tuple[str, ...]:

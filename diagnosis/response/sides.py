@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnosis.response.by_channel import lost_of, spikes_of
+from diagnosis.response.by_channel import broken_off, lost_of, spikes_of
 from diagnosis.response.findings import Wheel, finding_of
 from diagnosis.response.inputs import cell_of
 from diagnosis.response.machine import Judged
@@ -87,6 +87,8 @@ def sides_of(
             one, spell, width, dt
         ):
             doubtful[spell.start : spell.stop] = False  # what came slowly is slip or load, no sensor's fault
+    if not one.response.answered and one.speed is None:
+        findings.extend(broken_off(wheel, one.others, limits.driving_speed))
     there = np.isfinite(one.data.y)
     driving = np.repeat(one.driving, width)[:size]
     findings = _without_doubles([*findings, *late, *lost_of(wheel, one.data.lost, driving)])

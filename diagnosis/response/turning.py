@@ -83,7 +83,8 @@ def turns_with(wheel: str, spell: Spell, judged: Mapping[str, Judged], turning: 
         return (
             None  # a loop that winds up behind a dead sensor turns the body, too, against the other wheels of its side
         )
-    should = 0.5 * (b.low + b.high) if one.speed is None else one.speed
+    should = b.mean * np.nan if not one.response.answered else 0.5 * (b.low + b.high)
+    should = should if one.speed is None else one.speed
     share = turning.sides[wheel] / sum(s == turning.sides[wheel] for s in turning.sides.values())
     apart = difference(judged, turning)
     sound = np.isfinite(apart) & np.isfinite(turning.yaw) & one.driving
