@@ -89,8 +89,12 @@ def with_frozen(data: WheelsData, found: Mapping[int, WheelFindings]) -> dict[in
     out = {}
     for i, wheel in found.items():
         own = [r for r in held[i] if _moves_on(data, i, r) and not _all_held(held, i, r)]
-        findings = [_alive(f, data.y[:, i]) for f in wheel.findings if not any(_inside(f, r) for r in own)]
-        findings += [_told(data, i, r) for r in own if not any(_says_so(f, r) for f in findings)]
+        kept = [_alive(f, data.y[:, i]) for f in wheel.findings if _stuck(f) or not any(_inside(f, r) for r in own)]
+        told = {r: [f for f in kept if _says_so(f, r)] for r in own}
+        same = [f for fs in told.values() for f in fs]
+        findings = [f for f in kept if not any(f is g for g in same)]
+        for r, fs in told.items():
+            findings += [_surer(f, _told(data, i, r)) for f in fs] or [_told(data, i, r)]
         out[i] = replace(wheel, findings=sorted(findings, key=lambda f: f.start))
     return out
 
@@ -126,17 +130,28 @@ def _inside(f: Finding, r: Frozen) -> bool:
 
 def _alive(f: Finding, y: Array) -> Finding:
     """A stuck sensor is less sure where its last digits go on changing."""
-    if (f.side, f.mode) != (Side.SENSOR, FaultMode.STUCK) or f.probability >= _CERTAIN:
+    if not _stuck(f) or f.probability >= _CERTAIN:
         return f
     known = y[f.start : f.stop]
     changes = np.diff(known[np.isfinite(known)]) != 0.0
     return limited(f, _TREMBLING, _TREMBLES) if changes.size and float(np.mean(changes)) > _CHANGING else f
 
 
+def _stuck(f: Finding) -> bool:
+    return (f.side, f.mode) == (Side.SENSOR, FaultMode.STUCK)
+
+
 def _says_so(f: Finding, r: Frozen) -> bool:
-    """Whether a longer finding says already that the sensor is stuck."""
-    same = (f.side, f.mode) == (Side.SENSOR, FaultMode.STUCK)
-    return same and min(f.stop, r.stop) - max(f.start, r.start) > _INSIDE * (r.stop - r.start)
+    """Whether a finding says already that the sensor is stuck."""
+    common = min(f.stop, r.stop) - max(f.start, r.start)
+    return _stuck(f) and common > _INSIDE * min(r.stop - r.start, f.stop - f.start)
+
+
+def _surer(f: Finding, frozen: Finding) -> Finding:
+    """A finding with what its readings say; no less probable than that."""
+    sure = f.probability >= frozen.probability
+    evidence = (*f.evidence, *frozen.evidence)
+    return replace(f if sure else replace(frozen, start=f.start, stop=f.stop, sat=f.sat), evidence=evidence)
 
 
 def _told(data: WheelsData, i: int, r: Frozen) -> Finding:

@@ -48,13 +48,17 @@ def noise(side: Side, start: int = 1000, stop: int = 2000) -> SideFindings:
     return SideFindings((found,), ())
 
 
-def inputs(*, angle: bool = False, valve: bool = False, reading: np.ndarray | None = None) -> Any:
+def inputs(
+    *, angle: bool = False, valve: bool = False, reading: np.ndarray | None = None, command: np.ndarray | None = None
+) -> Any:
     return SimpleNamespace(
         angle_redundant=angle,
         valve_redundant=valve,
         timeline=SimpleNamespace(dt=DT),
         angle=reading,
         fresh=ALWAYS,
+        logged=frozenset({"u"} if command is not None else ()),
+        values=lambda leaf: command,
     )
 
 
@@ -119,3 +123,33 @@ def test_a_valve_that_pushes_its_axle_against_the_stop_is_not_dead(level: float,
     of = blocks_of(angle + np.random.default_rng(7).normal(0.0, 3e-4, SIZE), u, ALWAYS, ALWAYS, DT)
     out = not_denied({Side.SENSOR: NOTHING, Side.ACTUATOR: dead}, inputs(), of, MOST)[Side.ACTUATOR]
     assert bool(out.findings) is not stops
+
+
+@pytest.mark.parametrize(("size", "kept"), [(0.03, 0), (0.1, 1)])
+def test_a_valve_that_rests_about_its_middle_as_it_is_told_has_no_fault(size: float, kept: int) -> None:
+    stuck = replace(noise(Side.ACTUATOR).findings[0], mode=FaultMode.STUCK)
+    command = size * np.sin(np.arange(SIZE) * DT)
+    found = {Side.SENSOR: NOTHING, Side.ACTUATOR: SideFindings((stuck,), ())}
+    out = not_denied(found, inputs(valve=True, command=command), axle(None), MOST)[Side.ACTUATOR]
+    assert len(out.findings) == kept
+    assert len(out.unexplained) == 1 - kept
+
+
+def test_a_tremor_is_no_noise() -> None:
+    found = {Side.SENSOR: noise(Side.SENSOR, 0, SIZE), Side.ACTUATOR: NOTHING}
+    assert not_denied(found, inputs(), axle(None), MOST)[Side.SENSOR].findings == ()
+
+
+def test_many_brief_pauses_of_a_reading_are_its_habit() -> None:
+    one = replace(noise(Side.SENSOR).findings[0], mode=FaultMode.STUCK, probability=0.8)
+    few = tuple(replace(one, start=k, stop=k + 30) for k in range(500, 2000, 500))
+    many = tuple(replace(one, start=k, stop=k + 30) for k in range(500, 3500, 500))
+    for pauses, most in ((few, 0.8), (many, 0.4)):
+        out = not_denied(
+            {Side.SENSOR: SideFindings(pauses, ()), Side.ACTUATOR: NOTHING},
+            inputs(reading=np.zeros(SIZE)),
+            axle(None),
+            MOST,
+        )
+        assert all(f.probability <= most for f in out[Side.SENSOR].findings)
+        assert len(out[Side.SENSOR].findings) == len(pauses)
