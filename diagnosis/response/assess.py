@@ -137,8 +137,7 @@ def assess_response(
     asked = {w: _asked(j, limits) for w, j in judged.items()}
     kept = {w: where_asked(spells, asked[w], least) for w, spells in kept.items()}
     kept = {w: until_back(spells, judged[w].wheel.blocks.dead, asked[w]) for w, spells in kept.items()}
-    meant = {w: asked[w] | _commanded(j, limits, width) for w, j in judged.items()}
-    kept = {w: [s for s in spells if not stands_with_all(s, w, judged, meant)] for w, spells in kept.items()}
+    kept = {w: [s for s in spells if not stands_with_all(s, w, judged, asked)] for w, spells in kept.items()}
     turning = turning_of(judged, geometry, bodies.yaw if not sideways else None)
     kept = {w: [s._replace(turns=turns_with(w, s, judged, turning)) for s in spells] for w, spells in kept.items()}
     together = held_back_together(judged)
@@ -290,11 +289,6 @@ def _habit(wheel: str, holds: Mapping[str, Array]) -> float:
     """How long healthy channels stay at one value [s]: some holds may be faults, fewer of them another wheel's."""
     longest = [x[k] for w, x in holds.items() if x.size > (k := _OWN if w == wheel else _OTHERS)]
     return float(max(longest, default=0.0))
-
-
-def _commanded(one: Judged, limits: Limits, width: int) -> Flags:
-    """Blocks in which the log itself asks the wheel to move, whatever the drive makes of that elsewhere, shape (b,)."""
-    return np.asarray(np.abs(np.nan_to_num(cells(one.data.asked, width))) > _MOVES * limits.driving_speed)
 
 
 def _asked(one: Judged, limits: Limits) -> Flags:
