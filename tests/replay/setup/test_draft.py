@@ -320,3 +320,17 @@ def test_tables_that_begin_and_end_apart_are_not_taken_to_share_a_clock(
     draft = draft_machine(read_everything([tmp_path / "a.csv", tmp_path / "b.csv"]))
     assert [o.clock for o in draft.machine.sources.values() or [SourceOptions()]] == [clock]
     assert any("stamped by one computer" in q for q in draft.questions)
+
+
+def test_directions_and_lengths_are_of_signals_at_one_time(tmp_path: Path) -> None:
+    """The second file's clock is 42 s behind: what is found is found on one clock."""
+    rng = np.random.default_rng(3)
+    v, w = (np.convolve(np.repeat(rng.uniform(-1, 1, 40), 75), np.ones(25) / 25, "same") for _ in range(2))
+    t = pd.Timestamp("2026-10-14T06:00:00Z") + pd.to_timedelta(np.arange(3000) * 0.04, "s")
+    sides = {"FL": v - 0.4 * w, "FR": v + 0.4 * w, "RL": v - 0.4 * w, "RR": v + 0.4 * w}
+    wheels = {f"{n} {what}": x for n, x in sides.items() for what in ("speed setpoint [m/s]", "speed [m/s]")}
+    pd.DataFrame({"time": t, "cmd_v [m/s]": v, **wheels}).to_csv(tmp_path / "a.csv", index=False)
+    late = {"speed_cmd_mps": v, "cmd_yaw_rate [rad/s]": w, "yaw_rate [rad/s]": w}
+    pd.DataFrame({"time": t - pd.Timedelta(seconds=42), **late}).to_csv(tmp_path / "b.csv", index=False)
+    draft = draft_machine(read_everything([tmp_path / "a.csv", tmp_path / "b.csv"]))
+    assert not any("exchanged" in q for q in draft.questions)
