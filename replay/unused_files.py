@@ -14,6 +14,7 @@ _SHOWN = 6
 #: What is said of tables that hold nothing of a machine and are too slow to be the log of one.
 NO_LOG = "no log of a machine: "
 _SLOWEST_S = 10.0  # between two rows of a log
+_FEWEST = 20  # rows of a log in which anything could show
 
 
 class ReadFile(Protocol):
@@ -62,6 +63,11 @@ def require_use(files: Sequence[ReadFile], signals: Signals) -> None:
             raise LogError(
                 f"{', '.join(str(f.path) for f in files)}: {NO_LOG}no column{shown} is called like a signal of a machine, and rows are "
                 f"{_SLOWEST_S:g} s and more apart"
+            )
+        if all(0 < max((t.count for t in f.summary.topics), default=0) < _FEWEST for f in files):
+            raise LogError(
+                f"{', '.join(str(f.path) for f in files)}: {NO_LOG}no column{shown} is called like a signal of a machine, and there "
+                f"are fewer than {_FEWEST} rows"
             )
         raise LogError(
             f"{', '.join(str(f.path) for f in files)}: no wheel signal: no column{shown} is called like a signal of a machine "

@@ -158,7 +158,7 @@ def _judged(side: SideCoverage | None) -> str:
 
 
 def _metrics(rows: Sequence[MetricChange], words: MachineWords) -> RenderableType:
-    cells = [
+    cells: list[tuple[str, ...]] = [
         (
             r.wheel,
             *_pair(r.tracking_error_older, r.tracking_error_newer),
@@ -166,7 +166,7 @@ def _metrics(rows: Sequence[MetricChange], words: MachineWords) -> RenderableTyp
         )
         for r in rows
     ]
-    headings = (
+    headings: tuple[str, ...] = (
         "",
         f"error, older [{words.speed_unit}]",
         "newer",
@@ -175,7 +175,9 @@ def _metrics(rows: Sequence[MetricChange], words: MachineWords) -> RenderableTyp
         "newer",
         "",
     )
-    return table(headings, cells, right=range(1, 7))
+    if not any(r.control_effort_older is not None or r.control_effort_newer is not None for r in rows):
+        cells, headings = [row[:4] for row in cells], headings[:4]  # no command of a drive is logged
+    return table(headings, cells, right=range(1, len(headings)))
 
 
 def _percent(share: float | None) -> float | None:

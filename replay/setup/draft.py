@@ -5,8 +5,9 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from pathlib import PurePath
+from pathlib import Path, PurePath
 
+from replay.clocks.align import align_clocks
 from replay.errors import LogError
 from replay.log.raw_log import Channel, RawLog
 from replay.log.source_options import SignalSource
@@ -20,6 +21,7 @@ from replay.setup.lengths import largest_angle, limits_for, wheel_places, wheel_
 from replay.setup.motion import WheelMotion, backwards, wheel_motion
 from replay.setup.numbered_wheels import ask_for_numbers, ordered_by_turns
 from replay.setup.preset import Preset
+from replay.setup.read import options_of
 from replay.setup.robot_description import RobotDescription, parse_description
 from replay.setup.structure import ONE, Structure, described_structure, named_structure, preset_structure
 from replay.setup.unstated_units import usual_units, valve_currents
@@ -111,6 +113,9 @@ def draft_machine(logs: Sequence[RawLog], preset: Preset | None = None) -> Draft
         if units:
             raw = replace(raw, signals={**raw.signals, **units})
             found = map_signals(logs, raw)
+    if len(logs) > 1:  # lengths and directions are of signals at one time
+        logs = align_clocks(logs, raw, [options_of(Path(log.source), raw) for log in logs])[0]
+        found = map_signals(logs, raw)
     motions = _motions(found, structure.wheels)
     origins = _in_one_direction(draft, structure, found, motions)
     _ask_for_what_is_missing(draft, found)

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import PurePath
 
-from replay.log.raw_log import Channel, RawLog
+from replay.log.raw_log import Channel, LogSummary, RawLog
 from replay.log.source_options import SignalSource, SourceOptions
 from replay.log.time_zone import NO_ZONE
 from replay.machine.geometry import own_axle
@@ -15,6 +15,7 @@ from replay.setup.draft_notes import Draft
 from replay.setup.structure import ONE, Structure
 
 _DATED = 10**18  # ns; stamps before are of a clock without a date
+_TOGETHER = 5 * 10**9  # ns; tables of one recorder begin and end together
 _JOINT_TYPES = ("JointState", "DynamicJointState")
 
 
@@ -88,18 +89,41 @@ def _command(channels: Mapping[str, Channel]) -> SignalSource | None:
 
 
 def table_sources(logs: Sequence[RawLog], draft: Draft) -> dict[str, SourceOptions]:
-    """Several tables with dated stamps are taken to come from one recorder; the zone of dates that state none is asked for."""
+    """Several tables with dated stamps are taken to come from one recorder, if they are of one format and begin and end together.
+
+    The zone of dates that state none is asked for.
+    """
     tables = [log for log in logs if all(not c.topic for c in log.channels.values())]
     options = SourceOptions()
     if len(tables) > 1 and all(t.summary.start_ns >= _DATED for t in tables):
-        draft.ask(
-            "sources",
-            "were all tables stamped by one computer? It is taken so; else remove clock, and it is estimated.",
-        )
-        options = replace(options, clock="as recorded")
+        apart = _apart([t.summary for t in tables])
+        if apart:
+            draft.ask(
+                "sources",
+                f"were all tables stamped by one computer? It is not taken so, for {apart}: clocks are estimated from what both "
+                'recorded. If it was one, add clock = "as recorded" here.',
+            )
+        else:
+            draft.ask(
+                "sources",
+                "were all tables stamped by one computer? It is taken so; else remove clock, and it is estimated.",
+            )
+            options = replace(options, clock="as recorded")
     if any(NO_ZONE in note for log in tables for note in log.summary.notes):
         draft.ask(
             "sources", "in which time zone are the dates? They state none; UTC is written, Europe/Berlin is another."
         )
         options = replace(options, time_zone="UTC")
     return {} if options == SourceOptions() else {f"*{PurePath(tables[0].source).suffix}": options}
+
+
+def _apart(tables: Sequence[LogSummary]) -> str:
+    """Why tables are not taken to be of one recorder; empty where they are."""
+    formats = sorted({t.format for t in tables})
+    if len(formats) > 1:
+        return f"they are of different formats ({', '.join(formats)})"
+    far = max(t.start_ns for t in tables) - min(t.start_ns for t in tables)
+    late = max(t.stop_ns for t in tables) - min(t.stop_ns for t in tables)
+    if min(far, late) > _TOGETHER:
+        return f"they begin {far / 1e9:.0f} s and end {late / 1e9:.0f} s apart"
+    return ""

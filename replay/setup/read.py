@@ -42,7 +42,7 @@ def read_everything(
     store = ColumnStore()
     logs = []
     for path in paths:
-        options = _options(path, machine)
+        options = options_of(path, machine)
         topics = None
         if not every:
             summary = summarise_log(path, options)
@@ -53,6 +53,7 @@ def read_everything(
     return joined_tables(logs)
 
 
-def _options(path: Path, machine: Machine | None) -> SourceOptions:
+def options_of(path: Path, machine: Machine | None) -> SourceOptions:
+    """Options of a file by the machine's patterns."""
     sources = {} if machine is None else machine.sources
     return next((options for pattern, options in sources.items() if fnmatch(path.name, pattern)), SourceOptions())

@@ -46,18 +46,28 @@ def valve_currents(
     for kind in ("wheel", "steer"):
         alike = {n: c for n, c in named.items() if n.startswith(kind) and n not in found.items}
         peak = max((peak_of(c.values) for c in alike.values()), default=0.0)
-        if peak > 0:
+        if peak > 0 and all(_unit(c) == "%" for c in alike.values()):
+            out |= {n: source_of(c, "%") for n, c in alike.items()}
+            draft.ask(
+                "signals",
+                f"does 100 % of {next(iter(alike.values())).name} and the like open a valve fully? It is a current; it is taken so.",
+            )
+        elif peak > 0:
             full = float(f"{peak:.4g}")
             out |= {n: replace(source_of(c, "1"), gain=float(f"{1 / peak:.4g}")) for n, c in alike.items()}
-            unit = next((u for c in alike.values() if (u := c.unit or bare_name(c.name)[1])), "")
+            unit = next((u for c in alike.values() if (u := _unit(c))), "")
             shown.append(f"{full:g} {unit}".rstrip() + f" of {next(iter(alike.values())).name}")
-    if out:
+    if shown:
         draft.ask(
             "signals",
             f"which current opens a valve fully? Valves are logged by their currents, and the largest in this log stands in "
             f"({', '.join(shown)} and the like): gain = 1 / that current, negative where it closes.",
         )
     return out
+
+
+def _unit(channel: Channel) -> str:
+    return channel.unit or bare_name(channel.name)[1]
 
 
 def usual_units(draft: Draft, found: Signals) -> Mapping[str, SignalSource]:

@@ -17,6 +17,7 @@ _ENDS = (
 _DOUBTFUL = (
     (r"ms", "m/s"), (r"rps", "rad/s"), (r"rad", "rad"), (r"amps?|current", "A"), (r"volts?|voltage", "V"), (r"mm", "mm"),
 )  # fmt: skip
+_CAPITAL = re.compile(r"(?<=[a-z])(?=[A-Z])")
 _BRACKET = re.compile(r"\s*[\[(]([^\[\]()]*)[\])]\s*$")
 
 
@@ -45,7 +46,8 @@ def unit_by_end(name: str, doubtful: bool = False) -> str:
     doubtful : bool
         Whether ends count that may be another word as well, and names that are nothing but a unit.
     """
-    plain = re.sub(r"[^a-z0-9]+", "_", re.sub(r"\[\d+\]", "", folded(name)).lower()).strip("_")
+    words = _CAPITAL.sub("_", folded(re.sub(r"\[\d+\]", "", name)))  # nSpeedRpm: n_Speed_Rpm
+    plain = re.sub(r"[^a-z0-9]+", "_", words.lower()).strip("_")
     for pattern, unit in _ENDS + (_DOUBTFUL if doubtful else ()):
         if re.search(rf"{'(^|_)' if doubtful else '_'}({pattern})$", plain):
             return unit

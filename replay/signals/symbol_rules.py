@@ -53,6 +53,7 @@ _PLAIN = (
 _ANGLES = frozenset(("deg", "grad"))  # units
 _STATES = frozenset(("state", "states", "status", "feedback", "telemetry"))  # topics of what is measured
 _OWN = frozenset(("n", "v", "rad", "wheel"))  # that say it even alone: ``Rad VL [1/min]``
+_VEHICLE = frozenset(("fahr", "fahrzeug", "fzg", "vehicle", "machine", "maschine"))
 # Words beside which an asked speed is that of the whole machine.
 _WHOLE = ASKING | frozenset(
     (*("speed", "velocity", "vel", "v", "r", "f", "lr", "x", "lin", "linear", "longitudinal", "fahr", "fahrzeug", "fzg", "vehicle"),
@@ -217,7 +218,7 @@ def _family(channel: Channel, template: str) -> str:
 def _is_speed(last: Sequence[str], unit: str) -> bool:
     """Whether words speak of a speed: by name, or as ``v``, a joystick or nothing but a setpoint in a unit of speed."""
     speed = (known := known_unit(unit)) is not None and UNITS[known][0] == "speed"
-    says = {"v", "joystick"} & {*last} or {*last} <= ASKING
+    says = {"v", "joystick"} & {*last} or ({*last} <= ASKING | _VEHICLE and ASKING & {*last})
     return bool({"speed", "velocity", "vel"} & {*last}) or (speed and bool(says))
 
 

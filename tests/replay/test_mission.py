@@ -75,6 +75,13 @@ def test_a_slow_table_that_holds_nothing_of_a_machine_is_no_log(tmp_path: Path) 
         load_mission([log], haulotte())
 
 
+def test_a_list_without_times_is_no_log(tmp_path: Path) -> None:
+    log = tmp_path / "inventory.csv"
+    log.write_text("number;name;stock\n4711;filter;3\n4712;spool;1\n")
+    with pytest.raises(LogError, match=r"inventory\.csv: no log of a machine: no column .*stock.* fewer than 20 rows"):
+        load_mission([log], haulotte())
+
+
 def test_files_of_different_days_are_refused(tmp_path: Path) -> None:
     a = write_table(tmp_path / "a.csv", "wheel.FR.v", np.arange(200.0) / 1000)
     b = write_table(tmp_path / "b.csv", "wheel.FR.u", np.arange(200.0) / 1000, start=START + 86_400 * 10**9)

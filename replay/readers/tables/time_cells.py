@@ -179,7 +179,7 @@ class TimeBase:
                 f"{self.label}: its long stamps were written as floating-point numbers, so they are exact only to about a "
                 "microsecond; write them as integers"
             )
-        if self.unit == "iso" and self._turns and not self._dated and self.rows > self.missing:
+        if self.unit == "iso" and self._turns and not self._dated and not self.epoch and self.rows > self.missing:
             self.report.note(
                 f"{self.label}: times of day without a date, counted on over midnight; [sources] epoch gives the date"
             )

@@ -11,6 +11,7 @@ import pandas as pd
 import pytest
 
 from replay.errors import LogError
+from replay.log.source_options import SourceOptions
 from replay.machine.toml_file import load_machine
 from replay.setup.all_channels import channel_rows
 from replay.setup.draft import draft_machine, preset_draft
@@ -291,3 +292,45 @@ def test_joints_of_a_description_are_found_by_their_positions(tmp_path: Path) ->
     places = {"rear_left_wheel_joint": (0.0, TRACK / 2), "rear_right_wheel_joint": (0.0, -TRACK / 2)}
     draft = drafted(tmp_path, Robot(wheels=places, description=urdf(places), positions=True))
     assert draft.machine.signals["wheel.L.v_position"].derivative
+
+
+def test_currents_of_valves_in_percent_keep_their_unit(tmp_path: Path) -> None:
+    v = np.repeat(np.random.default_rng(1).uniform(-0.5, 0.5, 15), 40)
+    columns: dict[str, Any] = {"time": np.arange(600) * 0.05}
+    for name in ("VR", "VL", "HR", "HL"):
+        columns |= {f"fbRad_{name}.nSoll [U/min]": 90 * v, f"fbRad_{name}.nIst [U/min]": 90 * v}
+        columns[f"fbRad_{name}.fVentilStrom [%]"] = 160 * v
+    pd.DataFrame(columns).to_csv(tmp_path / "run.csv", index=False)
+    draft = read_back(draft_machine(read_everything([tmp_path / "run.csv"])), tmp_path)
+    assert (draft.machine.signals["wheel.VL.u"].unit, draft.machine.signals["wheel.VL.u"].gain) == ("%", 1.0)
+    assert not any("which current opens" in q for q in draft.questions)
+    assert sum("100 %" in q for q in draft.questions) == 1
+
+
+@pytest.mark.parametrize(("late", "clock"), [(0, "as recorded"), (42, "estimate")])
+def test_tables_that_begin_and_end_apart_are_not_taken_to_share_a_clock(
+    tmp_path: Path, late: float, clock: str
+) -> None:
+    v = np.repeat(np.random.default_rng(1).uniform(-0.5, 0.5, 15), 40)
+    t = pd.Timestamp("2026-10-14T06:00:00Z") + pd.to_timedelta(np.arange(600) * 0.05, "s")
+    wheels = {f"{w} {what}": v for w in ("FR", "FL") for what in ("speed setpoint [m/s]", "speed [m/s]")}
+    pd.DataFrame({"time": t, **wheels}).to_csv(tmp_path / "a.csv", index=False)
+    later = t - pd.Timedelta(seconds=late)
+    pd.DataFrame({"time": later, "yaw_rate [rad/s]": 0.1 * v}).to_csv(tmp_path / "b.csv", index=False)
+    draft = draft_machine(read_everything([tmp_path / "a.csv", tmp_path / "b.csv"]))
+    assert [o.clock for o in draft.machine.sources.values() or [SourceOptions()]] == [clock]
+    assert any("stamped by one computer" in q for q in draft.questions)
+
+
+def test_directions_and_lengths_are_of_signals_at_one_time(tmp_path: Path) -> None:
+    """The second file's clock is 42 s behind: what is found is found on one clock."""
+    rng = np.random.default_rng(3)
+    v, w = (np.convolve(np.repeat(rng.uniform(-1, 1, 40), 75), np.ones(25) / 25, "same") for _ in range(2))
+    t = pd.Timestamp("2026-10-14T06:00:00Z") + pd.to_timedelta(np.arange(3000) * 0.04, "s")
+    sides = {"FL": v - 0.4 * w, "FR": v + 0.4 * w, "RL": v - 0.4 * w, "RR": v + 0.4 * w}
+    wheels = {f"{n} {what}": x for n, x in sides.items() for what in ("speed setpoint [m/s]", "speed [m/s]")}
+    pd.DataFrame({"time": t, "cmd_v [m/s]": v, **wheels}).to_csv(tmp_path / "a.csv", index=False)
+    late = {"speed_cmd_mps": v, "cmd_yaw_rate [rad/s]": w, "yaw_rate [rad/s]": w}
+    pd.DataFrame({"time": t - pd.Timedelta(seconds=42), **late}).to_csv(tmp_path / "b.csv", index=False)
+    draft = draft_machine(read_everything([tmp_path / "a.csv", tmp_path / "b.csv"]))
+    assert not any("exchanged" in q for q in draft.questions)

@@ -223,6 +223,7 @@ def test_units_in_names() -> None:
     assert bare_name("fbWheel[1]") == ("fbWheel[1]", "")
     assert found(column("n_ist_VR_U_min")) == [("wheel.FR.v", "rpm")]
     assert found(column("velocity[front_left_wheel]")) == [("wheel.FL.v", "")]
+    assert (unit_by_end("nSpeedRpm"), unit_by_end("fVelKmh")) == ("rpm", "km/h")
     assert (unit_by_end("speed_kmh"), unit_by_end("RPM"), unit_by_end("RPM", doubtful=True)) == ("km/h", "", "rpm")
 
 
@@ -235,6 +236,8 @@ def test_units_in_names() -> None:
         ("cmd_yaw_rate_radps", "cmd.omega", "rad/s"),
         ("odom_yaw_rate_radps", None, ""),
         ("speed_cmd_mps", "cmd.v", "m/s"),
+        ("fFahrSollwert [km/h]", "cmd.v", "km/h"),
+        ("Fahrzeug [km/h]", None, ""),
         ("front_left_wheel_cmd_mps", "wheel.FL.v_ref", "m/s"),
         ("front_left_wheel_speed_rad_per_s", "wheel.FL.v", "rad/s"),
         ("front_left_wheel_setpoint_radps", "wheel.FL.v_ref", "rad/s"),
