@@ -100,11 +100,13 @@ def with_frozen(data: WheelsData, found: Mapping[int, WheelFindings]) -> dict[in
 
 
 def _moves_on(data: WheelsData, i: int, r: Frozen) -> bool:
-    """Whether the valve's opening, or the speed of most other wheels, changes meanwhile."""
+    """Whether the valve's opening, or the speed of most other wheels, which turn, changes meanwhile."""
     part = slice(r.start, r.stop)
     steps = np.abs(np.diff(data.y[:, i]))
     step = float(np.min(steps[steps > 0.0], initial=np.inf))
     others = np.delete(data.y[part], i, axis=1)
+    if others.size and np.isfinite(others).any() and float(np.nanmedian(np.abs(others))) <= _TURNS * data.span:
+        return False  # all others stand: a wheel that stands reads one value, its offset too
     with np.errstate(invalid="ignore"):
         moved = [float(np.nanquantile(c, 0.95) - np.nanquantile(c, 0.05)) for c in others.T if np.isfinite(c).any()]
     opening = data.u[part, i]
