@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from diagnosis.response.channel import Samples
 from diagnosis.response.findings import SENSOR_SHARE, Wheel, sensor_finding
 from diagnosis.results.assessment import Finding
 from diagnosis.results.result import Epsilon
@@ -20,6 +21,7 @@ _BEYOND, _LEAP = (
     3.0,
     100.0,
 )  # times the largest speed of the driving; m/s² there and back: no wheel does that, be it once
+_TURNS, _SAME_LEAP, _SAME_TURN, _MOSTLY = 4, 0.01, 0.1, 0.7  # wild readings; shares of leap and turn; of the turns
 _IMPOSSIBLE_P = 0.97, 0.99  # that the sensor is at fault, by one such reading and by two
 _LOST_DRIVING_S = 1.0
 _DEAD_S, _OTHERS_MOVE = 2.0, 0.7  # of one reading of 0, and of that time in which another wheel turns
@@ -43,7 +45,7 @@ def spikes_of(wheel: Wheel, y: Array, driving_speed: float) -> list[Finding]:
     driving_speed : float
         Speed from which a wheel drives [m/s].
     """
-    if not wheel.spiky:
+    if not wheel.spiky or once_a_turn(wheel.samples, y, wheel.dt):
         return []
     places = wheel.samples.step[wheel.samples.wild]
     beyond = _impossible(wheel, y, driving_speed)
@@ -64,6 +66,24 @@ def spikes_of(wheel: Wheel, y: Array, driving_speed: float) -> list[Finding]:
         )
         out.append(sensor_finding(int(group[0]), int(group[-1]) + 1, FaultMode.NOISY, p, None, None, (text,)))
     return out
+
+
+def once_a_turn(samples: Samples, y: Array, dt: float) -> bool:
+    """Whether wild readings are those of an angle that starts anew after each turn, and whose derivative is logged.
+
+    All leap by the same amount against the motion, and from one to the next the wheel goes as far. `y` of shape (n,) [m/s], `dt` in s.
+    """
+    at = np.flatnonzero(samples.wild)
+    if at.size < _TURNS or at[0] == 0:
+        return False
+    value = y[samples.step]
+    near = np.interp(at, np.flatnonzero(~samples.wild), value[~samples.wild])
+    leap = value[at] - near
+    way = np.cumsum(np.where(samples.wild, 0.0, np.nan_to_num(samples.value)) * np.diff(samples.step, prepend=0) * dt)
+    turn = np.abs(np.diff(way[at]))
+    usual = float(np.median(turn))
+    same = float(np.std(leap)) < _SAME_LEAP * abs(float(np.mean(leap)))
+    return bool(same and (leap * near <= 0.0).all() and np.mean(np.abs(turn - usual) < _SAME_TURN * usual) >= _MOSTLY)
 
 
 def _impossible(wheel: Wheel, y: Array, driving_speed: float) -> NDArray[np.intp]:

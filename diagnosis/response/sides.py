@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnosis.response.by_channel import broken_off, lost_of, spikes_of
+from diagnosis.response.by_channel import broken_off, lost_of, once_a_turn, spikes_of
 from diagnosis.response.findings import Wheel, finding_of
 from diagnosis.response.inputs import cell_of
 from diagnosis.response.machine import Judged
@@ -189,7 +189,9 @@ def _assessment(
     )
     note += f"; compared with {one.wheel.compared}." if one.wheel.compared else "."
     wild = int(one.wheel.samples.wild.sum())
-    notes = (note, *((f"{wild} wild readings of {one.data.name} were set aside.",) if wild else ()))
+    turns = once_a_turn(one.wheel.samples, one.data.y, one.wheel.dt)
+    why = ": one a turn, as where the angle that they come from starts anew" if turns else ""
+    notes = (note, *((f"{wild} wild readings of {one.data.name} were set aside{why}.",) if wild else ()))
     reasons = {
         State.NOT_ASSESSED: _UNSEEN
         if unseen

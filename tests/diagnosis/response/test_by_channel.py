@@ -7,6 +7,7 @@ import pytest
 from numpy.typing import NDArray
 
 from diagnosis.response.assess import assess_response
+from diagnosis.response.by_channel import once_a_turn
 from diagnosis.response.channel import samples_of
 from diagnosis.response.jumps import Jumps, jumps_of
 from diagnosis.response.models import Blocks
@@ -58,3 +59,26 @@ def test_a_robot_that_ignores_its_commands_is_judged_by_its_channels(*, goes_on:
     judged = assess_response(followers_of(measured, asked, body), geometry(("R", "L")), None, Limits(), DT)
     found = [(w, f.start * DT, f.stop * DT) for w, parts in judged.parts.items() for f in parts[0].findings]
     assert found == ([("R", pytest.approx(25.0, abs=0.1), pytest.approx(33.0, abs=0.1))] if goes_on else [])
+
+
+@pytest.mark.parametrize(("apart", "sign", "turns"), [(1.0, 1, True), (1.0, -1, False), (0.3, 1, False)])
+def test_one_wild_reading_a_turn_is_an_angle_that_starts_anew(apart: float, sign: int, *, turns: bool) -> None:
+    n = 3000
+    v = -0.8 - 0.4 * np.sin(np.arange(n) * DT / 5.0)
+    way = np.abs(np.cumsum(v)) * DT
+    rng = np.random.default_rng(2)
+    at = [int(np.searchsorted(way, 1.3 * (k + (0.0 if apart == 1.0 else rng.uniform(0.0, 0.9))))) for k in range(1, 12)]
+    y = v + rng.normal(0.0, 0.002, n)
+    y[at] = v[at] + sign * 62.8
+    samples = samples_of(y, np.ones(n, np.bool_))
+    assert np.count_nonzero(samples.wild) == len(at)
+    assert once_a_turn(samples, y, DT) is turns
+
+
+def test_spikes_of_both_signs_are_spikes() -> None:
+    rng = np.random.default_rng(3)
+    y = -1.0 + rng.normal(0.0, 0.002, 3000)
+    at = np.arange(100, 2900, 130)
+    y[at] += 30.0 * rng.choice([-1, 1], at.size)
+    assert not once_a_turn(samples_of(y, np.ones(3000, np.bool_)), y, DT)
+    assert not once_a_turn(samples_of(y[:90], np.ones(90, np.bool_)), y[:90], DT)
