@@ -138,6 +138,8 @@ def finding_of(run: Run, found: IdentifiedPair, limits: Limits) -> Finding | Non
     pair, run, p = found.pair, isolated.run, isolated.p
     if p[HEALTHY] > p[run.row] or _hysteresis(isolated, found):
         return None
+    ahead = [r for r in codes_of(pair.side) if r != HEALTHY and p[r] >= p[run.row]]
+    p[ahead] = p[ahead].mean()  # what other rows explain as well is called by none of them more surely
     epsilon, sat, _ = isolated.estimate
     if epsilon is not None and mode is not FaultMode.OUTSIDE_TABLE:
         epsilon = epsilon.as_share()

@@ -199,7 +199,7 @@ def isolate(run: Run, found: IdentifiedPair, min_sat: float) -> Isolated | None:
     if run.row == INEFFICIENT and not restless and _shifted_away(seen, estimate[2], seen.noise):
         # a constant of its own, not a share
         run = replace(run, row=STUCK)
-        p[STUCK], p[INEFFICIENT] = p[INEFFICIENT], p[STUCK]
+        p[STUCK], p[INEFFICIENT] = max(p[STUCK], p[INEFFICIENT]), min(p[STUCK], p[INEFFICIENT])
         other = estimate_run(run, found)
         if other is None:
             return None

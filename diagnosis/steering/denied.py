@@ -35,6 +35,7 @@ _PAUSE_S = 0.12  # likewise of a side that does nothing: a reading that did not 
 _TREMOR = 0.004  # rad: noise of less is no fault
 _MIDDLE, _MOSTLY = 0.04, 0.98  # of full opening: about its middle a valve opens nothing; of the time
 _HABIT_S, _OFTEN, _HABIT = 1.0, 3, 0.4  # pauses no longer than this, more than so many, are a habit of this probability
+_LASTS = 0.99  # a share that says nothing of a finding's length
 _PAUSE = "As brief as this, it may be a reading that did not change, or what the model leaves out, which makes it less probable."
 _BURST = "Noise as brief as this may be what the model leaves out of a motion, which makes it less probable."
 _UNSEEN = "Where no opening is logged, a disturbance of the {valve} looks like what the model leaves out, which makes it less probable."
@@ -117,7 +118,9 @@ def _not_brief(findings: tuple[Finding, ...], dt: float, *, twice: bool) -> tupl
         half, why = (_BURST_S, _BURST) if f.mode is FaultMode.NOISY else (_PAUSE_S, _PAUSE)
         brief = seconds**2 / (seconds**2 + half**2)
         told = (
-            limited(f, f.probability * brief, why) if f.mode is FaultMode.NOISY or (f.mode.total and not twice) else f
+            limited(f, f.probability * brief, why)
+            if brief < _LASTS and (f.mode is FaultMode.NOISY or (f.mode.total and not twice))
+            else f
         )
         often = not twice and len(pauses) > _OFTEN and any(f is p for p in pauses)
         out.append(

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from replay.log.source_options import SignalSource
 from replay.machine.geometry import WheelGeometry
+from replay.machine.units import known_unit
 from replay.setup.motion import held
 from replay.signals.signal import Signal, Signals
 from replay.signals.steering_command import is_steering_command
@@ -73,7 +74,7 @@ def track_by_yaw(
     Parameters
     ----------
     found : Signals
-        With rotations of the wheels in rad/s.
+        With rotations of the wheels in rad/s, or speeds of their rims in m/s.
     places : Mapping[str, WheelGeometry]
         Which wheels are fixed, and on which side.
     radius : float
@@ -90,7 +91,12 @@ def track_by_yaw(
         return None
     at = _moments([yaw, *sides[0], *sides[1]])
     left, right = (np.mean([_forward(s, origins, at) for s in side], axis=0) for side in sides)
-    gain = gain_of(held(yaw, at), radius * (right - left))
+    speeds = all(
+        origin.unit and not is_rotation(origin)
+        for s in (*sides[0], *sides[1])
+        for origin in [origins.get(s.name, s.origin)]
+    )
+    gain = gain_of(held(yaw, at), (1.0 if speeds else radius) * (right - left))
     return Measured(abs(gain), "the yaw rate") if gain is not None else None
 
 
@@ -115,6 +121,12 @@ def base_by_yaw(found: Signals, base: float) -> Measured | None:
     at = _moments([yaw, asked])
     gain = gain_of(held(yaw, at), base * held(asked, at))
     return Measured(gain, "the yaw rate beside commanded speed and steering angle") if gain is not None else None
+
+
+def is_rotation(origin: SignalSource) -> bool:
+    """Whether a channel has a unit of turns, rather than of the rim's speed."""
+    unit = known_unit(origin.unit)
+    return unit in ("rad/s", "rpm", "rev/s", "deg/s") or (unit == "rad" and origin.derivative)
 
 
 def _forward(signal: Signal, origins: Mapping[str, SignalSource], at: NDArray[np.int64]) -> Array:

@@ -14,7 +14,7 @@ from replay.machine.config import Limits, Machine, haulotte
 from replay.machine.geometry import Geometry, WheelGeometry
 from replay.machine.quantities import UNITS
 from replay.machine.units import known_unit
-from replay.setup.by_the_body import Measured, base_by_yaw, track_by_yaw
+from replay.setup.by_the_body import Measured, base_by_yaw, is_rotation, track_by_yaw
 from replay.setup.draft_notes import Draft
 from replay.setup.motion import WheelMotion
 from replay.setup.structure import ONE, Structure
@@ -39,9 +39,9 @@ def wheel_radius(
     origins: dict[str, SignalSource], by_body: Measured | None = None,
 ) -> float:  # fmt: skip
     """Wheel radius [m], by the measured speed of the body before the commands. Signals without a unit get the one that fits the command."""
-    turning = [n for w in structure.wheels if (n := f"wheel.{w}.v") in origins and _is_rotation(origins[n])]
+    turning = [n for w in structure.wheels if (n := f"wheel.{w}.v") in origins and is_rotation(origins[n])]
     bare = [n for w in structure.wheels if (n := f"wheel.{w}.v") in origins and not origins[n].unit]
-    asked = [n for w in structure.wheels if (n := f"wheel.{w}.v_ref") in origins and _is_rotation(origins[n])]
+    asked = [n for w in structure.wheels if (n := f"wheel.{w}.v_ref") in origins and is_rotation(origins[n])]
     told = [
         n for n in turning if "cmd.v" in found.items or f"{n}_ref" not in asked
     ]  # rotations tell no size of each other
@@ -73,7 +73,7 @@ def wheel_radius(
             '"motor": give gear_ratio and wheel_diameter here.',
         )
         for n, origin in origins.items():
-            if n.startswith("wheel.") and _is_rotation(origin):
+            if n.startswith("wheel.") and is_rotation(origin):
                 origins[n] = replace(origin, at="motor")
         return max(float(_round(measured)), _RADII[0] / 2)
     if measured is not None and measured <= _RADII[1]:
@@ -97,14 +97,9 @@ def wheel_radius(
     return _STANDS_IN_RADIUS
 
 
-def _is_rotation(origin: SignalSource) -> bool:
-    unit = known_unit(origin.unit)
-    return unit in ("rad/s", "rpm", "rev/s", "deg/s") or (unit == "rad" and origin.derivative)
-
-
 def without_size(origin: SignalSource, radius: float) -> SignalSource:
     """Rotation of a wheel as a speed, for a machine file without geometry that could give the wheel's size [m]."""
-    if not _is_rotation(origin):
+    if not is_rotation(origin):
         return origin
     quantity, factor = UNITS[known_unit(origin.unit) or "rad/s"]
     unit = "m" if quantity == "angle" else "m/s"

@@ -334,3 +334,5 @@ def test_directions_and_lengths_are_of_signals_at_one_time(tmp_path: Path) -> No
     pd.DataFrame({"time": t - pd.Timedelta(seconds=42), **late}).to_csv(tmp_path / "b.csv", index=False)
     draft = draft_machine(read_everything([tmp_path / "a.csv", tmp_path / "b.csv"]))
     assert not any("exchanged" in q for q in draft.questions)
+    assert draft.machine.geometry is not None
+    assert draft.machine.geometry.wheels["FL"].y == pytest.approx(0.4, rel=0.05)
