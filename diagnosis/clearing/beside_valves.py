@@ -17,6 +17,7 @@ Part = tuple[str, str]
 _SURE = 0.9  # of the valve's fault
 _MOST = 0.65  # how often a fault of the sensor beside it was right
 _INSIDE = 0.5  # of its time
+_SAME = 1e-9  # m/s
 _WHY = "Meanwhile the {valve} of this {wheel} does not answer: the {wheel} may stand, be dragged or slip, which makes the fault less probable."
 
 
@@ -50,7 +51,12 @@ def _dead(f: Finding) -> bool:
     return f.side is Side.ACTUATOR and f.mode.total and f.probability >= _SURE
 
 
+def _constant(f: Finding) -> bool:
+    """Whether a reading stays at one value to the last digit, as no wheel does that is dragged."""
+    return f.mode.total and f.sat is not None and abs(f.sat.rms - abs(f.sat.mean)) <= _SAME
+
+
 def _doubtful(f: Finding, dead: Sequence[Finding]) -> bool:
-    if f.tier is Tier.DIRECT or f.side is not Side.SENSOR:
+    if f.tier is Tier.DIRECT or f.side is not Side.SENSOR or _constant(f):
         return False
     return any(min(f.stop, d.stop) - max(f.start, d.start) > _INSIDE * (f.stop - f.start) for d in dead)

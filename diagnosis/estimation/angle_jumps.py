@@ -65,7 +65,7 @@ def readings(y: Array, fresh: NDArray[np.bool_], dt: float) -> Iterator[tuple[Ar
 
 
 def quickest_of(read: Iterable[tuple[Array, Array]]) -> float | None:
-    """Largest rate of an axle that lasts [rad/s]; None without readings."""
+    """Largest rate of an axle that lasts [rad/s]; None without readings. `read` are pairs of shape (n,) each [s, rad]."""
     return max((_quickest(t, y) for t, y in read), default=None)
 
 
@@ -74,8 +74,8 @@ def jumps_of(read: Iterable[tuple[Array, Array]], quickest: float) -> Jumps:
 
     Parameters
     ----------
-    read : Iterable[tuple[Array, Array]]
-        From `readings`.
+    read : Iterable[tuple[Array, Array]], each of shape (n,)
+        From `readings` [s, rad].
     quickest : float
         Largest rate of the machine's axles [rad/s].
     """

@@ -27,8 +27,8 @@ def of_sensor(valve: Sequence[Finding], y: Array, fresh: NDArray[np.bool_], dt: 
     ----------
     valve : Sequence[Finding]
         Of one axle.
-    y, fresh, dt
-        Its angle, as of `diagnosis.estimation.angle_jumps.readings`.
+    y, fresh, dt : of shape (n,), (n,) and s
+        Its angle [rad], as of `diagnosis.estimation.angle_jumps.readings`.
     """
     losses = [f for f in valve if f.mode is FaultMode.INEFFICIENT and f.epsilon is not None]
     quickest = quickest_of(readings(y, fresh, dt)) if losses else None

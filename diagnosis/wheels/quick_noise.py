@@ -22,6 +22,7 @@ from replay.faults import FaultMode, Side
 Array = NDArray[np.float64]
 
 _STEP_S, _QUICK = 0.04, 0.42  # share of a deviation that changes within such a time
+_SLOW_AT_ALL, _RAISED = 0.15, 4.0  # the same where readings are so many times rougher than elsewhere
 _WINDOW_S, _QUIET = 3.0, 0.1  # quantile of windows that shows a channel's own noise
 _ROUGHER, _OF_MINE = 3.0, 0.2  # times that noise, and of the noisy wheel's
 _SHARED_P = 0.6
@@ -54,11 +55,13 @@ def _judged(f: Finding, i: int, path: WheelPath, rough: Mapping[int, Array]) -> 
     expected: Array = np.asarray(per_sample(path.expected, path.width, path.y.size), dtype=np.float64)
     part = slice(f.start, f.stop)
     share = quick_share(path.y[part], expected[part], path.dt)
-    if share is not None and share < _QUICK:
-        return opened(f, _SLOW)
     length = _length(path)
     places = slice(f.start // length, max(f.start // length + 1, f.stop // length))
-    mine = float(np.nanmedian(rough[i][places])) if np.isfinite(rough[i][places]).any() else np.inf
+    known = np.isfinite(rough[i][places]).any()
+    mine = float(np.nanmedian(rough[i][places])) if known else np.inf
+    rougher = known and mine > _RAISED * float(np.nanquantile(rough[i], _QUIET))  # noise, whatever the slow rest is
+    if share is not None and share < (_SLOW_AT_ALL if rougher else _QUICK):
+        return opened(f, _SLOW)
     for j, other in rough.items():
         if j != i and np.isfinite(other[places]).any():
             meanwhile, usual = float(np.nanmedian(other[places])), float(np.nanquantile(other, _QUIET))

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from diagnosis.clearing.beside_valves import less_sure_beside_dead_valves
 from diagnosis.results.assessment import Assessment, Finding
 from diagnosis.results.machine_words import HYDRAULIC
+from diagnosis.results.result import Sat
 from diagnosis.results.vocabulary import Tier
 from replay.faults import FaultMode, Side
 from tests.diagnosis.clearing.test_beside_angles import SURE, fault
@@ -48,3 +51,9 @@ def test_beside_a_dead_valve_a_sensor_is_less_sure(mode: FaultMode) -> None:
 )
 def test_a_second_sensor_another_time_or_a_loss_leave_it(sensor: Finding, valve: Finding) -> None:
     assert beside(sensor, valve).probability == SURE
+
+
+@pytest.mark.parametrize(("rms", "p"), [(0.0, SURE), (0.006, 0.65)])
+def test_a_reading_that_stays_to_the_last_digit_is_as_sure_as_ever(rms: float, p: float) -> None:
+    dead = replace(fault(1000, 1500, mode=FaultMode.NO_SIGNAL), sat=Sat(0.0, rms, -rms, rms, "m/s"))
+    assert beside(dead, DEAD).probability == pytest.approx(p)

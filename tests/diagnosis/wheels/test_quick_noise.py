@@ -42,7 +42,8 @@ def test_quick_noise_of_one_wheel_stays(tau: float) -> None:
 
 
 def test_a_slow_deviation_leaves_the_side_open() -> None:
-    out = judged(QUIET + 0.1 * INSIDE * noise(1.0, 1), QUIET)
+    slow = np.convolve(noise(0.0, 1), np.hanning(80) / 5.0, "same")
+    out = judged(QUIET + 0.1 * INSIDE * slow, QUIET)
     assert (out.side, out.probability) == (Side.SENSOR_OR_ACTUATOR, 0.85)
     assert "slowly" in out.evidence[0]
 
@@ -61,3 +62,9 @@ def test_the_share_of_white_noise_is_all_and_of_a_loss_alone_nothing_is_known() 
     assert quick_share(EXPECTED + noise(0.0, 1), EXPECTED, DT) == pytest.approx(1.0, abs=0.1)
     assert quick_share(EXPECTED[:10], EXPECTED[:10], DT) is None
     assert quick_share(np.full(N, np.nan), EXPECTED, DT) is None
+
+
+def test_noise_beside_a_large_slow_rest_is_the_sensors_where_readings_become_rough() -> None:
+    slow = 0.2 * INSIDE * np.sin(2 * np.pi * T / 7.0)
+    out = judged(QUIET + slow + 0.03 * INSIDE * noise(0.0, 1), QUIET)
+    assert (out.side, out.probability) == (Side.SENSOR, 0.95)
