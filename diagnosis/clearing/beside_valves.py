@@ -15,7 +15,7 @@ from replay.faults import Side
 Part = tuple[str, str]
 
 _SURE = 0.9  # of the valve's fault
-_MOST = 0.65  # how often a fault of the sensor beside it was right
+_MOST = 0.65  # of a fault of the sensor beside it; set by hand, not calibrated
 _INSIDE = 0.5  # of its time
 _SAME = 1e-9  # m/s
 _WHY = "Meanwhile the {valve} of this {wheel} does not answer: the {wheel} may stand, be dragged or slip, which makes the fault less probable."

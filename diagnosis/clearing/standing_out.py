@@ -54,10 +54,10 @@ def what_stands_out(checks: Sequence[Checked], cells: Cells, words: MachineWords
     words : MachineWords
         How to speak of the machine.
     """
-    found = {check.component: fault_of_angle(check, cells) for check in checks if _off_second_angle(check)}
-    found |= {check.component: fault_of_axle(check, cells) for check in checks if _does_not_answer(check, cells)}
     jumping = {c.component: fault_of_jumps(c, cells) for c in checks if c.check is Check.JUMP and not c.passed}
-    found |= {component: fault for component, fault in jumping.items() if fault is not None}
+    found = {component: fault for component, fault in jumping.items() if fault is not None}
+    found |= {check.component: fault_of_angle(check, cells) for check in checks if _off_second_angle(check)}
+    found |= {check.component: fault_of_axle(check, cells) for check in checks if _does_not_answer(check, cells)}
     if (wheel := _alone(checks, cells)) is not None:
         found[wheel.component] = fault_of_wheel(wheel, cells, alone=True)
     elif not _stated(cells) and (wheel := _alone_not_following(checks, cells)) is not None:

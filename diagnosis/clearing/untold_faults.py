@@ -19,7 +19,7 @@ from diagnosis.results.vocabulary import Tier
 from replay.faults import FaultMode, Side, State
 
 _P = 0.93  # on tuning missions of nine machines 23 of 24 were faults of the part that is named, ...
-_P_ABOVE = 0.75  # of a wheel that is too quick: all others may be too slow instead
+_P_ABOVE = 0.75  # of a wheel that is too quick, set by hand: all others may be too slow instead
 # ... of which these shares were of the row that it looks like, and of others
 _ROWS = {
     FaultMode.INEFFICIENT: {

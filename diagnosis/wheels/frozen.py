@@ -30,7 +30,7 @@ _STEPS = 4.0  # of the reading, by which others move at least
 _INSIDE = 0.5  # of a finding's time
 _CHANGING, _CERTAIN, _TREMBLING = 0.1, 0.9, 0.45  # of the readings; a finding as sure stays, others are no surer
 _TREMBLES = "Its last digits go on changing, which those of a stuck sensor rarely do."
-_P, _VALVE = 0.96, 0.02  # that the sensor is frozen, and that its valve is
+_P, _VALVE = 0.96, 0.02  # that the sensor is frozen, and that its valve is; set by hand, not calibrated
 
 
 class Frozen(NamedTuple):
