@@ -21,8 +21,9 @@ _ALIKE = 0.5  # of the limit: where half of the wheels deviate by more, openings
 #: torque's, and 0.56 and more of valves with wide dead bands.
 _SURELY, _FOLLOWS = 0.8, 0.45
 _CHANGED = 0.88  # a change counts by its limit in windows, not over the mission
-#: A deviation counts from this on, whatever the other wheels do [ln]: tyres hide most of a valve's loss.
-LEAST_SEEN = 0.1
+#: A deviation counts from this on, whatever the other wheels do [ln]: tyres hide most of a valve's loss, which is all that
+#: shows of it where neither side is measured twice.
+_LEAST_SEEN, _LEAST_SEEN_TWICE = 0.06, 0.1
 #: A deviation counts from so many times the largest of the other wheels' on, a change likewise.
 _ALONE, _CHANGED_ALONE = 3.0, 2.2
 _LEAST_TWICE = 0.75  # of the loss that counts, where both sides are measured twice
@@ -187,11 +188,12 @@ def response_limits(responses: Responses, twice: Sequence[tuple[bool, bool]], cl
         limit._replace(changed=alone(responses.changes, i, limit.changed, least, _CHANGED_ALONE))
         if all(twice[i])
         else limit._replace(
-            below=alone(most[0], i, limit.below, LEAST_SEEN, _ALONE),
-            above=alone(most[1], i, limit.above, LEAST_SEEN, _ALONE),
-            changed=alone(responses.changes, i, limit.changed, LEAST_SEEN, _CHANGED_ALONE),
+            below=alone(most[0], i, limit.below, seen, _ALONE),
+            above=alone(most[1], i, limit.above, seen, _ALONE),
+            changed=alone(responses.changes, i, limit.changed, seen, _CHANGED_ALONE),
         )
         for i, limit in enumerate(usual)
+        for seen in (_LEAST_SEEN_TWICE if any(twice[i]) else _LEAST_SEEN,)
     ]
 
 

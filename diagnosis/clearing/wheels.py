@@ -10,7 +10,6 @@ import numpy as np
 from diagnosis.clearing.cells import Array, Cells
 from diagnosis.clearing.measure import alone, compared, lasts, late, off_commands, times, worst
 from diagnosis.clearing.responses import (
-    LEAST_SEEN,
     OTHERS,
     largest,
     measured_twice,
@@ -28,9 +27,8 @@ FLOOR = 0.16  # of the top speed: a deviation is a share of at least this
 OPENING = 0.03  # of full opening: likewise
 ROUGH, _ROUGHER = 0.15, 5.0  # quick changes: share of the speed, times those of the other wheels
 LATE_S = 0.2
-CARRIED = float(
-    np.exp(-2.0 * LEAST_SEEN)
-)  # of its speed: the ground gives a wheel more, and a partial loss of its valve stays hidden
+#: How much more of a partial loss the speed per opening shows than a carried wheel's speed alone: its controller asks for more.
+_ASKED_MORE = 2.0
 _TRACKING, _TRACKING_ALONE = 0.35, 0.12  # at most, and at least where the other wheels follow much better
 _SLOWER = 3.0  # times the deviation of the others' valves, or speeds: a slow one
 VALVE = 1.4  # dead band and hysteresis of a healthy valve: the limit as a multiple of the loss that counts
@@ -67,7 +65,8 @@ def wheel_checks(cells: Cells, clear_at: float) -> Iterator[Checked]:
             limit = alone(slowest, i, VALVE * clear_at, clear_at, _SLOWER)
             yield worst(cells, (*about, Side.ACTUATOR, Check.SECOND_MEASUREMENT), behind[:, i], limit, apart=True)
         if wheel in cells.carried and not any(twice[i]) and _known(command[:, i]):
-            yield Checked(*about, Side.ACTUATOR, Check.CARRIED, cells.carried[wheel], CARRIED)
+            limit = most_carried(limits[i].below, clear_at)
+            yield Checked(*about, Side.ACTUATOR, Check.CARRIED, cells.carried[wheel], limit)
         # where an opening is no speed, nothing of it is asked of a wheel that is measured twice on either side
         if _known(used[:, i]) and speed.shape[1] > OTHERS and (tells or not all(twice[i])):
             own = limits[i]
@@ -87,6 +86,19 @@ def wheel_checks(cells: Cells, clear_at: float) -> Iterator[Checked]:
             if delays[i] is not None:
                 yield lasts(cells, (*about, Side.SENSOR, Check.DELAY), delays[i], LATE_S)
         yield worst(cells, (*about, Side.SENSOR, Check.ROUGHNESS), rough[:, i], ROUGH, apart=True)
+
+
+def most_carried(below: float, clear_at: float) -> float:
+    """Share of its speed that the ground may give a wheel, so that a loss of its valve still shows in the speed per opening [1].
+
+    Parameters
+    ----------
+    below : float
+        From here on a fall of the speed per opening counts in this mission [ln].
+    clear_at : float
+        The loss that counts [1].
+    """
+    return 1.0 + below / (_ASKED_MORE * float(np.log1p(-clear_at)))
 
 
 def _known(x: Array) -> bool:

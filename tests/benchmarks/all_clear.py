@@ -43,7 +43,7 @@ from troubles import Part, Trouble, troubles
 from variation import recorded_signals
 
 from diagnosis.pipeline import diagnose_mission, diagnose_signals
-from diagnosis.results.document import ReportDocument
+from diagnosis.results.document import IntervalRow, ReportDocument
 from replay.errors import MfhcaError
 from replay.machine.config import haulotte
 from replay.simulation.options import SimulationOptions
@@ -92,6 +92,8 @@ class Outcome:
     words: str
     sure: int = 0
     wrong_sure: int = 0
+    rows: int = 0
+    right_rows: int = 0
     findings: tuple[str, ...] = ()
     seed: int = -1
     kind: int | None = None
@@ -219,7 +221,20 @@ def judged(task: Task, tier: str, name: str, report: ReportDocument, parts: froz
         outcome = "wrong part" if wrong_high else "abstained"
     ill = Outcome(task.machine, name, tier, outcome, wrong_high, len(high), verdict["status"], words)
     wrong_sure = 0 if not parts else sum(s and not ok for s, ok in zip(sure, right, strict=True))
-    return replace(ill, sure=sum(sure) if parts else 0, wrong_sure=wrong_sure, **own)
+    rows = [
+        f["mode"] in modes
+        for f, ok in zip(found, right, strict=True)
+        if ok and f["mode"] != "outside_table" and (modes := _modes(task, f))
+    ]
+    return replace(
+        ill, sure=sum(sure) if parts else 0, wrong_sure=wrong_sure, rows=len(rows), right_rows=sum(rows), **own
+    )
+
+
+def _modes(task: Task, finding: IntervalRow) -> set[str]:
+    """Rows that the simulated faults of a finding's part have."""
+    faults = task.trouble.faults if task.trouble else ()
+    return {f.mode.value for f in faults if _names(finding["component"], finding["side"], (f.component, f.side.value))}
 
 
 def _names(component: str, side: str, part: Part) -> bool:

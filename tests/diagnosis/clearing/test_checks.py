@@ -11,6 +11,7 @@ from diagnosis.clearing import yaw
 from diagnosis.clearing.axles import dead_bands
 from diagnosis.clearing.checks import checks_of
 from diagnosis.clearing.measure import off_commands
+from diagnosis.clearing.wheels import most_carried
 from diagnosis.results.clearing import Check, Checked
 from diagnosis.results.machine_words import HYDRAULIC
 from replay.faults import FaultMode, FaultSpec, Side
@@ -238,10 +239,16 @@ def test_wheels_that_are_steered_one_by_one_are_an_axle_beside_the_yaw_rate() ->
     assert all(c.passed for c in yaw.values())
 
 
-@pytest.mark.parametrize(("base", "share", "passed"), [(True, 0.95, False), (True, 0.7, True), (False, 0.95, None)])
+@pytest.mark.parametrize(("base", "share", "passed"), [(True, 0.95, False), (True, 0.5, True), (False, 0.95, None)])
 def test_a_wheel_that_the_ground_carries_shows_no_dead_valve(base: bool, share: float, passed: bool | None) -> None:
     """With the opening measured, the ground hides nothing of the valve: it is not asked."""
     cells = replace(in_cells(simulated(), base=base), carried={"FR": share})
     asked = [c for c in checks_of(cells, HYDRAULIC) if c.check is Check.CARRIED]
     assert [(c.component, c.passed) for c in asked] == ([] if passed is None else [("FR", passed)])
     assert all(c.passed or "ground carries FR" in c.text for c in asked)
+
+
+def test_how_much_the_ground_may_carry_goes_with_what_counts_in_the_mission() -> None:
+    """Where wheels differ much anyhow, a loss must show more of itself."""
+    assert most_carried(0.06, 0.25) == pytest.approx(1 - 0.06 / (2 * -np.log(0.75)))
+    assert most_carried(0.2, 0.25) < most_carried(0.1, 0.25) < most_carried(0.1, 0.5)
