@@ -22,7 +22,7 @@ import traceback
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from contextlib import nullcontext
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from types import ModuleType
 
@@ -37,13 +37,13 @@ import geared_circuit
 import hydrostatic
 import numpy as np
 from accuracy import EVIDENCE
+from campaign import Outcome, Task, judged
 from foreign_machine import NAME as FOREIGN
 from foreign_machine import faults_for, has, maker, missions, scenario
-from troubles import Part, Trouble, troubles
+from troubles import Trouble, troubles
 from variation import recorded_signals
 
 from diagnosis.pipeline import diagnose_mission, diagnose_signals
-from diagnosis.results.document import IntervalRow, ReportDocument
 from replay.errors import MfhcaError
 from replay.machine.config import haulotte
 from replay.simulation.options import SimulationOptions
@@ -57,46 +57,8 @@ OTHERS = {
     m.NAME: m
     for m in (hydrostatic, electrohydraulic, electric, flow_sharing, closed_circuit, geared_circuit, forwarder)
 }
-_SURE = 0.9
 _DRIVEN, _STEERED = 0.06, 0.02  # m/s, rad/s
 _DRIVEN_S, _STEERED_S = 3.0, 1.0
-
-
-@dataclass(frozen=True)
-class Task:
-    """One mission: its machine, which of the kinds of trouble it has (None: none), its seed, length, and the evidence to judge it with."""
-
-    machine: str
-    kind: int | None
-    seed: int
-    duration: float
-    tiers: tuple[str, ...]
-
-    @property
-    def trouble(self) -> Trouble | None:
-        """What is wrong; None: nothing."""
-        return None if self.kind is None else troubles(self.duration)[self.kind]
-
-
-@dataclass(frozen=True)
-class Outcome:
-    """What became of a mission at one level of evidence."""
-
-    machine: str
-    trouble: str
-    tier: str
-    outcome: str
-    wrong_high: int
-    high: int
-    status: str
-    words: str
-    sure: int = 0
-    wrong_sure: int = 0
-    rows: int = 0
-    right_rows: int = 0
-    findings: tuple[str, ...] = ()
-    seed: int = -1
-    kind: int | None = None
 
 
 def options_of(task: Task) -> SimulationOptions:
@@ -190,55 +152,6 @@ def exercised(t: np.ndarray, asked: Mapping[str, np.ndarray], trouble: Trouble |
             np.count_nonzero(used & (t >= f.start_s) & (t < f.stop_s))
         )
     return any(s >= (_STEERED_S if c in ("front", "rear") else _DRIVEN_S) for c, s in time.items())
-
-
-def judged(task: Task, tier: str, name: str, report: ReportDocument, parts: frozenset[Part] | None) -> Outcome:
-    """How a report stands to what is wrong: `parts` fail; None: nothing does."""
-    found = [f for f in report["intervals"] if f["severity"] != "info"]
-    high = [f for f in found if f["severity"] == "high"]
-    verdict = report["verdict"]
-    still = [
-        f"{c['component']} {c['check']} {c['worst']} of {c['limit']:.2f}" for c in report["clearing"] if not c["passed"]
-    ]
-    words = "; ".join([verdict["title"], *still])
-    lines = tuple(
-        f"{f['component']} {f['side']} {f['mode']} p {f['probability']:.3f} {f['severity']} {f['start_s']:.1f}-{f['stop_s']:.1f} s"
-        for f in found
-    )
-    own = {"findings": lines, "seed": task.seed, "kind": task.kind}
-    sure = [f["probability"] >= _SURE for f in found]
-    if parts is None:
-        sound = Outcome(task.machine, name, tier, verdict["status"], len(high), len(high), verdict["status"], words)
-        return replace(sound, sure=sum(sure), wrong_sure=sum(sure), **own)
-    right = [any(_names(f["component"], f["side"], part) for part in parts) for f in found]
-    wrong_high = 0 if not parts else sum(f["severity"] == "high" and not ok for f, ok in zip(found, right, strict=True))
-    named = any(right) if parts else bool(found)
-    if verdict["cleared"] and not named:
-        outcome = "cleared"
-    elif named:
-        outcome = "named"
-    else:
-        outcome = "wrong part" if wrong_high else "abstained"
-    ill = Outcome(task.machine, name, tier, outcome, wrong_high, len(high), verdict["status"], words)
-    wrong_sure = 0 if not parts else sum(s and not ok for s, ok in zip(sure, right, strict=True))
-    rows = [
-        f["mode"] in modes
-        for f, ok in zip(found, right, strict=True)
-        if ok and f["mode"] != "outside_table" and (modes := _modes(task, f))
-    ]
-    return replace(
-        ill, sure=sum(sure) if parts else 0, wrong_sure=wrong_sure, rows=len(rows), right_rows=sum(rows), **own
-    )
-
-
-def _modes(task: Task, finding: IntervalRow) -> set[str]:
-    """Rows that the simulated faults of a finding's part have."""
-    faults = task.trouble.faults if task.trouble else ()
-    return {f.mode.value for f in faults if _names(finding["component"], finding["side"], (f.component, f.side.value))}
-
-
-def _names(component: str, side: str, part: Part) -> bool:
-    return component == part[0] and side in (part[1], "sensor_or_actuator")
 
 
 def tasks_of(
