@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -60,6 +61,8 @@ class Judged:
         Assessments of all parts.
     named_by : tuple[Checked, ...]
         Checks that alone name a fault of `found`: which part of it fails is not known, so that they stay open.
+    kept : dict[str, Any]
+        What the checks computed of the mission, whatever is found in it.
     """
 
     mission: Mission
@@ -68,6 +71,7 @@ class Judged:
     replay: Replay
     found: ComponentResult
     named_by: tuple[Checked, ...] = ()
+    kept: dict[str, Any] = field(default_factory=dict, repr=False, compare=False)
 
     @cached_property
     def intervals(self) -> tuple[FaultInterval, ...]:
@@ -78,7 +82,8 @@ class Judged:
     @cached_property
     def cells(self) -> Cells:
         """The mission in cells, with what is stated."""
-        return cells_of(self.mission.timeline, self.replay, self.machine, self.intervals, self.found.wheel_model)
+        line, model = self.mission.timeline, self.found.wheel_model
+        return cells_of(line, self.replay, self.machine, self.intervals, model, self.kept)
 
     @cached_property
     def checks(self) -> tuple[Checked, ...]:

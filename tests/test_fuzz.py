@@ -20,7 +20,7 @@ from tests.benchmarks.fuzzing.formats import TARGETS
 from tests.benchmarks.fuzzing.pool import Pool
 from tests.benchmarks.fuzzing.worker import input_of, lay_out, sound_samples, tried
 
-SEED, COUNT = 7, {"mcap": 60, "rosbag2": 40, "store": 30, "results": 40, "first-look": 30}
+SEED, COUNT = 7, {"mcap": 30, "rosbag2": 20, "store": 15, "results": 20, "first-look": 15}
 
 
 @pytest.mark.parametrize("name", TARGETS)
@@ -28,7 +28,7 @@ def test_damaged_inputs_end_in_one_stated_way(tmp_path: Path, name: str) -> None
     target = TARGETS[name]()
     (corpus := tmp_path / "corpus").mkdir()
     samples = sound_samples(target, corpus)
-    for number in range(COUNT.get(name, 80)):
+    for number in range(COUNT.get(name, 40)):
         sample, case, source = input_of(target, samples, SEED, number)
         answer = tried(target, sample, case, source, lay_out(sample, case, tmp_path / str(number)))
         assert not answer["kind"], (number, answer)

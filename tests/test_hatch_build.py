@@ -38,16 +38,20 @@ def _finish(module: ModuleType, root: Path, version: str) -> list[str]:
     return told.lines
 
 
+@pytest.mark.parametrize(("processors", "names"), [(2, ["diagnose", "simulate", "diagnose"]), (1, ["diagnose"])])
 def test_an_editable_installation_runs_the_first_diagnosis(
-    hook_module: ModuleType, monkeypatch: pytest.MonkeyPatch
+    hook_module: ModuleType, monkeypatch: pytest.MonkeyPatch, processors: int, names: list[str]
 ) -> None:
     runs: list[tuple[list[str], dict[str, Any]]] = []
     monkeypatch.setattr(subprocess, "run", lambda command, **options: runs.append((command, options)))
+    monkeypatch.setattr(hook_module.os, "cpu_count", lambda: processors)
     told = _finish(hook_module, ROOT, "editable")
-    ((command, options),) = runs
-    assert command[:3] == [sys.executable, "-m", "cli.main"]
-    assert str(ROOT / "sample_logs" / "three_faults.mcap") in command
-    assert options["cwd"] == str(ROOT)
+    assert sorted(command[4] for command, _ in runs) == sorted(names)
+    sample = str(ROOT / "sample_logs" / "three_faults.mcap")
+    assert sum(sample in command for command, _ in runs) == 1
+    for command, options in runs:
+        assert command[:4] == [sys.executable, "-m", "cli.main", "-q"]
+        assert options["cwd"] == str(ROOT)
     assert len(told) == 1
 
 

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,7 @@ from replay.machine.config import Machine
 from replay.signals.timeline import Timeline
 
 Array = NDArray[np.float64]
+_T = TypeVar("_T")
 
 CELL_S = 0.1
 WINDOW_S = 3.0  # a fault of the size that counts, for this long, must show
@@ -43,7 +45,7 @@ class Cells:
     machine: Machine
     stated: Mapping[str, Sequence[tuple[float, float]]] = field(default_factory=dict)
     carried: Mapping[str, float] = field(default_factory=dict)
-    _kept: dict[str, Array] = field(default_factory=dict, repr=False, compare=False)
+    _kept: dict[str, Any] = field(default_factory=dict, repr=False, compare=False)
 
     @cached_property
     def width(self) -> int:
@@ -96,21 +98,30 @@ class Cells:
         """Whether faults of the component are stated for so long that its usual behaviour is theirs."""
         return bool(self.explained(component).mean() > _MOSTLY)
 
+    def once(self, what: str, found: Callable[[], _T]) -> _T:
+        """What `found` gives, computed once for a mission, whatever is stated of it; `what` names it, and no signal."""
+        if what not in self._kept:
+            self._kept[what] = found()
+        kept: _T = self._kept[what]
+        return kept
+
     def means(self, name: str) -> Array:
         """Mean of a signal in each cell; NaN where it has no value. Shape (cells,)."""
-        if name not in self._kept:
+
+        def means() -> Array:
             found = self.timeline.get(name)
-            self._kept[name] = np.full(self.size, np.nan) if found is None else self.of(found)
-        return self._kept[name]
+            return np.full(self.size, np.nan) if found is None else self.of(found)
+
+        return self.once(name, means)
 
     def of(self, x: Array) -> Array:
         """The same of any column of the timeline, shape (cells, …)."""
         return np.concatenate([_means(x[part], self.width) for part in blocks(len(x), self.width)])
 
-    @cached_property
+    @property
     def reference(self) -> Array:
         """Commanded speed of every wheel, shape (cells, wheels)."""
-        return self.of(self.replay.v_ref)
+        return self.once("reference", lambda: self.of(self.replay.v_ref))
 
     def wheels(self, leaf: str) -> Array:
         """A signal of every wheel, shape (cells, wheels)."""
@@ -152,7 +163,7 @@ class Frame:
 
     def sums(self, x: Array) -> Array:
         """Sum over each window of what is known, shape (windows, …)."""
-        return self._sums(np.nan_to_num(x))
+        return self._sums(x if np.isfinite(x).all() else np.nan_to_num(x))
 
     def _sums(self, x: Array) -> Array:
         total = np.concatenate([np.zeros((1, *x.shape[1:])), np.cumsum(x, axis=0)])

@@ -5,6 +5,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 from diagnosis.clearing.axles import axle_checks
 from diagnosis.clearing.cells import Cells
@@ -27,6 +28,7 @@ def cells_of(
     machine: Machine,
     faults: Sequence[FaultInterval] = (),
     model: WheelModelFit | None = None,
+    kept: dict[str, Any] | None = None,
 ) -> Cells:
     """A mission in cells.
 
@@ -38,6 +40,8 @@ def cells_of(
         What is stated: it need not be asked again whether something is wrong with such a part at that time.
     model : WheelModelFit or None
         Of the wheels on the ground.
+    kept : dict[str, Any] or None
+        What was computed of this mission already, whatever is stated of it; more is added.
     """
     stated: dict[str, list[tuple[float, float]]] = {}
     for f in faults:
@@ -45,7 +49,8 @@ def cells_of(
             stated.setdefault(f.component, []).append((f.start_s, f.stop_s))
     plants = () if model is None or not model.reliable else model.plants
     held = {w: p.grip for w, p in zip(machine.wheels, plants, strict=False) if p is not None and p.grip is not None}
-    return Cells(timeline, replay, machine, stated, {w: grip / (1.0 + grip) for w, grip in held.items()})
+    carried = {w: grip / (1.0 + grip) for w, grip in held.items()}
+    return Cells(timeline, replay, machine, stated, carried, {} if kept is None else kept)
 
 
 def checks_of(cells: Cells, words: MachineWords) -> tuple[Checked, ...]:

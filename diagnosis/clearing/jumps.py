@@ -59,6 +59,10 @@ def fault_of_jumps(check: Checked, cells: Cells) -> Finding | None:
 
 def _found(cells: Cells) -> dict[str, tuple[Jumps, float]]:
     """Jumps of all axles whose angles are read often enough, and the largest rate of any of them [rad/s]."""
+    return cells.once("jumps", lambda: _searched(cells))
+
+
+def _searched(cells: Cells) -> dict[str, tuple[Jumps, float]]:
     read = {}
     for axle in cells.machine.axles:
         name = f"steer.{axle}.phi"

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
+from numpy.typing import NDArray
 
 from diagnosis.clearing.cells import Array, Cells
 
@@ -29,21 +32,24 @@ def wild_readings(cells: Cells, speed: Array, floor: float) -> Array:
     frame = cells.frame
     height, count = np.zeros(speed.shape), np.zeros(speed.shape)
     for i, wheel in enumerate(cells.machine.wheels):
-        name = f"wheel.{wheel}.v"
-        y = cells.timeline.get(name)
-        if y is None:
-            continue
-        at = np.flatnonzero(cells.timeline.fresh[name] & np.isfinite(y))
-        v = y[at]
-        if v.size < _FEW:
-            continue
-        before, after = v[1:-1] - v[:-2], v[1:-1] - v[2:]
-        alone = np.where(before * after > 0.0, np.minimum(np.abs(before), np.abs(after)), 0.0)
-        usual = float(np.median(np.abs(before + after))) / 0.6745 / np.sqrt(6.0)
-        wild = alone > max(_NOISES * usual, _OF_TOP * cells.machine.max_speed)
-        cell, apart = at[1:-1][wild] // cells.width, cells.apart(wheel)
-        height[:, i] = np.bincount(cell, alone[wild], minlength=cells.size) * apart
+        cell, wild = cells.once(f"wild {wheel}", partial(_wild, cells, f"wheel.{wheel}.v"))
+        apart = cells.apart(wheel)
+        height[:, i] = np.bincount(cell, wild, minlength=cells.size) * apart
         count[:, i] = np.bincount(cell, minlength=cells.size) * apart
     many = frame.sums(count)
     mean = frame.sums(height) / np.maximum(many, 1.0)
     return np.asarray(np.where(many >= _FEW, mean / np.maximum(np.nan_to_num(frame.rms(speed)), floor), 0.0))
+
+
+def _wild(cells: Cells, name: str) -> tuple[NDArray[np.intp], Array]:
+    """Cells of a signal's wild readings, and their heights [m/s]."""
+    y = cells.timeline.get(name)
+    at = np.zeros(0, dtype=np.intp) if y is None else np.flatnonzero(cells.timeline.fresh[name] & np.isfinite(y))
+    if y is None or at.size < _FEW:
+        return np.zeros(0, dtype=np.intp), np.zeros(0)
+    v = y[at]
+    before, after = v[1:-1] - v[:-2], v[1:-1] - v[2:]
+    alone = np.where(before * after > 0.0, np.minimum(np.abs(before), np.abs(after)), 0.0)
+    usual = float(np.median(np.abs(before + after))) / 0.6745 / np.sqrt(6.0)
+    wild = alone > max(_NOISES * usual, _OF_TOP * cells.machine.max_speed)
+    return at[1:-1][wild] // cells.width, np.asarray(alone[wild], dtype=np.float64)

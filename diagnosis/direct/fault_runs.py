@@ -28,6 +28,20 @@ _ONE_GAIN = 0.1  # by which gains of one fault may differ
 _PLAYS = 3.0  # by which a command must move for a valve with a loss of gain to follow
 
 
+class _Evidence:
+    """Log-evidence of each row over parts of one channel, each computed once: the same ones are asked again and again."""
+
+    def __init__(self, samples: Samples, model: ModeModel) -> None:
+        self.samples, self.model = samples, model
+        self._known: dict[tuple[int, int], Array] = {}
+
+    def of(self, start: int, stop: int) -> Array:
+        """That of samples [start, stop), shape (rows,)."""
+        if (start, stop) not in self._known:
+            self._known[start, stop] = segment_evidence(self.samples.part(start, stop), self.model)
+        return self._known[start, stop]
+
+
 def fault_runs(path: ModePath, samples: Samples, model: ModeModel, dt: float, shortest: int, play: float) -> list[Run]:
     """Faulty runs of a path, joined where they belong together, without the ends in which nothing moves.
 
@@ -36,8 +50,9 @@ def fault_runs(path: ModePath, samples: Samples, model: ModeModel, dt: float, sh
     runs = absorb_short(runs_of(path), shortest)
     runs = join_noisy(runs)
     runs = merge_equal(runs, max(2, round(0.02 / dt)), VARYING_ROWS + UNSATURATED_ROWS)
-    runs = _bridged(_renamed([r for r in runs if r.row != HEALTHY], samples, model), samples, model)
-    runs = _bridged(_resting(runs, samples, model, play), samples, model)
+    evidence = _Evidence(samples, model)
+    runs = _bridged(_renamed([r for r in runs if r.row != HEALTHY], evidence), evidence)
+    runs = _bridged(_resting(runs, samples, model, play), evidence)
     out = []
     for run in runs:
         if run.row in UNSATURATED_ROWS:
@@ -83,7 +98,7 @@ def _pairs(run: Run, samples: Samples, model: ModeModel) -> tuple[Array, Array, 
     return part.y[use], part.x[use], model.noise * float(np.sqrt(white.mean())) if white.size else model.noise
 
 
-def _renamed(runs: list[Run], samples: Samples, model: ModeModel) -> list[Run]:
+def _renamed(runs: list[Run], evidence: _Evidence) -> list[Run]:
     """Noisy runs beside another one under that one's row, where it explains them better: the path never went back."""
     out = list(runs)
     for i, run in enumerate(runs):
@@ -94,9 +109,9 @@ def _renamed(runs: list[Run], samples: Samples, model: ModeModel) -> list[Run]:
         ]
         if run.row not in VARYING_ROWS or not near:
             continue
-        evidence = segment_evidence(samples.part(*inner(run)), model)
-        best = max((r.row for r in near), key=lambda row: evidence[row])
-        if evidence[best] > evidence[run.row] + model.switch_cost:
+        rows = evidence.of(*inner(run))
+        best = max((r.row for r in near), key=lambda row: rows[row])
+        if rows[best] > rows[run.row] + evidence.model.switch_cost:
             out[i] = Run(run.start, run.stop, best)
     return out
 
@@ -107,7 +122,7 @@ def inner(run: Run) -> tuple[int, int]:
     return run.start + edge, run.stop - edge
 
 
-def _bridged(runs: list[Run], samples: Samples, model: ModeModel) -> list[Run]:
+def _bridged(runs: list[Run], evidence: _Evidence) -> list[Run]:
     """Join runs of one row where the same fault explains them and what lies between as well as parts of their own do.
 
     Between them may lie a healthy stretch or a shorter run of another row.
@@ -116,21 +131,21 @@ def _bridged(runs: list[Run], samples: Samples, model: ModeModel) -> list[Run]:
     for run in runs:
         out.append(run)
         while len(out) > 1:
-            if _one_fault(out[-2], out[-1], samples, model):
+            if _one_fault(out[-2], out[-1], evidence):
                 out[-2:] = [Run(out[-2].start, out[-1].stop, out[-1].row)]
-            elif len(out) > 2 and _interrupted(out[-3], out[-2], out[-1], samples, model):
+            elif len(out) > 2 and _interrupted(out[-3], out[-2], out[-1], evidence):
                 out[-3:] = [Run(out[-3].start, out[-1].stop, out[-1].row)]
             else:
                 break
     return out
 
 
-def _interrupted(first: Run, middle: Run, last: Run, samples: Samples, model: ModeModel) -> bool:
+def _interrupted(first: Run, middle: Run, last: Run, evidence: _Evidence) -> bool:
     """Whether a run of another row merely interrupts one fault, such as a value that rests for a moment."""
     if first.row != last.row or middle.size >= min(first.size, last.size):
         return False
-    brief = last.start - first.stop <= min(_BRIEF_S / model.dt, min(first.size, last.size) / 4)
-    return (brief and _of_one_gain(first, last, samples, model)) or _one_fault(first, last, samples, model)
+    brief = last.start - first.stop <= min(_BRIEF_S / evidence.model.dt, min(first.size, last.size) / 4)
+    return (brief and _of_one_gain(first, last, evidence.samples, evidence.model)) or _one_fault(first, last, evidence)
 
 
 def _of_one_gain(first: Run, last: Run, samples: Samples, model: ModeModel) -> bool:
@@ -148,14 +163,12 @@ def _of_one_gain(first: Run, last: Run, samples: Samples, model: ModeModel) -> b
     return abs(gains[0] - gains[1]) <= _ONE_GAIN
 
 
-def _one_fault(first: Run, second: Run, samples: Samples, model: ModeModel) -> bool:
+def _one_fault(first: Run, second: Run, evidence: _Evidence) -> bool:
     """Whether two runs and what lies between are one fault rather than three parts."""
-    reach = round(_BRIDGE_S / model.dt)
+    reach = round(_BRIDGE_S / evidence.model.dt)
     a, b, c, d = max(first.start, first.stop - reach), first.stop, second.start, min(second.stop, second.start + reach)
-    if first.row != second.row or c - b > _APART_S / model.dt:
+    if first.row != second.row or c - b > _APART_S / evidence.model.dt:
         return False
-    whole = segment_evidence(samples.part(a, d), model)[first.row]
-    parts = (
-        segment_evidence(samples.part(a, b), model)[first.row] + segment_evidence(samples.part(c, d), model)[first.row]
-    )
-    return bool(whole > parts + segment_evidence(samples.part(b, c), model).max() - 2 * model.switch_cost)
+    row = first.row
+    whole, parts = evidence.of(a, d)[row], evidence.of(a, b)[row] + evidence.of(c, d)[row]
+    return bool(whole > parts + evidence.of(b, c).max() - 2 * evidence.model.switch_cost)

@@ -15,6 +15,7 @@ from diagnosis.results.result import Epsilon, Hypothesis, Sat
 from diagnosis.results.vocabulary import Tier
 from diagnosis.wheels.findings import WheelFindings
 from diagnosis.wheels.inputs import WheelsData
+from replay.arrays.blocks import blocks
 from replay.faults import FaultMode, Side, State
 
 Array = NDArray[np.float64]
@@ -54,25 +55,52 @@ def frozen_of(y: Array, span: float, dt: float) -> list[Frozen]:
     dt : float
         Step [s].
     """
-    same = np.diff(y) == 0.0
+    same = y[1:] == y[:-1]
     edge = np.flatnonzero(np.diff(np.r_[False, same, False].astype(np.int8)))
     starts, stops = edge[::2], edge[1::2] + 1
     if not starts.size:
         return []
     value, length = y[starts], (stops - starts) * dt
     turns = np.abs(value) > _TURNS * span
-    size = np.abs(y)
-    changes = np.flatnonzero(np.diff(y) != 0.0)
-    usual = float(np.median(np.diff(changes))) * dt if changes.size > 1 else dt
+    usual = _usual(starts, stops, same.size) * dt
     out = []
     for k in np.flatnonzero(turns & (length >= max(_LEAST_S, _READINGS * usual))):
-        beside = np.r_[size[: starts[k]], size[stops[k] :]]
-        if np.abs(value[k]) >= _OF_MOST * float(np.nanmax(beside, initial=-1.0)) >= 0.0:
+        beside = max(_largest(y[: starts[k]]), _largest(y[stops[k] :]))
+        if np.abs(value[k]) >= _OF_MOST * beside >= 0.0:
             continue  # the end of its range
         longest = float(np.max(length[turns & (value != value[k])], initial=usual))
         if length[k] >= _LONGER * longest:
             out.append(Frozen(int(starts[k]), int(stops[k]), float(value[k]), longest))
     return out
+
+
+def _usual(starts: NDArray[np.intp], stops: NDArray[np.intp], steps: int) -> float:
+    """Median number of steps from one change to the next, where samples [start, stop) repeat one value; 1 where fewer than two change."""
+    inside = (starts > 0) & (stops <= steps)  # a change on either side
+    changes = steps - int((stops - starts - 1).sum())
+    if changes < 2:
+        return 1.0
+    longer = np.sort((stops - starts)[inside])
+    ones = changes - 1 - longer.size
+
+    def at(k: int) -> int:
+        return 1 if k < ones else int(longer[k - ones])
+
+    return 0.5 * (at((changes - 2) // 2) + at((changes - 1) // 2))
+
+
+def _largest(y: Array) -> float:
+    """Largest size of what is known, without a copy; -1 where nothing is."""
+    return max(float(np.fmax.reduce(y, initial=-1.0)), -float(np.fmin.reduce(y, initial=1.0)))
+
+
+def _least_step(y: Array) -> float:
+    """Smallest size by which a value changes, block by block; infinite where none does."""
+    least = np.inf
+    for part in blocks(y.size):
+        steps = np.abs(np.diff(y[part.start : part.stop + 1]))
+        least = min(least, float(np.min(steps[steps > 0.0], initial=np.inf)))
+    return least
 
 
 def with_frozen(data: WheelsData, found: Mapping[int, WheelFindings]) -> dict[int, WheelFindings]:
@@ -102,8 +130,7 @@ def with_frozen(data: WheelsData, found: Mapping[int, WheelFindings]) -> dict[in
 def _moves_on(data: WheelsData, i: int, r: Frozen) -> bool:
     """Whether the valve's opening, or the speed of most other wheels, which turn, changes meanwhile."""
     part = slice(r.start, r.stop)
-    steps = np.abs(np.diff(data.y[:, i]))
-    step = float(np.min(steps[steps > 0.0], initial=np.inf))
+    step = _least_step(data.y[:, i])
     others = np.delete(data.y[part], i, axis=1)
     if others.size and np.isfinite(others).any() and float(np.nanmedian(np.abs(others))) <= _TURNS * data.span:
         return False  # all others stand: a wheel that stands reads one value, its offset too

@@ -200,7 +200,7 @@ def asked(seed: int, duration: float) -> tuple[Array, dict[str, Array]]:
     return np.arange(len(ref)) * 10 * STEP_S, dict(zip((*WHEELS, *AXLES), ref.T, strict=True))
 
 
-@lru_cache(maxsize=3)
+@lru_cache(maxsize=8)
 def driven(seed: int, faults: tuple[FaultSpec, ...], duration: float) -> tuple[Array, ...]:
     """The mission per millisecond; see `drive`."""
     (made, parts), rng = build(seed), np.random.default_rng(103_000 + seed)

@@ -228,7 +228,7 @@ def frames_of(seed: int, duration: float) -> Array:
     return out
 
 
-@lru_cache(maxsize=3)
+@lru_cache(maxsize=8)
 def driven(seed: int, faults: tuple[FaultSpec, ...], duration: float) -> tuple[Array, ...]:
     """The mission per millisecond; see `drive`."""
     (made, parts), rng = build(seed), np.random.default_rng(124_000 + seed)

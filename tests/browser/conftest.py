@@ -24,7 +24,7 @@ WATCH = (
 _PATIENCE_MS = 20_000  # a busy machine draws slowly; what is there at once is not waited for
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="package")
 def browser() -> Iterator[Any]:
     chromium = os.environ.get("CHROMIUM") or shutil.which("chromium") or shutil.which("google-chrome")
     if not chromium:
@@ -42,7 +42,7 @@ def _sample(name: str) -> tuple[dict[str, Any], samples.Columns, *tuple[Closeups
     return getattr(module, name)()  # type: ignore[no-any-return]
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="package")
 def pages(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
     folder = tmp_path_factory.mktemp("pages")
 
@@ -131,9 +131,13 @@ class Watch:
             self.tabs.give_back(page, *kind)
 
 
+@pytest.fixture(scope="package")
+def tabs(browser: Any) -> Tabs:
+    return Tabs(browser)
+
+
 @pytest.fixture(scope="module")
-def new_watch(browser: Any, pages: Callable[[str], Path]) -> Callable[[], Watch]:
-    tabs = Tabs(browser)
+def new_watch(tabs: Tabs, pages: Callable[[str], Path]) -> Callable[[], Watch]:
     return lambda: Watch(tabs, pages)
 
 
