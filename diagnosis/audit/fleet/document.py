@@ -24,7 +24,7 @@ from diagnosis.audit.fleet.news import news, since_runs
 from diagnosis.audit.fleet.read import Mission
 from diagnosis.audit.fleet.runs import sides_of
 from diagnosis.audit.fleet.trend_types import Axis
-from diagnosis.audit.fleet.trends import PartTrend, trends_of
+from diagnosis.audit.fleet.trends import PartTrend, trends_of, untold_losses
 from diagnosis.audit.store.outcome import ENDS, READ
 from diagnosis.results.vocabulary import Verdict
 from replay.version import __version__
@@ -100,7 +100,8 @@ def fleet_document(fleet: Fleet, baseline: BaselineRow | None = None) -> FleetDo
             first.setdefault(mission.result.id, mission.name)
     results = {m.name: m.result.id if m.result is not None else -1 for m in fleet.missions}
     at = {mission.name: k for k, mission in enumerate(fleet.missions)}
-    status, tag, title = words.headline(fleet.machines, len(fleet.unknown))
+    lost = [bool(untold_losses(m, own)) for m, own in zip(fleet.machines, fleet.trends, strict=True)]
+    status, tag, title = words.headline(fleet.machines, len(fleet.unknown), lost)
     counts = _counts(fleet, first)
     unread = sum(m.result is not None and m.result.state not in READ for m in fleet.missions)
     return {
