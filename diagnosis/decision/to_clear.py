@@ -155,7 +155,8 @@ def _of_faults(blamed: Sequence[tuple[Checked, FaultInterval]], words: MachineWo
 
 def _when(check: Checked, fault: FaultInterval) -> str:
     """How a check's window lies to a fault that may explain it."""
-    assert check.start_s is not None and check.stop_s is not None
+    assert check.start_s is not None
+    assert check.stop_s is not None
     during = lasts_in(check.start_s, check.stop_s, (fault.start_s, fault.stop_s))
     return "At the time of" if during else "Just after"
 

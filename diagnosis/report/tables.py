@@ -218,7 +218,7 @@ def _action(action: ActionRow, intervals: Mapping[str, IntervalRow], report: Rep
 def _when(report: ReportDocument, duration: float) -> Markup:
     """Begin, end and length of the mission, for the first screen."""
     start = report["log"]["start_ns"]
-    if not 0 <= start < UNDATED_NS:
+    if 0 <= start < UNDATED_NS:
         return Markup("Clock without a date, {}").format(clock(duration))
     end = start + round(duration * 1e9)
     same = utc(start)[:10] == utc(end)[:10]

@@ -70,11 +70,11 @@ def fleet_of(
     """Order machines worst first: by verdict, then by how soon a limit comes near, then by missions with faults."""
     found = [(m, tuple(trends_of(m, axis))) for m in machines]
 
-    def rank(pair: tuple[Machine, tuple[PartTrend, ...]]) -> tuple[int, int, float, int, str]:
+    def rank(pair: tuple[Machine, tuple[PartTrend, ...]]) -> tuple[int, int, bool, float, int, str]:
         m, trends = pair
         soon = min((t.trend.forecast.likely or 0.0 for t in trends if t.approaching), default=np.inf)
         worst = max((f.severity.rank for f in m.faults if f.standing), default=-1)
-        return -m.verdict.rank, -worst, soon, -m.with_faults, m.label
+        return -m.verdict.rank, -worst, not untold_losses(m, trends), soon, -m.with_faults, m.label
 
     found.sort(key=rank)
     place = {(m.id, "" if m.id else m.name): k for k, (m, _) in enumerate(found)}
