@@ -180,8 +180,7 @@ def main() -> None:
             wrong[kind] += bool(found)
             for text in found:
                 print(f"{name}: {text}", flush=True)
-    for kind, n in results.items():
-        print(f"{kind}: {n} results, {wrong[kind]} contradict themselves")
+        print(f"{kind}: {results[kind]} results, {wrong[kind]} contradict themselves", flush=True)
     print(f"all: {sum(results.values())} results, {sum(wrong.values())} contradict themselves")
     if left_out:
         print(left_out)
