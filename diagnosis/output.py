@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
@@ -161,7 +161,13 @@ def _read_windows(path: Path) -> Closeups | None:
     return Closeups(step, columns)
 
 
-def rebuild(path: Path, *, max_size_mb: float = 8.0, previous: tuple[Path, ReportDocument] | None = None) -> Path:
+def rebuild(
+    path: Path,
+    *,
+    max_size_mb: float = 8.0,
+    previous: tuple[Path, ReportDocument] | None = None,
+    open_faults: Sequence[str] = (),
+) -> Path:
     """Make ``report.html`` again from a saved result, without the log.
 
     Parameters
@@ -172,6 +178,8 @@ def rebuild(path: Path, *, max_size_mb: float = 8.0, previous: tuple[Path, Repor
         Size the page should keep to [MB].
     previous : tuple[Path, ReportDocument] or None
         Name and document of an earlier result of the machine to compare with; kept in ``report.json``.
+    open_faults : Sequence[str]
+        Sentences on faults of earlier missions that are open, to stand with `previous`.
 
     Raises
     ------
@@ -185,7 +193,7 @@ def rebuild(path: Path, *, max_size_mb: float = 8.0, previous: tuple[Path, Repor
     saved = load_result(source)
     report, columns, windows = saved.report, saved.columns, saved.windows
     if previous is not None:
-        compared: ReportDocument = writable(with_previous(report, previous[1], str(previous[0])))
+        compared: ReportDocument = writable(with_previous(report, previous[1], str(previous[0]), open_faults))
         report = compared
     with bordered(folder, "a saved result", remedy=_AGAIN):
         page = build_page(report, columns, closeups=windows, max_size_mb=max_size_mb)

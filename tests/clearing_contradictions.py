@@ -9,7 +9,7 @@ from typing import Any
 from diagnosis.report.confidence import sure_of
 
 _SURE = 0.9
-_STILL_SHOWS_S = 0.5
+_STILL_SHOWS_S, _STILL_SHOWS_MOST_S = 0.5, 3.0  # after the end of a fault
 _EXPLAINS = 0.3
 
 
@@ -39,16 +39,19 @@ def _resting(fault: Mapping[str, Any], side: str, report: Mapping[str, Any]) -> 
 
 
 def of_checks(report: Mapping[str, Any]) -> Iterator[str]:
-    """A check that is put down to a fault which lasts for a moment of its window alone."""
+    """A check that is put down to a fault which lasts for a moment of its window alone, or is over for long."""
     faults = {f["id"]: f for f in report["intervals"]}
     for row in report["verdict"]["to_clear"]:
-        found = re.match(r"At the time of (F\d+), ", row["reason"])
+        found = re.match(r"(At the time of|Just after) (F\d+), ", row["reason"])
         if not found:
             continue
-        fault = faults[found.group(1)]
+        fault, during = faults[found.group(2)], found.group(1) != "Just after"
         for start, stop in re.findall(r" at ([\d.]+)–([\d.]+) s", row["reason"]):
             a, b = float(start), float(stop)
-            after = min(max(fault["stop_s"] - fault["start_s"], _STILL_SHOWS_S), b - a)
-            shared = min(b, fault["stop_s"] + after) - max(a, fault["start_s"])
+            shows = 0.0 if during else min(max(fault["stop_s"] - fault["start_s"], _STILL_SHOWS_S), _STILL_SHOWS_MOST_S)
+            shared = min(b, fault["stop_s"] + shows) - max(a, fault["start_s"])
             if shared < _EXPLAINS * (b - a) - 0.1:
-                yield f"{fault['id']} lasts for {max(shared, 0.0):.1f} s of what it may explain: {row['reason']!r}"
+                lasts = "lasts" if during else "still shows"
+                yield f"{fault['id']} {lasts} for {max(shared, 0.0):.1f} s of what it may explain: {row['reason']!r}"
+            if not during and fault["stop_s"] >= b:
+                yield f"{fault['id']} is said to have ended: {row['reason']!r}"

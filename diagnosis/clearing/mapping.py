@@ -41,7 +41,9 @@ _FACTORS: tuple[tuple[float, str], ...] = (
     (0.001, "1/1000 times"),
 )
 
-_LOOK = "look at its entry in the machine file ([signals] channel, sign, unit or scale) before any part is replaced."
+_LOOK = (
+    "look at its entry under [signals] of a machine file (channel, sign, unit or scale) before any part is replaced."
+)
 
 
 class Hint(NamedTuple):

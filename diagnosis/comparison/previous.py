@@ -6,6 +6,8 @@ again from the newer result alone. ``older`` and ``newer`` go by the logs' clock
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from diagnosis.comparison.compare import Comparison, compare_reports, comparison_json, machine_difference
 from diagnosis.results.comparison_document import ComparedMissionRow, LossChangeRow, OtherMissionRow, PreviousRow
 from diagnosis.results.document import MachineIdentity, ReportDocument
@@ -14,7 +16,9 @@ from replay.errors import ConfigError
 THIS, OTHER = "this mission", "the other mission"
 
 
-def with_previous(report: ReportDocument, previous: ReportDocument, name: str = "") -> ReportDocument:
+def with_previous(
+    report: ReportDocument, previous: ReportDocument, name: str = "", open_faults: Sequence[str] = ()
+) -> ReportDocument:
     """Give a report with the comparison with another mission of the same machine under the key ``previous``.
 
     Parameters
@@ -25,6 +29,8 @@ def with_previous(report: ReportDocument, previous: ReportDocument, name: str = 
         Document of the other mission.
     name : str
         What to call the other result in an error.
+    open_faults : Sequence[str]
+        Sentences on severe faults of earlier missions that nobody is known to have repaired.
 
     Returns
     -------
@@ -45,7 +51,10 @@ def with_previous(report: ReportDocument, previous: ReportDocument, name: str = 
     pair = (report, previous) if later else (previous, report)
     names = (THIS, OTHER) if later else (OTHER, THIS)
     found = compare_reports(*pair, names, force=True)
-    return {**report, "previous": _compact(found, pair, later)}
+    compact = _compact(found, pair, later)
+    if open_faults:
+        compact["open_faults"] = list(open_faults)
+    return {**report, "previous": compact}
 
 
 def require_same_machine(machine: MachineIdentity, previous: ReportDocument, name: str) -> None:

@@ -141,7 +141,7 @@ def doubt_of(watch: Sequence[FaultInterval], against: Reservations) -> str:
     if against.not_compared:
         out.append("a loss that lasts the whole mission would not show")
     if against.hints:
-        out.append("the machine file does not fit the log")
+        out.append("the machine's settings do not fit the log")
     out += against.scope
     out += dict.fromkeys(event.doubt for event in against.events)
     if against.open:
@@ -227,7 +227,7 @@ def _most_open(
         return []
     reason = main_reason(assessments[most], against.open_state.get(most) or main_state(assessments[most]))
     return [
-        f"{against.words.part_words(Kind.WHEEL, *most)}: {open_s[most]:.1f} s of {driven[most]:.1f} s of {against.words.moving} could not be judged"
+        f"{against.words.part_words(Kind.WHEEL, *most)}: {open_s[most]:.1f} s of its {driven[most]:.1f} s of {against.words.moving} could not be judged"
         + (f" ({reason})" if reason else "")
         + f"; this is the most of all parts{' judged long enough' if against.short else ''}."
         " The timeline shows when."

@@ -265,7 +265,7 @@ def _without_faults(
     if against.events:
         return Decision(Verdict.NOT_ASSESSED, against.events[0].title, against.events[0].text)
     if against.hints:
-        return Decision(Verdict.NOT_ASSESSED, "The machine file does not fit the log", against.hints[0])
+        return Decision(Verdict.NOT_ASSESSED, "The machine's settings do not fit the log", against.hints[0])
     if against.short and (seen := _sensors_alone(assessments, decided_s, axles, against)):
         return Decision(Verdict.NOT_ASSESSED, _SENSORS_ALONE, seen)
     if against.short:

@@ -57,10 +57,13 @@ class Scale(NamedTuple):
         Wheel diameter [m] by which rotations were converted; None where the log has speeds of the rim.
     found : tuple[Scaled, ...]
         What sensors of the body say; empty where none does.
+    assumed : bool
+        Whether the diameter is the paper's machine's, as no machine file gave this one's.
     """
 
     diameter: float | None
     found: tuple[Scaled, ...]
+    assumed: bool = False
 
     @property
     def wrong(self) -> tuple[Scaled, ...]:
@@ -84,9 +87,14 @@ class Scale(NamedTuple):
         others = f", or {one.lengths}" if one.lengths else ""
         return (
             f"By {one.by} the machine is {one.factor:.2f} times as fast as by its wheels throughout, which is no part's fault, for all "
-            f"wheels share the factor: check {what}{others} in the machine file; if that is right, the wheels slip, or that sensor's "
+            f"wheels share the factor: check {what}{others}{self._where}; if that is right, the wheels slip, or that sensor's "
             "scale is wrong."
         )
+
+    @property
+    def _where(self) -> str:
+        """Where the machine's lengths are stated, to follow them."""
+        return ", which are assumed and to be stated in a machine file" if self.assumed else " in the machine file"
 
     @property
     def result(self) -> tuple[str, str, bool]:
@@ -94,7 +102,7 @@ class Scale(NamedTuple):
         given = (
             "as the log has it"
             if self.diameter is None
-            else f"by the wheel diameter of the machine file ({self.diameter:g} m)"
+            else f"by {'an assumed wheel diameter' if self.assumed else 'the wheel diameter of the machine file'} ({self.diameter:g} m)"
         )
         if self.wrong:
             return self.sentence, "speeds, distances and limits are wrong by that factor", False
@@ -124,9 +132,8 @@ def scale_of(cells: Cells, units: Collection[str]) -> Scale | None:
     turned = any(known_unit(u) in _ROTATIONAL for u in units)
     diameter = machine.geometry.wheel_diameter if machine.geometry is not None and turned else None
     speeds = cells.wheels("v")
-    return Scale(
-        diameter, () if not np.isfinite(speeds).any() else (*_straight(cells, speeds), *_turning(cells, speeds))
-    )
+    found = () if not np.isfinite(speeds).any() else (*_straight(cells, speeds), *_turning(cells, speeds))
+    return Scale(diameter, found, assumed="geometry" in machine.assumed)
 
 
 def _straight(cells: Cells, speeds: Array) -> Iterator[Scaled]:

@@ -225,7 +225,7 @@ def _act(
     if tier in by_tier and "wrong unit" not in reason:
         return by_tier[tier]
     if tier in by_tier:
-        return "correct the unit or the channel of wheel.{c}.v and of its command under [signals] in the machine file"
+        return "correct the unit or the channel of wheel.{c}.v and of its command under [signals] in a machine file"
     if reason.startswith(words.fill(_NOT_SAID)):
         return words.fill("log wheel.{c}.u (the {valve} command)")
     other = second if sensor else f"wheel.{{c}}.u_applied (the {words.position})"

@@ -11,7 +11,7 @@ from diagnosis.decision.short import Part, ToClear, short_parts, unjudged_axles
 from diagnosis.decision.wording import count_words, join_words
 from diagnosis.results.assessed import needed_s
 from diagnosis.results.assessment import Assessment
-from diagnosis.results.clearing import MAY_EXPLAIN, Check, Checked, share_covered
+from diagnosis.results.clearing import MAY_EXPLAIN, Check, Checked, lasts_in, share_covered
 from diagnosis.results.left_out import is_left_out
 from diagnosis.results.machine_words import MachineWords
 from diagnosis.results.result import FaultInterval
@@ -53,7 +53,7 @@ def to_clear(
     """
     words = against.words
     out = [ToClear(event.text, event.act) for event in against.events]
-    out += [ToClear(text, "correct [signals] in the machine file, and diagnose again") for text in against.hints]
+    out += [ToClear(text, "correct [signals] in a machine file, and diagnose again") for text in against.hints]
     out += short_parts(against.short, assessments, decided_s, driven, limits, words, open_state=against.open_state)
     if against.unexplained:
         for kind, second in (
@@ -121,32 +121,44 @@ def _brief(part: Part, decided_s: Mapping[Part, float], driven: Mapping[Part, fl
 def _meanwhile(check: Checked, faults: Sequence[FaultInterval]) -> FaultInterval | None:
     """The fault that may explain why a check deviates, one of the same part before others; None where there is none.
 
-    It lasts for a good part of the check's window, or ended just before.
+    It lasts for a good part of the check's window, or ended just before; what an axle's angle jumps by has no such aftermath.
     """
     start, stop = check.start_s, check.stop_s
     if start is None or stop is None:
         return None
     share = {f.id: share_covered(start, stop, (f.start_s, f.stop_s)) for f in faults if f.severity is not Severity.INFO}
-    counted = (f for f in faults if share.get(f.id, 0.0) >= MAY_EXPLAIN)
+    counted = [f for f in faults if share.get(f.id, 0.0) >= MAY_EXPLAIN]
+    if check.check is Check.JUMP:
+        counted = [f for f in counted if lasts_in(start, stop, (f.start_s, f.stop_s))]
     return max(counted, key=lambda f: (f.component == check.component, share[f.id]), default=None)
 
 
 def _of_faults(blamed: Sequence[tuple[Checked, FaultInterval]], words: MachineWords) -> list[ToClear]:
-    """Checks that deviate while faults last, those of one fault together."""
-    by: dict[str, list[tuple[Checked, FaultInterval]]] = {}
-    for check, fault in blamed:
-        by.setdefault(fault.id, []).append((check, fault))
+    """Checks that deviate while faults last, or just after, those of one fault together: of each component the furthest beyond its limit."""
+    by: dict[tuple[str, str], list[tuple[Checked, FaultInterval]]] = {}
+    for check, fault in sorted(blamed, key=lambda b: -(np.inf if b[0].worst is None else b[0].worst / b[0].limit)):
+        mine = by.setdefault((fault.id, _when(check, fault)), [])
+        if all(check.component != c.component for c, _ in mine):
+            mine.append((check, fault))
     out = []
-    for name, mine in by.items():
+    for (name, when), mine in by.items():
         fault = mine[0][1]
         part = words.part_words(fault.kind, fault.component, fault.side)
         out.append(
             ToClear(
-                f"At the time of {name}, which may explain it: {_some([check.text for check, _ in mine])}.",
+                f"{when} {name}, which may explain it: {_some([check.text for check, _ in mine])}.",
                 f"repair the {part} ({name}), then diagnose the next mission",
             )
         )
     return out
+
+
+def _when(check: Checked, fault: FaultInterval) -> str:
+    """How a check's window lies to a fault that may explain it."""
+    assert check.start_s is not None
+    assert check.stop_s is not None
+    during = lasts_in(check.start_s, check.stop_s, (fault.start_s, fault.stop_s))
+    return "At the time of" if during else "Just after"
 
 
 def _of_checks(checks: Sequence[Checked], twice: Collection[str]) -> list[ToClear]:

@@ -157,7 +157,7 @@ def count_words(n: int, word: str) -> str:
 
 def misplaced_words(doubt: str) -> str:
     """What turns contradict of the machine file, in a sentence that comes before any fault: the wrong part may be named."""
-    return f"The log contradicts the machine file: {doubt}. Correct [signals] or [geometry] in it before any part is looked at: another one may be meant."
+    return f"The log contradicts the machine's settings: {doubt}. Correct [signals] or [geometry] in a machine file before any part is looked at: another one may be meant."
 
 
 def join_words(words: Sequence[str]) -> str:

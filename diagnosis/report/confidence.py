@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import re
+
 from diagnosis.comparison.coverage import SideCoverage, sides_of
 from diagnosis.results.document import IntervalRow, ReportDocument
 from diagnosis.results.fault_rows import state_label
 from diagnosis.results.machine_words import words_of
-from diagnosis.results.vocabulary import Kind, Tier, Verdict
+from diagnosis.results.vocabulary import Kind, Severity, Tier, Verdict
 from replay.faults import Side, State
 
 _WORDS = ((0.99, "Practically certain"), (0.9, "Very likely"), (0.7, "Likely"))
@@ -82,12 +84,15 @@ def _likely(p: float) -> str:
 
 
 def judged(report: ReportDocument) -> str:
-    """How many parts were judged as far as a verdict of *ready* takes of a wheel, which for less and which not; empty where there are none."""
+    """How many parts were judged as far as a verdict of *ready* takes of a wheel, and cleared; which for less and which not.
+
+    Empty where there are none; `judged_means` says what the words mean.
+    """
     sides, words, axles = sides_of(report), words_of(report["machine"]), report["machine"]["axles"]
     short = [part for part, s in sides.items() if not s.long_enough]
-    if not sides or not short:
-        return f"all {len(sides)} parts" if sides else ""
-    out = [f"{len(sides) - len(short)} of {len(sides)} parts"]
+    if not sides:
+        return ""
+    out = [f"{len(sides) - len(short)} of {len(sides)} parts judged, {len(_cleared(report)) or 'none'} cleared"]
     for how, some in (("in part", True), ("not", False)):
         told = [
             words.listed(kind, mine)
@@ -102,6 +107,41 @@ def judged(report: ReportDocument) -> str:
         ]
         out += [f"{how} {'; '.join(told)}"] if told else []
     return "; ".join(out)
+
+
+def judged_means(report: ReportDocument) -> str:
+    """What *judged* and *cleared* mean in `judged`; empty where it says nothing."""
+    if not sides_of(report):
+        return ""
+    moving = words_of(report["machine"]).moving
+    return (
+        f"Judged: decided, healthy or faulty, for at least {report['limits']['min_assessed']:g} s and four fifths of the part’s {moving}. "
+        "Cleared: judged, without a fault, every check of the all-clear passed, and named in nothing that is open."
+    )
+
+
+def _cleared(report: ReportDocument) -> list[tuple[str, str]]:
+    """Parts that were judged and of which nothing is open; none where something is open that names no part, or that is not said."""
+    if "to_clear" not in report["verdict"]:
+        return []
+    verdict, components = report["verdict"], {row["component"] for row in report["coverage"]}
+    faulty = {
+        (f["component"], s)
+        for f in report["intervals"]
+        if f["severity"] != Severity.INFO
+        for s in Side(f["side"]).sides
+    }
+    named: set[str] = set()
+    for row in verdict["to_clear"]:
+        mine = {
+            c for c in components if re.search(rf"(?<!\w){re.escape(c.removesuffix('_steer'))}(?!\w)", row["reason"])
+        }
+        if not mine:
+            return []
+        named |= mine
+    if verdict["status"] == Verdict.NOT_ASSESSED and not named:
+        return []
+    return [part for part, s in sides_of(report).items() if s.assessed and part not in faulty and part[0] not in named]
 
 
 def _partly(side: SideCoverage) -> bool:

@@ -7,7 +7,7 @@ from typing import Any
 
 from diagnosis.pages.labels import bounded, grouped, number
 from diagnosis.report.judged_parts import kind_of
-from diagnosis.results.clearing import MAY_EXPLAIN, share_covered, size_words
+from diagnosis.results.clearing import MAY_EXPLAIN, Check, lasts_in, share_covered, size_words
 from diagnosis.results.clearing_rows import ClearingRow
 from diagnosis.results.document import (
     FileRow,
@@ -60,12 +60,14 @@ def _meanwhile(report: ReportDocument, check: ClearingRow) -> str:
     start, stop = check["start_s"], check["stop_s"]
     if check["passed"] or start is None or stop is None:
         return ""
-    names = [
-        f["id"]
+    near = [
+        f
         for f in report["intervals"]
         if share_covered(start, stop, (f["start_s"], f["stop_s"])) >= MAY_EXPLAIN and f["severity"] != Severity.INFO
     ]
-    return f", at the time of {', '.join(names)}" if names else ""
+    during = [f["id"] for f in near if lasts_in(start, stop, (f["start_s"], f["stop_s"]))]
+    after = [f["id"] for f in near if f["id"] not in during and check["check"] != Check.JUMP]
+    return "".join(f", {w} {', '.join(n)}" for w, n in (("at the time of", during), ("just after", after)) if n)
 
 
 def _unseen(faults: Sequence[IntervalRow], part: tuple[str, str], seen_s: float) -> list[str]:
@@ -93,8 +95,10 @@ def check_rows(report: ReportDocument) -> list[Context]:
                 "asked": c["asked"],
                 "worst": "not shown" if c["worst"] is None else size_words(c["check"], c["worst"]),
                 "limit": size_words(c["check"], c["limit"]),
-                "when": "" if start is None or stop is None else f"{start:.1f}–{stop:.1f} s{_meanwhile(report, c)}",
-                "shows": "" if c["shows"] is None else f"from {100 * c['shows']:.0f} %",
+                "when": "over the mission"
+                if start is None or stop is None
+                else f"{start:.1f}–{stop:.1f} s{_meanwhile(report, c)}",
+                "shows": "–" if c["shows"] is None else f"from {100 * c['shows']:.0f} %",
             }
         )
     return rows

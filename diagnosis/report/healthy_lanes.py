@@ -49,6 +49,7 @@ def _approach(row: ClearingRow) -> str:
     """How near a check came to its limit, and when."""
     if row["worst"] is None:
         return "the mission does not show it"
-    near = f"{size_words(row['check'], row['worst'])} of a limit of {size_words(row['check'], row['limit'])}"
-    when = "over the whole mission" if row["start_s"] is None else f"nearest at {clock(row['start_s'], 1)}"
-    return f"{near}, {when}"
+    beyond = "" if row["passed"] else ", beyond it"
+    worst = f"{size_words(row['check'], row['worst'])}, limit {size_words(row['check'], row['limit'])}{beyond}"
+    when = "over the whole mission" if row["start_s"] is None else f"largest at {clock(row['start_s'], 1)}"
+    return f"{worst}; {when}"

@@ -153,11 +153,16 @@ def _pictures(
     report: ReportDocument, detailed: Sequence[IntervalRow], series: _Series, duration: float
 ) -> tables.Context:
     """Timeline, machine, driven path and thumbnails."""
-    words = words_of(report["machine"])
+    words, parts = words_of(report["machine"]), shown_parts(report)
     path = driven_path(report, series.filled, series.axis.step)
     thumbs = worst(report["intervals"], _THUMBNAILS) if series.axis.rows else []
     return {
-        "shown": {"parts": shown_parts(report), "lanes": shown_lanes(report, duration), "heads": HEADS},
+        "shown": {
+            "parts": parts,
+            "gaps": any(not cell for part in parts for cell in part.cells),
+            "lanes": shown_lanes(report, duration),
+            "heads": HEADS,
+        },
         "timeline": timeline(report, duration, {f["id"] for f in detailed}),
         "duration": duration,
         "lane_details": healthy_lanes(report),

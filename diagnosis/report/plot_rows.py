@@ -19,7 +19,7 @@ from diagnosis.results.document import IntervalRow
 from diagnosis.results.fault_rows import state_label
 from diagnosis.results.machine_words import MachineWords
 from diagnosis.results.vocabulary import Kind
-from replay.faults import DECIDED, Side
+from replay.faults import DECIDED, Side, State
 from replay.machine.quantities import OPENING
 
 _FINEST = 500  # stretches of a mission that are told apart
@@ -202,7 +202,7 @@ def _side_rows(
             band=(base + "sat_low", base + "sat_high"),
             band_scale=sat_scale,
         ),
-        *_mode_row(fault, side, base, of, columns),
+        *_mode_row(fault, side, base, of, columns, words),
     ]
 
 
@@ -212,18 +212,30 @@ def _lowest(epsilon: NDArray[np.floating] | None) -> float:
     return min(-1.0, 1.1 * float(known.min(initial=0.0)))
 
 
-def _mode_row(fault: IntervalRow, side: Side, base: str, of: str, columns: Columns) -> list[Row]:
-    """Mode probabilities of one side; only once, and of both, where the evidence does not tell the sides apart."""
+def _mode_row(fault: IntervalRow, side: Side, base: str, of: str, columns: Columns, words: MachineWords) -> list[Row]:
+    """Mode probabilities of one side; only once, and of both, where the evidence does not tell the sides apart.
+
+    That a side is healthy does not say that nothing is faulty where the other side may be: its curve says so.
+    """
     both = any(h["side"] == Side.SENSOR_OR_ACTUATOR for h in fault["hypotheses"])
     if both and side is Side.ACTUATOR:
         return []
+    other = Side.ACTUATOR if side is Side.SENSOR else Side.SENSOR
+    elsewhere = any(h["side"] == other and h["mode"] != State.HEALTHY for h in fault["hypotheses"])
+    healthy = state_label(State.HEALTHY, side).lower()
+    if elsewhere:
+        own, rest = (words.part_name(fault["kind"], s) for s in (side, other))
+        healthy = f"{own} healthy: {rest} faulty, or neither"
     whole = ", of the fault as a whole" if _as_a_whole(base, columns) else ""
     return [
         Row(
             f"modes{of}",
             f"Mode probability{whole}{' (of either part)' if both else of}",
             "1",
-            tuple(Trace(f"{base}p_{m}", state_label(m, side).lower(), f"mode-{m}") for m in DECIDED),
+            tuple(
+                Trace(f"{base}p_{m}", healthy if m is State.HEALTHY else state_label(m, side).lower(), f"mode-{m}")
+                for m in DECIDED
+            ),
             limits=(-0.03, 1.03),
         )
     ]

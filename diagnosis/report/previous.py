@@ -51,6 +51,7 @@ def previous_section(report: ReportDocument) -> Context | None:
         "loss": [_loss(x, report["machine"]) for x in found["loss"] if _differs(x)],
         "same_loss": sum(not _differs(x) for x in found["loss"]),
         "notes": found["notes"],
+        "open_faults": found.get("open_faults", []),
     }
 
 

@@ -6,8 +6,10 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from diagnosis.pages.labels import UNDATED_NS, clock, mode_legend, number, sat_text, utc_mark
-from diagnosis.report.confidence import headline, judged, percent, sure_of, sure_of_verdict
+from markupsafe import Markup
+
+from diagnosis.pages.labels import UNDATED_NS, clock, mode_legend, number, sat_text, utc, utc_mark
+from diagnosis.report.confidence import headline, judged, judged_means, percent, sure_of, sure_of_verdict
 from diagnosis.report.data_tables import (
     check_rows,
     coverage_rows,
@@ -33,7 +35,7 @@ from diagnosis.results.document import (
 from diagnosis.results.fault_rows import state_label
 from diagnosis.results.machine_words import MachineWords, words_of
 from diagnosis.results.vocabulary import Kind, Severity, Tier, Verdict
-from replay.faults import UNDECIDED, FaultMode, State
+from replay.faults import UNDECIDED, FaultMode, Side, State
 
 _SHOWN = 0.001
 _UNFOLDED = 4  # notes and evidence beyond this number fold away
@@ -65,7 +67,10 @@ def context(report: ReportDocument, duration: float) -> Context:
         "machine": machine_name(report["machine"]),
         "mission": " + ".join(f["path"] for f in log["files"]) or "no log named",
         "verdict": _verdict(report),
+        "when": _when(report, duration),
         "facts": _facts(report, duration),
+        "means": judged_means(report),
+        "moved": clock(log["driving_s"]),
         "faults": [_fault(f, words) for f in report["intervals"]],
         "coverage": coverage_rows(report),
         "metrics": loop_tables(report["metrics"], words),
@@ -130,6 +135,7 @@ def _fault(fault: IntervalRow, words: MachineWords) -> Context:
         "tier": words.evidence(Tier(fault["tier"]), Kind(fault["kind"])),
         "delay": _delay(fault),
         "likely": hypotheses[:likely],
+        "both": len({h["side"] for h in hypotheses} & {*Side.SENSOR_OR_ACTUATOR.sides, Side.SENSOR_OR_ACTUATOR}) > 1,
         "unlikely": ", ".join(
             (f"{words.part_name(fault['kind'], h['side'])} " if h["side"] != "none" else "")
             + state_label(h["mode"], h["side"]).lower()
@@ -209,6 +215,17 @@ def _action(action: ActionRow, intervals: Mapping[str, IntervalRow], report: Rep
     }
 
 
+def _when(report: ReportDocument, duration: float) -> Markup:
+    """Begin, end and length of the mission, for the first screen."""
+    start = report["log"]["start_ns"]
+    if 0 <= start < UNDATED_NS:
+        return Markup("Clock without a date, {}").format(clock(duration))
+    end = start + round(duration * 1e9)
+    same = utc(start)[:10] == utc(end)[:10]
+    until = Markup("<time>{}</time>").format(utc(end)) if not same else Markup("{}").format(utc(end)[11:19])
+    return Markup("{} to {} UTC, {}").format(utc_mark(start), until, clock(duration))
+
+
 def _facts(report: ReportDocument, duration: float) -> list[tuple[str, str]]:
     machine, log = report["machine"], report["log"]
     facts = [
@@ -226,7 +243,7 @@ def _facts(report: ReportDocument, duration: float) -> list[tuple[str, str]]:
     if faulty:
         facts.append(("Faulty", f"{len(faulty)} part{'s' if len(faulty) > 1 else ''}"))
     parts = judged(report)
-    facts.append(("Judged", parts) if parts else (words_of(machine).parts.capitalize(), _count(machine)))
+    facts.append(("Judged and cleared", parts) if parts else (words_of(machine).parts.capitalize(), _count(machine)))
     return facts
 
 

@@ -185,6 +185,12 @@ def share_covered(start_s: float, stop_s: float, fault: tuple[float, float]) -> 
     return max(0.0, inside) / max(stop_s - start_s, 1e-9)
 
 
+def lasts_in(start_s: float, stop_s: float, fault: tuple[float, float]) -> bool:
+    """Whether a fault lasts for a good part of the window of a check, rather than having ended before; all times in s."""
+    inside = min(stop_s, fault[1]) - max(start_s, fault[0])
+    return inside >= MAY_EXPLAIN * (stop_s - start_s)
+
+
 def size_words(check: str, value: float) -> str:
     """A value of a check in its unit. By the check: a share [1], rad, rad/s or m/s."""
     if check in (Check.YAW, Check.LASTING_YAW, Check.JUMP):

@@ -125,7 +125,11 @@ class MetricChangeRow(TypedDict):
 
 
 class PreviousRow(TypedDict):
-    """What became of the faults since another mission of the machine; `counts` and `coverage` hold what changed."""
+    """What became of the faults since another mission of the machine; `counts` and `coverage` hold what changed.
+
+    `open_faults` are sentences on severe faults of earlier missions that an audit's fleet holds open when it writes the comparison;
+    it is there where there are any.
+    """
 
     order: Literal["earlier", "later"]
     mission: OtherMissionRow
@@ -135,6 +139,7 @@ class PreviousRow(TypedDict):
     coverage: list[CoverageChangeRow]
     loss: list[LossChangeRow]
     notes: list[str]
+    open_faults: NotRequired[list[str]]
 
 
 class ComparisonDocument(Worded):

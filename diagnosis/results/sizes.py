@@ -56,7 +56,7 @@ def _digits(least: float, most: float) -> int:
 def not_reported(below: int, name: str) -> str:
     """Sentence on deviations of a channel that are too small to count."""
     many = f"{below} deviations of {name} are" if below != 1 else f"1 deviation of {name} is"
-    return f"{many} below the limits of the machine file and not reported."
+    return f"{many} below the limits from which a deviation counts as a fault, and not reported."
 
 
 def times_as_probable(log_evidence: float) -> str:

@@ -47,7 +47,7 @@ class Swings:
         first, last = self.spans[0][0], max(stop for _, stop in self.spans)
         return (
             f"Between {first:.1f} and {last:.1f} s several {{wheels}} swing about their expected speeds together, as where the speed loop "
-            "hunts or the supply surges. No {wheel} is blamed for it."
+            "hunts or the supply surges; no {wheel} is blamed for it."
         )
 
 

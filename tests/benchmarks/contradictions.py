@@ -160,8 +160,15 @@ def main() -> None:
         "other physics": other_physics(count, asked.first),
         "ordinary robots": ordinary_robots(count, asked.first),
     }
-    if (Path(os.environ.get("MFHCA_REFERENCE_DATA", "../shared")) / "fault_data").is_dir():
+    data = Path(os.environ.get("MFHCA_REFERENCE_DATA", "../shared"))
+    left_out = ""
+    if (data / "fault_data").is_dir():
         sources |= {"foreign plant": foreign(count, asked.first), "real": real(count, asked.first)}
+    else:
+        left_out = (
+            f"left out: foreign plant and real robots, for there are no reference data in {data} (MFHCA_REFERENCE_DATA)"
+        )
+        print(left_out, flush=True)
     results: Counter[str] = Counter()
     wrong: Counter[str] = Counter()
     for kind, reports in sources.items():
@@ -173,8 +180,10 @@ def main() -> None:
             wrong[kind] += bool(found)
             for text in found:
                 print(f"{name}: {text}", flush=True)
-    for kind, n in results.items():
-        print(f"{kind}: {n} results, {wrong[kind]} contradict themselves")
+        print(f"{kind}: {results[kind]} results, {wrong[kind]} contradict themselves", flush=True)
+    print(f"all: {sum(results.values())} results, {sum(wrong.values())} contradict themselves")
+    if left_out:
+        print(left_out)
     sys.exit(1 if sum(wrong.values()) else 0)
 
 

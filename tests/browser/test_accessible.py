@@ -75,3 +75,20 @@ def test_colours_stand_out(open_page: OPEN, theme: str) -> None:
             for b in back:
                 dark, light = sorted((level(f), level(b)))
                 assert (light + 0.05) / (dark + 0.05) >= least, (f, b)
+
+
+@pytest.mark.parametrize("name", ["decided", "no_faults"])
+def test_no_breach_with_everything_unfolded(open_page: OPEN, axe: str, name: str) -> None:
+    page = open_page(name, width=1280)
+    page.evaluate("document.querySelectorAll('details').forEach(d => { d.open = true; })")
+    assert breaches(page, axe) == []
+
+
+def test_a_fault_s_evidence_is_five_keys_away_at_most(open_page: OPEN) -> None:
+    page = open_page("decided", width=1280)
+    for key in "jg":
+        page.keyboard.press(key)
+    page.wait_for_function(
+        "() => { const box = document.querySelector('article[data-ev=F2] h2').getBoundingClientRect();"
+        " return box.top >= 0 && box.bottom <= innerHeight; }"
+    )

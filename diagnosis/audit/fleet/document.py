@@ -24,7 +24,7 @@ from diagnosis.audit.fleet.news import news, since_runs
 from diagnosis.audit.fleet.read import Mission
 from diagnosis.audit.fleet.runs import sides_of
 from diagnosis.audit.fleet.trend_types import Axis
-from diagnosis.audit.fleet.trends import PartTrend, trends_of
+from diagnosis.audit.fleet.trends import PartTrend, trends_of, untold_losses
 from diagnosis.audit.store.outcome import ENDS, READ
 from diagnosis.results.vocabulary import Verdict
 from replay.version import __version__
@@ -70,11 +70,11 @@ def fleet_of(
     """Order machines worst first: by verdict, then by how soon a limit comes near, then by missions with faults."""
     found = [(m, tuple(trends_of(m, axis))) for m in machines]
 
-    def rank(pair: tuple[Machine, tuple[PartTrend, ...]]) -> tuple[int, int, float, int, str]:
+    def rank(pair: tuple[Machine, tuple[PartTrend, ...]]) -> tuple[int, int, bool, float, int, str]:
         m, trends = pair
         soon = min((t.trend.forecast.likely or 0.0 for t in trends if t.approaching), default=np.inf)
         worst = max((f.severity.rank for f in m.faults if f.standing), default=-1)
-        return -m.verdict.rank, -worst, soon, -m.with_faults, m.label
+        return -m.verdict.rank, -worst, not untold_losses(m, trends), soon, -m.with_faults, m.label
 
     found.sort(key=rank)
     place = {(m.id, "" if m.id else m.name): k for k, (m, _) in enumerate(found)}
@@ -100,7 +100,8 @@ def fleet_document(fleet: Fleet, baseline: BaselineRow | None = None) -> FleetDo
             first.setdefault(mission.result.id, mission.name)
     results = {m.name: m.result.id if m.result is not None else -1 for m in fleet.missions}
     at = {mission.name: k for k, mission in enumerate(fleet.missions)}
-    status, tag, title = words.headline(fleet.machines, len(fleet.unknown))
+    lost = [bool(untold_losses(m, own)) for m, own in zip(fleet.machines, fleet.trends, strict=True)]
+    status, tag, title = words.headline(fleet.machines, len(fleet.unknown), lost)
     counts = _counts(fleet, first)
     unread = sum(m.result is not None and m.result.state not in READ for m in fleet.missions)
     return {

@@ -9,13 +9,16 @@ from dataclasses import dataclass
 
 from diagnosis.audit.fleet.fault_types import FleetFaultRow
 from diagnosis.audit.fleet.fleet_types import FleetDocument, MachineRow, MissionRow
-from diagnosis.audit.fleet.may_leave import Leave, leave_of
+from diagnosis.audit.fleet.may_leave import Leave, is_lost, leave_of
 from diagnosis.audit.fleet.page.figures import unassessed
 from diagnosis.audit.fleet.page.rows import fault_words
+from diagnosis.audit.fleet.runs import sides_of
+from diagnosis.audit.fleet.trend_types import TrendRow
 from diagnosis.audit.fleet.words import count, open_words
 from diagnosis.decision.wording import join_words
 from diagnosis.results.machine_words import words_of
 from diagnosis.results.vocabulary import Severity, Verdict
+from replay.faults import FaultMode
 
 #: Statuses of faults that do not stand.
 GONE = ("past", "repaired")
@@ -56,20 +59,68 @@ def lists_of(document: FleetDocument) -> tuple[Left, ...]:
     """Every machine of a fleet in one list, in the document's order."""
     out = []
     standing: dict[int, list[FleetFaultRow]] = defaultdict(list)
+    every: dict[int, list[FleetFaultRow]] = defaultdict(list)
     rising: dict[int, set[tuple[str, str]]] = defaultdict(set)
+    beyond: dict[int, list[TrendRow]] = defaultdict(list)
     for f in document["faults"]:
+        every[f["machine"]].append(f)
         if f["status"] not in GONE:
             standing[f["machine"]].append(f)
     for t in document["trends"]:
         if t["direction"] == "rising" and t["points"][-1][2] >= t["limit"]:
             rising[t["machine"]].add((t["component"], t["side"]))
+        if t["points"][-1][2] >= t["limit"]:
+            beyond[t["machine"]].append(t)
     for k, m in enumerate(document["machines"]):
-        leave = leave_of(m["verdict"], m["cleared"], m["unjudged"])
+        untold = [t for t in beyond[k] if _is_untold(t, every[k], document["missions"])]
+        lost = any(is_lost(t["points"][-1][3], t["limit"]) for t in untold)
+        leave = leave_of(m["verdict"], m["cleared"], m["unjudged"], lost=lost)
         place, reason = _why(leave, m, standing[k], document["missions"], rising[k])
-        reason += _blind(m)
+        reason = _with_losses(leave, m, reason, untold) + _blind(m)
+        if leave is not Leave.MAY and any(f["open"] and f["since"] for f in standing[k]) and _ready(m, document):
+            reason += "; its newest report says ready, for that judges its own mission alone"
         name = "" if place is None else document["missions"][place]["name"]
         out.append(Left(leave, k, m["label"], reason, place, name))
     return tuple(out)
+
+
+def _is_untold(t: TrendRow, faults: Sequence[FleetFaultRow], missions: Sequence[MissionRow]) -> bool:
+    """Whether a loss beyond its limit is said by no fault that stands, and the part was not repaired since."""
+    mine = [f for f in faults if f["component"] == t["component"] and t["side"] in sides_of(f["side"])]
+    at = missions[t["points"][-1][0]].get("start_ns")
+    repaired = any(f["repaired_ns"] is not None and at is not None and at < f["repaired_ns"] for f in mine)
+    return not repaired and all(f["status"] in GONE for f in mine)
+
+
+def _with_losses(leave: Leave, m: MachineRow, reason: str, untold: Sequence[TrendRow]) -> str:
+    """A reason with the losses beyond their limit that no fault says: those that are certain give no leave, others are told beside it."""
+    if leave is Leave.MUST_NOT or not untold:
+        return reason
+    words, said = words_of(m), []
+    for t in sorted(untold, key=lambda t: -t["points"][-1][3])[:_FAULTS]:
+        _, _, value, low, high = t["points"][-1]
+        sure = is_lost(low, t["limit"])
+        part = words.part_words(t["kind"], t["component"], t["side"])
+        bounds = (
+            "" if sure else f", which its bounds of {100 * low:.0f} to {100 * high:.0f} % leave open".replace("-", "−")
+        )
+        said.append(
+            f"{part} lost {100 * value:.0f} % over the whole of its last mission, beyond the limit of {100 * t['limit']:.0f} %{bounds}"
+        )
+    losses = "; ".join(said)
+    if (
+        leave is Leave.NOT_KNOWN
+        and m["verdict"] in (Verdict.READY, Verdict.WATCH)
+        and not m["unjudged"]
+        and m["cleared"]
+    ):
+        return f"{losses}, though no fault was stated in it: check the part"
+    return f"{reason}; {losses}"
+
+
+def _ready(m: MachineRow, document: FleetDocument) -> bool:
+    """Whether the newest report of a machine says that it is ready."""
+    return bool(m["missions"]) and document["missions"][m["missions"][-1]]["verdict"] is Verdict.READY
 
 
 def _why(
@@ -96,7 +147,9 @@ def _why(
         return place, (named or m["standing"]) + later
     if leave is Leave.MAY:
         if any(not f["since"] for f in faults):
-            return last, f"with {count(len(faults), 'fault')} to watch: {named}"
+            worn = any(f["mode"] == FaultMode.INEFFICIENT for f in faults[:_FAULTS])
+            why = "; a loss of effectiveness alone is no reason to stop, only to check" if worn else ""
+            return last, f"with {count(len(faults), 'fault')} to watch: {named}{why}"
         return last, "no fault in its last mission" + (f"; seen before: {named}" if faults else "")
     for place in (*sorted(m["failed"], key=lambda k: missions[k]["gone"]), *reversed(m["undated"])):
         if m["unjudged"] and missions[place]["verdict"] in (None, Verdict.NOT_ASSESSED):

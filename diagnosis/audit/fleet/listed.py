@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from diagnosis.audit.fleet.fault_types import FleetFaultRow
 from diagnosis.audit.fleet.fleet_types import FleetDocument, MachineRow
 from diagnosis.audit.fleet.leave import GONE, lists_of
+from diagnosis.audit.fleet.may_leave import Leave
 from diagnosis.audit.fleet.page.rows import fault_words
 from diagnosis.audit.fleet.words import open_words
 from diagnosis.results.machine_words import words_of
@@ -45,7 +46,7 @@ class ListedMachine:
     mission: str = ""
 
 
-def machine_words(m: MachineRow, standing: Sequence[FleetFaultRow], approaching: bool) -> str:
+def machine_words(m: MachineRow, standing: Sequence[FleetFaultRow], approaching: bool, leave: Leave = Leave.MAY) -> str:
     """Where a machine stands, with what a ready one still shows.
 
     Parameters
@@ -56,7 +57,11 @@ def machine_words(m: MachineRow, standing: Sequence[FleetFaultRow], approaching:
         Its faults that stand.
     approaching : bool
         Whether a trend of its comes near its limit.
+    leave : Leave
+        Whether it may go out: a machine may be ready by its last report, and yet have lost too much.
     """
+    if m["verdict"] == Verdict.READY and leave is not Leave.MAY:
+        return "Ready by its last report, but a loss is beyond its limit"
     if m["verdict"] == Verdict.READY and standing:
         often = any(f["status"] == "recurring" for f in standing)
         return f"Ready, fault {'comes and goes' if often else 'seen lately'}"
@@ -80,7 +85,7 @@ def listed_machines(document: FleetDocument) -> tuple[ListedMachine, ...]:
             ListedMachine(
                 m["label"],
                 Verdict(m["verdict"]),
-                _with_note(machine_words(m, standing, k in near), m),
+                _with_note(machine_words(m, standing, k in near, lists[k].leave), m),
                 tuple(fault_words(f, words_of(m)) + open_words(f["open"], f["clean"], f["needed"]) for f in standing),
                 m["with_faults"],
                 len(m["missions"]) + len(m["undated"]),

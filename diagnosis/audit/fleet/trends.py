@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.audit.fleet.machines import Machine
-from diagnosis.audit.fleet.runs import Run
+from diagnosis.audit.fleet.may_leave import is_lost
+from diagnosis.audit.fleet.runs import Run, sides_of
 from diagnosis.audit.fleet.trend_types import Axis
 from diagnosis.audit.trends.trend import REACH, Forecast, Series, Trend, trend_of
 
@@ -73,6 +74,20 @@ def trends_of(machine: Machine, axis: Axis = "hours") -> list[PartTrend]:
         kind = machine.kind(component)
         out.append(PartTrend(component, side, kind, machine.limits.min_epsilon, runs, series, trend))
     return out
+
+
+def untold_losses(machine: Machine, trends: Sequence[PartTrend]) -> tuple[tuple[str, str], ...]:
+    """Components and sides whose loss in the last mission is beyond the limit for certain, without a fault that stands or a repair since."""
+    out = []
+    for t in trends:
+        if not is_lost(float(t.series.low[-1]), t.limit):
+            continue
+        mine = [f for f in machine.faults if f.component == t.component and t.side in sides_of(f.side)]
+        at = t.runs[-1].result.start_ns
+        repaired = any(f.repaired_ns is not None and at is not None and at < f.repaired_ns for f in mine)
+        if not repaired and not any(f.standing for f in mine):
+            out.append((t.component, t.side))
+    return tuple(out)
 
 
 def _places(runs: Sequence[Run], axis: Axis) -> tuple[NDArray[np.float64], float]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Sequence
 
 from diagnosis.audit.fleet.machines import FleetFault, Machine
@@ -15,6 +16,7 @@ from diagnosis.results.fault_rows import mode_words
 from diagnosis.results.left_out import only_left_out
 from diagnosis.results.machine_words import MachineWords
 from diagnosis.results.vocabulary import Verdict
+from replay.faults import Side
 
 _SHOWN = 3
 _NAMED = 12
@@ -52,6 +54,12 @@ def missions_words(all_missions: int, counted: int) -> str:
 def open_words(is_open: bool, clean: int, needed: int) -> str:
     """How far an open fault is refuted: ``, clean in 3 of the 10 missions that close it``; empty where it is not, or just found."""
     return f", clean in {clean} of the {needed} missions that close it" if is_open and clean else ""
+
+
+def repair_command(label: str, component: str, side: str) -> str:
+    """The command that records a part's repair, run in the folder of the fleet page; the date is the user's to give."""
+    part = f"{label} {component.removesuffix('_steer')}{'' if side == Side.SENSOR_OR_ACTUATOR else f' {side}'}"
+    return f"mfhca audit -o . --repaired {shlex.quote(part)} --on DATE"
 
 
 def forecast_words(f: Forecast, limit: float, axis: Axis = "hours") -> str:
@@ -124,7 +132,9 @@ def is_damaged(m: Machine) -> bool:
     return m.verdict is Verdict.WATCH and not any(f.standing for f in m.faults) and not any(r.faults for r in watched)
 
 
-def headline(machines: Sequence[Machine], unknown: int = 0) -> tuple[Verdict, str, str]:
+def headline(
+    machines: Sequence[Machine], unknown: int = 0, lost: Sequence[bool] | None = None
+) -> tuple[Verdict, str, str]:
     """Status of the fleet, a few words above its sentence, and the sentence: how many may go out, as the lists have it.
 
     Parameters
@@ -133,7 +143,10 @@ def headline(machines: Sequence[Machine], unknown: int = 0) -> tuple[Verdict, st
         All machines.
     unknown : int
         Logs that were not judged, whose machine is not known: none is ready for certain then.
+    lost : Sequence[bool] or None
+        Of each machine, whether a loss is beyond its limit that no fault says; see `diagnosis.audit.fleet.trends.untold_losses`.
     """
+    lost = [False] * len(machines) if lost is None else lost
     verdicts = [m.verdict for m in machines]
     status = max(verdicts, key=lambda verdict: verdict.rank, default=Verdict.NOT_ASSESSED)
     damaged = [m for m in machines if is_damaged(m)]
@@ -143,7 +156,10 @@ def headline(machines: Sequence[Machine], unknown: int = 0) -> tuple[Verdict, st
     if status is Verdict.WATCH and len(damaged) == verdicts.count(Verdict.WATCH):
         apart = all(_lacks_a_file(m) for m in damaged)
         tag = f"{count(len(damaged), 'machine')}: {'files left out' if apart else 'damaged logs'}"
-    title = _leave_words([leave_of(m.verdict, m.cleared, m.unjudged) for m in machines])
+    leaves = [leave_of(m.verdict, m.cleared, m.unjudged, lost=x) for m, x in zip(machines, lost, strict=True)]
+    title = _leave_words(leaves)
+    if status is Verdict.READY and any(lost):
+        status, tag = Verdict.WATCH, "a loss beyond its limit"
     if unknown and status is Verdict.READY:
         status, tag = Verdict.NOT_ASSESSED, "not all assessed"
         title += f", but {count(unknown, 'log')} of no known machine {_was(unknown)} not judged"

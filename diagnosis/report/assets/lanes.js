@@ -1,5 +1,5 @@
 "use strict";
-// Lanes without a fault, opened: what the part was judged by over the whole mission, and where it came nearest to a threshold.
+// Lanes without a fault, opened: what the part was judged by over the whole mission, and where it came nearest to a threshold, or furthest beyond one.
 const Lanes = {
   rows(component, side) {
     const names = new Map(Data.view.channels.map((c, i) => [c.name, i])), base = `evidence.${component}.${side}.`, kind = ["wheel", "steer"].find((k) => names.has(`${k}.${component}.u`) || names.has(`${k}.${component}.v`) || names.has(`${k}.${component}.phi`));
@@ -34,7 +34,7 @@ const Lanes = {
     const row = rows.find((r) => r.threshold !== undefined);
     if (row) {
       const { part, time, residual, limit } = await Lanes.nearest(row), unit = row.unit === "1" ? "" : ` ${row.unit}`;
-      words.textContent = part < 0 ? "Its residual was never held against a threshold." : `Nearest to its threshold at ${time.toFixed(3)} s: residual ${Now.number(residual)}${unit}, ${Now.number(100 * part)} % of the threshold of ${Now.number(limit)}${unit}.${part >= 1 ? " Single readings beyond it are no fault: one lasts." : ""}`;
+      words.textContent = part < 0 ? "Its residual was never held against a threshold." : part < 1 ? `Nearest to its threshold at ${time.toFixed(3)} s: residual ${Now.number(residual)}${unit}, ${Now.number(100 * part)} % of the threshold of ${Now.number(limit)}${unit}.` : `Furthest beyond its threshold at ${time.toFixed(3)} s: residual ${Now.number(residual)}${unit}, ${Now.number(+part.toPrecision(2))} times the threshold of ${Now.number(limit)}${unit}. That alone is no fault: one lasts for longer.`;
     }
     await figure.draw(rows, Data.view.faults.filter((f) => f.component === component).slice(0, 40).map((f) => ({ ...f, main: false })), [0, Data.view.duration]);
   },

@@ -92,3 +92,22 @@ def test_a_broken_report_is_told_and_costs_nothing(store: Path) -> None:
     ((event, facts),) = compare(store, "new")
     assert event == "not_compared"
     assert "not JSON" in facts["reason"]
+
+
+def test_the_newest_report_says_what_is_open_from_earlier_missions(tmp_path: Path) -> None:
+    """A report judges its own mission; the fleet holds a severe fault open that nobody is known to have repaired."""
+    silent = samples.Fault("FR", "sensor", "no_signal", "high")
+    missions = [Sample("old", day=0.0, verdict="stop", faults=[silent]), Sample("mid", day=1.0), Sample("new", day=2.0)]
+    path = samples.write_store(tmp_path / "fleet.sqlite", missions)
+    for k, mission in enumerate(missions):
+        written(tmp_path, mission, report_samples.no_faults(), samples.START_NS + k * samples.DAY_NS)
+    assert compare(path, "new") == []
+    (said,) = document(path, "new")["previous"]["open_faults"]
+    assert said.startswith("FR speed sensor without signal, last found in old (2026-10-")
+    assert said.endswith(", no repair recorded, clean in 2 of the 10 missions that close it")
+    page = (tmp_path / "missions/new/report.html").read_text("utf-8")
+    assert "Open from earlier missions" in page
+    assert said in page
+    before = (tmp_path / "missions/new/report.html").stat().st_mtime_ns
+    compare(path, "new")
+    assert (tmp_path / "missions/new/report.html").stat().st_mtime_ns == before

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import html
 import json
+import re
+import shlex
 import shutil
 import sqlite3
 from contextlib import closing
@@ -343,3 +346,21 @@ def test_what_the_command_refuses(
     assert run(["audit", "-o", str(tmp_path / "out"), *words]) == 2
     assert said in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
+
+
+def test_the_command_that_the_page_shows_records_the_repair(tmp_path: Path) -> None:
+    """For a machine with a space in its name, and of a fault that may be either side's."""
+    missions = [
+        Sample("one", "Lift 7", verdict="stop", faults=[SILENT, Fault("front", "sensor_or_actuator", "stuck", "high")])
+    ]
+    stored(tmp_path, missions)
+    page = html.unescape(build_fleet_page(document(tmp_path)))
+    commands = re.findall(r"<code>(mfhca audit .*?)</code>", page)
+    assert commands == [
+        "mfhca audit -o . --repaired 'Lift 7 FR sensor' --on DATE",
+        "mfhca audit -o . --repaired 'Lift 7 front' --on DATE",
+    ]
+    for command in commands:
+        repair(tmp_path, shlex.split(command)[5], 1.0)
+    assert {f["status"] for f in document(tmp_path)["faults"]} == {"repaired"}
+    assert "<code>mfhca audit" not in build_fleet_page(document(tmp_path))

@@ -44,7 +44,7 @@ def _swapped(a: str, b: str) -> EDIT:
 def test_a_wrong_sign_unit_or_place_is_told(edit: EDIT, words: str) -> None:
     (hint, *others) = mapping_hints(in_cells(edit(simulated()), base=True))
     assert hint.text.startswith(words)
-    assert "look at its entry in the machine file" in hint.text
+    assert "look at its entry under [signals] of a machine file" in hint.text
     assert len(others) <= 1
 
 

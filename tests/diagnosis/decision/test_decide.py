@@ -223,7 +223,7 @@ def test_the_worst_open_time_is_named_truly() -> None:
     driven = dict.fromkeys(parts, 60.0)
     decided = dict.fromkeys(parts, 60.0) | {("FL", "sensor"): 50.0}
     only = decide((), parts, decided, AXLES, LIMITS, (), HYDRAULIC, driving_s=driven)
-    assert any("10.0 s of 60.0 s" in c and "this is the most of all parts." in c for c in only.caveats)
+    assert any("10.0 s of its 60.0 s" in c and "this is the most of all parts." in c for c in only.caveats)
     worse = decide((), parts, decided | {("FR", "sensor"): 20.0}, AXLES, LIMITS, (), HYDRAULIC, driving_s=driven)
     assert any("FL" in c and "this is the most of all parts judged long enough." in c for c in worse.caveats)
 

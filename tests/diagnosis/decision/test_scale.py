@@ -48,7 +48,7 @@ def test_a_sound_scale_agrees_with_receiver_and_gyro(seed: int) -> None:
     found = scale(mission(seed), 1.0)
     assert {s.by for s in found.found} >= {"odometry", "the yaw rate"}
     assert (found.wrong, found.sentence) == ((), "")
-    assert found.result[0].startswith("by the wheel diameter of the machine file (")
+    assert found.result[0].startswith("by an assumed wheel diameter (")
     assert "agrees with odometry" in found.result[0]
 
 

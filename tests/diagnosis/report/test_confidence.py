@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from diagnosis.report.confidence import headline, judged, percent, sure_of, sure_of_verdict
+from diagnosis.report.confidence import headline, judged, judged_means, percent, sure_of, sure_of_verdict
 from diagnosis.results.document import IntervalRow, ReportDocument
 from tests import report_samples as samples
 
@@ -92,7 +92,7 @@ def test_phrase_of_a_verdict() -> None:
         "All 2 wheel parts were judged, each for at least 90 % of its driving, by second measurements and a model of the "
         "wheels."
     )
-    assert judged(done) == "all 2 parts"
+    assert judged(done) == "2 of 2 parts judged, none cleared"  # the report does not say what is open
     short = samples.report_with(coverage=[row("sensor", 98.0), row("actuator", 0.0, tier="none")])
     assert sure_of_verdict(short).startswith("1 of 2 wheel parts were judged long enough")
     assert sure_of_verdict(samples.report_with(coverage=[])) == ""
@@ -112,3 +112,22 @@ def test_leave_to_go_out_is_given_only_where_nothing_stands_against_it() -> None
     assert headline(with_verdict("stop")) == ("Stop and repair", "must not go out before repair")
     assert headline(with_verdict("ready")) == ("Ready for the next mission", "")
     assert headline(with_verdict("not_assessed")) == ("Not assessed", "whether it may go out is not known")
+
+
+def test_parts_that_were_judged_and_those_that_were_cleared_are_counted_apart() -> None:
+    """What has a fault, or is named in what is open, is judged and not cleared."""
+    rows = [row(side, 100.0, wheel) for wheel in ("FR", "FL") for side in ("sensor", "actuator")]
+    watched = samples.fault(component="FR", side="sensor", severity="low")
+    about = {"status": "watch", "cleared": True, "to_clear": []}
+    found = samples.report_with(coverage=rows, intervals=[watched], verdict=about)
+    assert judged(found) == "4 of 4 parts judged, 3 cleared"
+    about["to_clear"] = [{"reason": "The speed of FL per opening falls below the others' by 30 %.", "act": "lift it"}]
+    assert judged(samples.report_with(coverage=rows, intervals=[watched], verdict=about)) == (
+        "4 of 4 parts judged, 1 cleared"
+    )
+    about["to_clear"] = [{"reason": "Several wheels swing together.", "act": "lower the gains"}]
+    assert judged(samples.report_with(coverage=rows, intervals=[watched], verdict=about)) == (
+        "4 of 4 parts judged, none cleared"
+    )
+    assert judged_means(found).startswith("Judged: decided, healthy or faulty, for at least ")
+    assert judged_means(samples.report_with(coverage=[])) == ""

@@ -29,7 +29,7 @@ from diagnosis.audit.fleet.page.shown import Context, ShownDocument, fault_addre
 from diagnosis.audit.fleet.page.svg import LEGEND, mark, sparkline, sprite
 from diagnosis.audit.fleet.page.trends import MOST, chosen, course, interest, level_words
 from diagnosis.audit.fleet.trend_types import TrendRow
-from diagnosis.audit.fleet.words import count, missions_words, open_words
+from diagnosis.audit.fleet.words import count, missions_words, open_words, repair_command
 from diagnosis.pages import labels
 from diagnosis.pages.environment import DARK, SHARED, asset, environment, shared_style
 from diagnosis.pages.mode_style import mode_rules
@@ -64,6 +64,8 @@ _DEFINITIONS = (
     "Trend: weighted line through the missions' ε̂ over time, each over its whole mission, while a fault's ε̂ is that of the fault's own time; the spread from mission to mission is estimated with it. "
     "Outliers (×) are excluded. A step or bend (↓ ↑ ∠), such as a repair, starts a new line. "
     "The band is its 90 % interval, the bar on the limit the 90 % interval of the crossing.",
+    "The limit of ε̂ is the loss from which on a report states a fault to watch. A loss alone is no reason to stop, so a machine with one may go "
+    "out; one whose loss is beyond the limit for certain, though no report states the fault, is not known to be fit to.",
     "A forecast needs five missions since the last change, and reaches at most three times as far ahead as the time that "
     "they cover. It gives the time at which the mean of missions reaches the limit if wear continues at this rate.",
     "Copies of a log count once, and for one machine: that in whose folder an audit saw the log first.",
@@ -84,7 +86,7 @@ def build_fleet_page(found: FleetDocument) -> str:
     scripts = [asset(SHARED / "theme.js"), asset(_HERE / "fleet.js")]
     present = [f for f in document["faults"] if f["status"] not in GONE]
     past = [f for f in document["faults"] if f["status"] in GONE]
-    drawn, standing = chosen(trends), _by_machine(present)
+    drawn, standing, lists = chosen(trends), _by_machine(present), lists_of(found)
     failed = [k for k, m in enumerate(found["missions"]) if m["verdict"] is None]
     own: dict[int, list[TrendRow]] = defaultdict(list)
     for t in trends:
@@ -103,9 +105,11 @@ def build_fleet_page(found: FleetDocument) -> str:
         "audit": _audit(document["audit"]),
         "kpis": kpis(document),
         "baseline": changes_of(document["baseline"], {m["label"]: words_of(m) for m in document["machines"]}),
-        "leave": _leave(lists_of(found), document),
+        "leave": _leave(lists, document),
         "strip": rows.strip_length(len(document["machines"])),
-        "machines": [_machine(k, m, document, standing[k], own[k]) for k, m in enumerate(document["machines"])],
+        "machines": [
+            _machine(k, m, document, standing[k], own[k], lists[k].leave) for k, m in enumerate(document["machines"])
+        ],
         "faults": [_fault(f, document, directions) for f in present[:_FAULTS]],
         "unlisted": max(0, len(present) - _FAULTS),
         "past": [_fault(f, document, directions) for f in past[:_FAULTS]],
@@ -203,13 +207,15 @@ def _machine(
     document: ShownDocument,
     standing: Sequence[FleetFaultRow],
     trends: Sequence[TrendRow],
+    leave: Leave,
 ) -> Context:
     leading = max((t for t in trends if t["line"] is not None), key=interest, default=None)
     line = leading["line"] if leading else None
     judged = len(m["missions"]) + len(m["undated"])
     near = any(t["approaching"] for t in trends)
-    words, symbol = machine_words(m, standing, near), m["verdict"].symbol
-    if (m["verdict"] is Verdict.WATCH and not standing) or (m["verdict"] is Verdict.READY and (standing or near)):
+    words, symbol = machine_words(m, standing, near, leave), m["verdict"].symbol
+    shows = bool(standing) or near or leave is not Leave.MAY
+    if (m["verdict"] is Verdict.WATCH and not standing) or (m["verdict"] is Verdict.READY and shows):
         symbol = "warning"  # a damaged log, or a ready one that shows something
     return {
         "label": m["label"],
@@ -267,4 +273,7 @@ def _fault(f: FleetFaultRow, document: ShownDocument, directions: Mapping[tuple[
         "last": rows.day(last.get("start_ns")),
         "address": fault_address(last["address"], f["last_id"]),
         "course": ", ".join(notes) or "–",
+        "repair": ""
+        if f["status"] in GONE
+        else repair_command(document["machines"][f["machine"]]["label"], f["component"], f["side"]),
     }

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from diagnosis.audit.fleet.leave import Left, lists_of
+from diagnosis.audit.fleet.listed import listed_machines
 from diagnosis.audit.fleet.may_leave import Leave
 from diagnosis.audit.fleet.page.page import build_fleet_page
 from diagnosis.audit.fleet_files import fleet_json, load_fleet
@@ -76,8 +77,11 @@ def test_an_open_fault_and_a_rising_loss_are_said(tmp_path: Path) -> None:
         for k in range(6)
     ]
     found = listed(tmp_path, stuck, Sample("a/2", "a", day=1.0), *worn)
-    assert found["a"].reason == "FR speed sensor stuck, no repair recorded, clean in 1 of the 10 missions that close it"
-    assert found["b"].reason.endswith("RL drive valve inefficient, rising") or found["b"].leave is not Leave.MAY
+    assert found["a"].reason == (
+        "FR speed sensor stuck, no repair recorded, clean in 1 of the 10 missions that close it; its newest report says ready, for "
+        "that judges its own mission alone"
+    )
+    assert "RL drive valve inefficient, rising" in found["b"].reason or found["b"].leave is not Leave.MAY
 
 
 def test_a_reason_names_its_log_without_the_folders(tmp_path: Path) -> None:
@@ -106,3 +110,36 @@ def test_parts_that_were_not_assessed_stand_beside_the_leave(tmp_path: Path) -> 
         part["assessed_last"] = False
     assert found.reason != lists_of(document)[k].reason
     assert f" and {len(document['machines'][k]['parts']) - 4} more parts" in lists_of(document)[k].reason
+
+
+def worn(tmp_path: Path, low: float) -> tuple[Left, str, str]:
+    """A machine whose reports are ready and whose RL valve has lost .2 with a lower bound: its place, its words, the headline."""
+    missions = [Sample(f"a/{k}", "a", day=float(k), epsilon={("RL", "actuator"): (0.2, low, 0.3)}) for k in range(3)]
+    store = samples.write_store(tmp_path / "fleet.sqlite", missions)
+    for m in missions:
+        samples.write_report(tmp_path, m.name, cleared=True)
+    document = fleet_json(load_fleet(store))
+    (one,), (listed_one,) = lists_of(document), listed_machines(document)
+    assert one.leave.value == listed_one.leave
+    return one, listed_one.words, document["verdict"]["title"]
+
+
+def test_a_loss_beyond_its_limit_that_no_report_states_gives_no_leave(tmp_path: Path) -> None:
+    one, words, title = worn(tmp_path, 0.15)
+    assert one.leave is Leave.NOT_KNOWN
+    assert one.reason == (
+        "RL drive valve lost 20 % over the whole of its last mission, beyond the limit of 10 %, though no fault was stated in it: check "
+        "the part"
+    )
+    assert words == "Ready by its last report, but a loss is beyond its limit"
+    assert title == "It is not known whether the machine may go out"
+
+
+def test_a_loss_that_may_be_within_its_limit_is_told_beside_the_leave(tmp_path: Path) -> None:
+    one, words, title = worn(tmp_path, 0.05)
+    assert one.leave is Leave.MAY
+    assert one.reason.endswith(
+        "; RL drive valve lost 20 % over the whole of its last mission, beyond the limit of 10 %, which its bounds of 5 to 30 % leave open"
+    )
+    assert words == "Ready"
+    assert title == "The machine may go out"
