@@ -13,6 +13,7 @@ from diagnosis.results.assessment import CODE, Assessment, unassessed
 from diagnosis.results.sizes import amount
 from diagnosis.results.vocabulary import Tier
 from diagnosis.steering.acquittal import acquitted, moves_otherwise, scatter_of
+from diagnosis.steering.agreed import without_agreed
 from diagnosis.steering.blocks import SteeringBlocks, without_growth
 from diagnosis.steering.denied import not_denied
 from diagnosis.steering.driven import driven_by
@@ -175,7 +176,7 @@ def _found(
         found = weighed(found, blocks.length, inputs.timeline.dt)
     else:
         found = paired(found)
-    found = not_denied(found, inputs, blocks, machine.max_steer)
+    found = without_agreed(not_denied(found, inputs, blocks, machine.max_steer), inputs)
     found = {side: acquitted(side, found[side], inputs, blocks, believed=not otherwise) for side in _SIDES}
     found = {side: of_one_cause(side, found[side], inputs, machine.limits.min_opening) for side in _SIDES}
     return _Found(axle, path, found, valve_judged)
