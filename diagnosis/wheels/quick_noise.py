@@ -27,6 +27,7 @@ _WINDOW_S, _QUIET = 3.0, 0.1  # quantile of windows that shows a channel's own n
 _ROUGHER, _OF_MINE = 3.0, 0.2  # times that noise, and of the noisy wheel's
 _SHARED_P = 0.6
 _LEAST = 20  # readings
+_BESIDE = "The {wheel} swings, or deviates slowly, at other times of this mission: the same may shake it here."
 _SLOW = "It changes slowly: the {wheel} may really move so, as where it is dragged or slips, or its sensor may read so."
 
 
@@ -42,9 +43,18 @@ def with_shaken(paths: Mapping[int, WheelPath], found: Mapping[int, WheelFinding
         return dict(found)
     rough = {i: _roughness(p) for i, p in paths.items()}
     return {
-        i: replace(w, findings=[_judged(f, i, paths[i], rough) if _of_sensor(f) else f for f in w.findings])
+        i: replace(
+            w, findings=_of_one_cause([_judged(f, i, paths[i], rough) if _of_sensor(f) else f for f in w.findings])
+        )
         for i, w in found.items()
     }
+
+
+def _of_one_cause(findings: list[Finding]) -> list[Finding]:
+    """A wheel's findings; noise of its sensor beside noise of which the side is open is no surer than that."""
+    if not any(f.mode is FaultMode.NOISY and f.side is Side.SENSOR_OR_ACTUATOR for f in findings):
+        return findings
+    return [opened(f, _BESIDE) if _of_sensor(f) else f for f in findings]
 
 
 def _of_sensor(f: Finding) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -12,7 +13,7 @@ from diagnosis.results.assessment import Finding
 from diagnosis.results.result import Hypothesis
 from diagnosis.results.vocabulary import Tier
 from diagnosis.wheels.findings import WheelFindings
-from diagnosis.wheels.quick_noise import quick_share, with_shaken
+from diagnosis.wheels.quick_noise import _of_one_cause, quick_share, with_shaken
 from replay.faults import FaultMode, Side
 from tests.diagnosis.wheels.test_own_swings import DT, WIDTH, N, T, noise
 
@@ -68,3 +69,13 @@ def test_noise_beside_a_large_slow_rest_is_the_sensors_where_readings_become_rou
     slow = 0.2 * INSIDE * np.sin(2 * np.pi * T / 7.0)
     out = judged(QUIET + slow + 0.03 * INSIDE * noise(0.0, 1), QUIET)
     assert (out.side, out.probability) == (Side.SENSOR, 0.95)
+
+
+def test_noise_beside_a_swing_of_the_same_wheel_is_no_surer_than_that() -> None:
+    rows = (Hypothesis("sensor", FaultMode.NOISY, 0.97), Hypothesis("none", "healthy", 0.03))
+    own = Finding(1000, 2000, Side.SENSOR, FaultMode.NOISY, 0.97, rows, None, None, ("It shakes.",), Tier.MODEL)
+    swing = replace(own, start=3000, stop=4000, side=Side.SENSOR_OR_ACTUATOR, probability=0.6)
+    first, second = _of_one_cause([own, swing])
+    assert (first.side, first.probability) == (Side.SENSOR_OR_ACTUATOR, 0.6)
+    assert second is swing
+    assert _of_one_cause([own]) == [own]
