@@ -71,6 +71,20 @@ def test_what_deviates_while_a_fault_lasts_is_told_as_its_possible_doing() -> No
         assert "F1" not in row.reason + row.act
 
 
+def test_what_deviates_after_a_fault_is_told_so_and_an_angle_that_jumps_then_is_not_its_doing() -> None:
+    parts = {("RR", "actuator"): assessed(finding(Side.ACTUATOR, FaultMode.STUCK, 1000, 3000))}
+    faults = intervals_of(parts, haulotte(), HYDRAULIC, 0, 1_000_000)
+    wheel, times = (Kind.WHEEL, "FR", Side.SENSOR_OR_ACTUATOR), (3.2, 4.2)
+    less, more = (Checked(*wheel, c, x, 0.1, *times) for c, x in ((Check.RESPONSE, 0.4), (Check.EXCESS, 0.9)))
+    (row,) = to_clear(Reservations(open=(less, more)), PARTS, {}, {}, [], Limits(), faults)
+    assert row.reason == (
+        "Just after F1, which may explain it: the speed of FR per opening rises above the other wheels' by 90 % at 3.2–4.2 s."
+    )  # of one wheel the check that is furthest beyond its limit, not two measures of one thing
+    jump = Checked(Kind.STEER, "front", Side.SENSOR, Check.JUMP, 0.02, 0.01, 3.2, 3.4)
+    (row,) = to_clear(Reservations(open=(jump,)), PARTS, {}, {}, [], Limits(), faults)
+    assert "F1" not in row.reason + row.act
+
+
 def test_what_the_yaw_rate_shows_of_either_axle_is_said_once() -> None:
     checks = [
         Checked(Kind.STEER, axle, Side.SENSOR_OR_ACTUATOR, Check.YAW, 0.54, 0.06, 53.0, 56.0)

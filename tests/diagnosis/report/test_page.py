@@ -138,7 +138,11 @@ def test_a_clock_without_a_date_is_not_shown_as_1970() -> None:
     text = Tree(build_page(undated, columns)).text
     assert "clock without a date" in text
     assert "Start (UTC)" not in text
-    assert "Start (UTC)" in Tree(build_page(report, columns)).text
+    assert "Clock without a date, " in text
+    dated = {**report, "log": {**report["log"], "start_ns": 1_793_000_000 * 10**9}}
+    text = Tree(build_page(dated, columns)).text
+    assert "Start (UTC)" in text
+    assert re.search(r"2026-10-26 07:33:20 to 07:3\d:\d\d UTC, \d:\d\d ", " ".join(text.split()))
 
 
 LISTS = ("readings", "intervals", "states", "phases", "coverage", "loss", "clearing", "signals", "missing", "quality")

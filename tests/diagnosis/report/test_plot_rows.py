@@ -20,6 +20,20 @@ def test_rows_of_a_sensor_fault() -> None:
     assert all(r.unit for r in rows)
 
 
+def test_a_side_that_is_healthy_is_not_called_as_a_wheel_without_fault() -> None:
+    report, columns = samples.five_faults()
+    elsewhere = {"side": "actuator", "mode": "stuck", "p": 0.04}
+    fault = report["intervals"][0]
+    own_side = [h for h in fault["hypotheses"] if h["side"] != "actuator"]
+    for hypotheses, words in (
+        (own_side, "healthy"),
+        ([*own_side, elsewhere], "speed sensor healthy: drive valve faulty, or neither"),
+    ):
+        own = {**fault, "hypotheses": hypotheses}
+        modes = next(r for r in fault_rows(own, WHEELS, derived(columns, report), HYDRAULIC) if r.key == "modes")
+        assert next(t.label for t in modes.traces if t.column.endswith("p_healthy")) == words
+
+
 def test_steering_is_shown_in_degrees() -> None:
     report, columns = samples.five_faults()
     fault = report["intervals"][3]
