@@ -34,18 +34,18 @@ class KernelHook(BuildHookInterface[Any]):
         with TemporaryDirectory() as folder:
             own = Path(folder, "own.csv")
             words = ["simulate", "--scenario", "random", "--duration", "20", "--rate", "100", "--evidence", "base"]
-            lines = [[self._diagnosis(log, machine, Path(folder, "sample"))]]
+            lines = [[self._diagnosis(log, Path(folder, "sample"), "-m", str(machine))]]
             if (
                 os.cpu_count() or 1
             ) > 1:  # what a log without second measurements needs beyond that, by another processor
-                lines.append([[*words, "-o", str(own)], self._diagnosis(own, machine, Path(folder, "own"))])
+                lines.append([[*words, "-o", str(own)], self._diagnosis(own, Path(folder, "own"))])
             with ThreadPoolExecutor(len(lines)) as pool:
                 if not all(list(pool.map(self._run, lines))):
                     self.app.display_info("not compiled now; the first diagnosis does it")
 
     @staticmethod
-    def _diagnosis(log: Path, machine: Path, folder: Path) -> list[str]:
-        return ["diagnose", str(log), "-m", str(machine), "-o", str(folder), "--fail-on", "never"]
+    def _diagnosis(log: Path, folder: Path, *words: str) -> list[str]:
+        return ["diagnose", str(log), "-o", str(folder), "--fail-on", "never", *words]
 
     def _run(self, commands: list[list[str]]) -> bool:
         """Run commands one after the other; whether all ended well."""

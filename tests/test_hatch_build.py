@@ -5,11 +5,14 @@ from __future__ import annotations
 import importlib.util
 import subprocess
 import sys
+from contextlib import nullcontext
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
 import pytest
+
+from cli.main import run
 
 ROOT = Path(__file__).parents[1]
 
@@ -53,6 +56,21 @@ def test_an_editable_installation_runs_the_first_diagnosis(
         assert command[:4] == [sys.executable, "-m", "cli.main", "-q"]
         assert options["cwd"] == str(ROOT)
     assert len(told) == 1
+
+
+def test_what_an_installation_runs_ends_well(
+    hook_module: ModuleType, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    runs: list[list[str]] = []
+    monkeypatch.setattr(subprocess, "run", lambda command, **_: runs.append(command))
+    monkeypatch.setattr(hook_module.os, "cpu_count", lambda: 2)
+    monkeypatch.setattr(hook_module, "TemporaryDirectory", lambda: nullcontext(str(tmp_path)))
+    _finish(hook_module, ROOT, "editable")
+    monkeypatch.undo()
+    own = [command for command in runs if str(tmp_path / "own.csv") in command]
+    assert len(own) == 2
+    assert [run(command[3:]) for command in own] == [0, 0]
+    assert (tmp_path / "own" / "report.json").is_file()
 
 
 def test_wheels_for_others_compile_nothing(hook_module: ModuleType, monkeypatch: pytest.MonkeyPatch) -> None:
