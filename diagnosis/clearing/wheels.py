@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -24,6 +24,10 @@ from diagnosis.results.vocabulary import Kind
 from replay.faults import Side
 
 FLOOR = 0.16  # of the top speed: a deviation is a share of at least this
+CREEPING, _CREEPS_ALIKE = (
+    0.06,
+    1.5,
+)  # the same beside a second speed; there it counts beyond so many times the median of the others
 OPENING = 0.03  # of full opening: likewise
 ROUGH, _ROUGHER = 0.15, 5.0  # quick changes: share of the speed, times those of the other wheels
 LATE_S = 0.2
@@ -54,13 +58,20 @@ def wheel_checks(cells: Cells, clear_at: float) -> Iterator[Checked]:
     delays = late(speed, reference, cells.dt)
     either = Side.SENSOR_OR_ACTUATOR
     top = cells.machine.max_speed
+    creeping = np.column_stack(
+        [compared(cells, y, x, CREEPING * top).off for y, x in zip(speed.T, second.T, strict=True)]
+    )
+    slowly = [float(x) for x in largest(creeping)]
     for i, wheel in enumerate(cells.machine.wheels):
         about = (Kind.WHEEL, wheel)
         if not _known(speed[:, i]):
             continue
         if twice[i][1]:
+            about_sensor = (*about, Side.SENSOR, Check.SECOND_MEASUREMENT)
             off = compared(cells, speed[:, i], second[:, i], FLOOR * top).off
-            yield worst(cells, (*about, Side.SENSOR, Check.SECOND_MEASUREMENT), off, clear_at, apart=True)
+            driven = worst(cells, about_sensor, off, clear_at, apart=True)
+            creeps = worst(cells, about_sensor, creeping[:, i], most_creeping(slowly, i, clear_at), apart=True)
+            yield max(driven, creeps, key=times)
         if twice[i][0]:
             limit = alone(slowest, i, VALVE * clear_at, clear_at, _SLOWER)
             yield worst(cells, (*about, Side.ACTUATOR, Check.SECOND_MEASUREMENT), behind[:, i], limit, apart=True)
@@ -86,6 +97,24 @@ def wheel_checks(cells: Cells, clear_at: float) -> Iterator[Checked]:
             if delays[i] is not None:
                 yield lasts(cells, (*about, Side.SENSOR, Check.DELAY), delays[i], LATE_S)
         yield worst(cells, (*about, Side.SENSOR, Check.ROUGHNESS), rough[:, i], ROUGH, apart=True)
+
+
+def most_creeping(slowly: Sequence[float], i: int, clear_at: float) -> float:
+    """By how much a wheel's speed may be off its second measurement where it hardly drives [1].
+
+    Stiction, backlash and pulses that are few make more of small speeds than a fault does, of all wheels alike.
+
+    Parameters
+    ----------
+    slowly : Sequence[float]
+        By how much each wheel's is, at most [1]; NaN where nothing is known.
+    i : int
+        The wheel.
+    clear_at : float
+        The loss that counts [1].
+    """
+    others = [x for j, x in enumerate(slowly) if j != i and np.isfinite(x)]
+    return max(clear_at, _CREEPS_ALIKE * float(np.median(others))) if others else clear_at
 
 
 def most_carried(below: float, clear_at: float) -> float:

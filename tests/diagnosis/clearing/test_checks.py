@@ -11,7 +11,7 @@ from diagnosis.clearing import yaw
 from diagnosis.clearing.axles import dead_bands
 from diagnosis.clearing.checks import checks_of
 from diagnosis.clearing.measure import off_commands
-from diagnosis.clearing.wheels import most_carried
+from diagnosis.clearing.wheels import most_carried, most_creeping
 from diagnosis.results.clearing import Check, Checked
 from diagnosis.results.machine_words import HYDRAULIC
 from replay.faults import FaultMode, FaultSpec, Side
@@ -252,3 +252,10 @@ def test_how_much_the_ground_may_carry_goes_with_what_counts_in_the_mission() ->
     """Where wheels differ much anyhow, a loss must show more of itself."""
     assert most_carried(0.06, 0.25) == pytest.approx(1 - 0.06 / (2 * -np.log(0.75)))
     assert most_carried(0.2, 0.25) < most_carried(0.1, 0.25) < most_carried(0.1, 0.5)
+
+
+def test_a_creeping_wheel_is_held_to_what_the_others_do() -> None:
+    """Two of four wheels that are wrong are told, all that stick alike are not."""
+    assert most_creeping([0.33, 0.05, 0.32, 0.06], 0, 0.25) == 0.25
+    assert most_creeping([0.44, 0.31, 0.48, 0.3], 2, 0.25) == pytest.approx(1.5 * 0.31)
+    assert most_creeping([0.3, np.nan, np.nan, np.nan], 0, 0.25) == 0.25
