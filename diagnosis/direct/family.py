@@ -11,7 +11,7 @@ from diagnosis.channels.habit import Habit, identify_habit, of_kind
 from diagnosis.channels.relation import relations_of_kind, valves_of_kind
 from diagnosis.direct.assess import assess_identified
 from diagnosis.direct.at_once import without_shared_moments
-from diagnosis.direct.identification import IdentifiedPair, identify
+from diagnosis.direct.identification import IdentifiedPair, identify, usual_spread
 from diagnosis.direct.inputs import Pair, make_pair
 from diagnosis.direct.low_speed import without_low_speed_habit
 from diagnosis.direct.uncertainty import most_noise_of_kind, usual_of_kind
@@ -82,6 +82,8 @@ def _identified(pairs: dict[Part, Pair], limits: Limits, mission: MissionView) -
             louder = most is not None and one.model.noise > most
             if exceeds or louder or relation != one.relation:
                 found[part] = identify(one.pair, limits, usual if exceeds else None, relation, most)
+        spread = usual_spread([found[part].own_spread for part in kind])
+        found |= {part: replace(found[part], kind_spread=spread) for part in kind}
     return found
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import NamedTuple
@@ -35,6 +36,8 @@ _MAX_LAG_S = 0.05
 _GAIN_S, _GAIN_DRIVEN, _GAIN_WINDOWS = 1.0, 0.1, 6  # windows; of the span, from which on they move; the fewest of them
 _NORMAL_MEDIAN = 0.6745  # of the size of a normal variable of unit variance
 _MOST_SPREAD = 0.1  # of a gain: as much may a healthy one vary; more of it is a fault in other windows
+_LEAST_SPREAD = 0.005  # of a gain: two instruments agree no better, however steady they are
+_OF_FEW = 1.6  # times as wide are 95 % bounds by four channels (Student's t) as by many
 _WHOLE = 0.25
 _JUMP = 3.5  # times the noise
 _COARSE, _COARSE_COST = (
@@ -87,6 +90,8 @@ class IdentifiedPair:
         Share of the power of the command's quick changes that shows up as a residual; 0 where all is resolved.
     own : HealthyNoise
         Noise of y − x.
+    kind_spread : GainSpread
+        By how much the gains of healthy channels of its kind vary.
     """
 
     pair: Pair
@@ -97,6 +102,7 @@ class IdentifiedPair:
     unresolved: NDArray[np.bool_]
     unresolved_share: float = 0.0
     own: HealthyNoise = field(default_factory=HealthyNoise)
+    kind_spread: GainSpread = field(default_factory=lambda: GainSpread(_LEAST_SPREAD, 0.0))
 
     @property
     def lag(self) -> float:
@@ -125,9 +131,14 @@ class IdentifiedPair:
         """
         return _news(np.isin(self.samples.status, (PAIR, BLIND)))[0]
 
-    def gain_spread(self, start: int, stop: int) -> float:
-        """Standard deviation of y per reference from second to second outside of a fault [1]: it lasts, and does not average out."""
-        return self._gains.spread(self.model.span, start, stop)
+    def gain_spread(self, start: int, stop: int) -> GainSpread:
+        """By how much a healthy gain varies outside of a fault; that of its kind where the fault leaves too little of the mission."""
+        return self._gains.spread(self.model.span, start, stop) or self.kind_spread
+
+    @property
+    def own_spread(self) -> GainSpread | None:
+        """The same over the whole mission, a fault's part of it included; None where it moves little."""
+        return self._gains.spread(self.model.span)
 
     @cached_property
     def _gains(self) -> GainWindows:
@@ -153,6 +164,21 @@ class IdentifiedPair:
         return Texture(y.size, white, self.lsb, own)
 
 
+class GainSpread(NamedTuple):
+    """By how much y per reference of a healthy channel varies from second to second: that lasts, and does not average out.
+
+    Attributes
+    ----------
+    share : float
+        Standard deviation of the gain [1].
+    size : float
+        Root mean square of the reference where that was seen [unit of y].
+    """
+
+    share: float
+    size: float
+
+
 class GainWindows(NamedTuple):
     """Sums over windows of a second.
 
@@ -168,8 +194,8 @@ class GainWindows(NamedTuple):
     moved: Array
     width: int
 
-    def spread(self, span: float, start: int = 0, stop: int = 0) -> float:
-        """Robust standard deviation of the gain Σxy/Σx² about 1 [1]; 0 where few windows move.
+    def spread(self, span: float, start: int = 0, stop: int = 0) -> GainSpread | None:
+        """Robust standard deviation of the gain Σxy/Σx² about 1; None where few windows move.
 
         Parameters
         ----------
@@ -181,9 +207,19 @@ class GainWindows(NamedTuple):
         driven = self.power > self.width * (_GAIN_DRIVEN * span) ** 2
         driven[start // self.width : -(-stop // self.width)] = False
         if np.count_nonzero(driven) < _GAIN_WINDOWS:
-            return 0.0
+            return None
         usual = float(np.median(np.abs(self.moved[driven] / self.power[driven] - 1.0)) / _NORMAL_MEDIAN)
-        return min(usual, _MOST_SPREAD)
+        size = float(np.sqrt(np.median(self.power[driven]) / self.width))
+        return GainSpread(min(max(usual, _LEAST_SPREAD), _MOST_SPREAD), size)
+
+
+def usual_spread(own: Sequence[GainSpread | None]) -> GainSpread:
+    """Spread of a healthy one of several channels of one kind, by that of each: the lower middle one, wider since they are few."""
+    known = [s for s in own if s is not None]
+    if not known:
+        return GainSpread(_LEAST_SPREAD, 0.0)
+    share, size = (float(x) for x in np.quantile(np.array(known), 0.5, axis=0, method="lower"))
+    return GainSpread(min(_OF_FEW * share, _MOST_SPREAD), size)
 
 
 def gain_windows(samples: Samples, dt: float) -> GainWindows:

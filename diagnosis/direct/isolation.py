@@ -40,7 +40,7 @@ _LAPSE, _COARSE_S = 0.01, 1.7
 _BURST_S = 0.6  # at which half of the bursts of noise are what a motion leaves out: right were 12 of 48 below 1 s, 8 of 8 up to 3 s
 _WILD, _WILD_S, _WILD_SAMPLES = 10.0, 0.04, 4.0  # times the noise; motion that a wrong time may be off by
 _RESTLESS, _RESTLESS_P = 0.1, 0.8  # share of changing news from which a channel is not stuck, and how probably so
-_OF_PLAY = 0.2  # of its width per rms opening: standard deviation of the gain that a play leaves in simulated valves
+_OF_PLAY = 0.3  # of its width per rms opening: standard deviation of the gain that a play leaves in simulated valves
 _CALM_P = 0.95  # that a steady row which leaves hardly anything is the fault's
 _CLEARLY = 2.0  # times as probable as the path's row, from which on another one is stated
 _MAJORITY = 0.5  # of the probability: a fault is called by it
@@ -132,10 +132,17 @@ def estimate_run(run: Run, found: IdentifiedPair) -> Estimate | None:
 
 
 def _gain_std(x: Array, found: IdentifiedPair, delta: float, run: Run) -> float:
-    """Standard deviation of a gain as a share of it: what the healthy channel's own varies by, and the side of the play it is on."""
+    """Standard deviation of a gain as a share of it: what the healthy channel's own varies by, and the side of the play it is on.
+
+    A speed sensor's own varies by a share. What keeps a valve from its command, such as friction or an offset of its
+    position, stays as large as it was where only a part of the opening is left.
+    """
+    spread = found.gain_spread(run.start, run.stop)
     large = float(np.sqrt(np.mean(x**2))) if x.size else 0.0
-    played = _OF_PLAY * found.relation.play / (large * abs(delta)) if large > 0.0 and delta != 0.0 else 0.0
-    return float(np.hypot(found.gain_spread(run.start, run.stop), min(played, 1.0)))
+    if found.pair.side is Side.SENSOR or large <= 0.0 or delta == 0.0:
+        return spread.share
+    off = spread.share * max(spread.size, large) + _OF_PLAY * found.relation.play
+    return min(off / (large * abs(delta)), 1.0)
 
 
 def isolate(run: Run, found: IdentifiedPair, min_sat: float) -> Isolated | None:
