@@ -15,6 +15,7 @@ from diagnosis.results.loss import Loss
 from diagnosis.results.machine_event import MachineEvent, foreign, swinging
 from diagnosis.results.vocabulary import Tier
 from diagnosis.wheels.blocks import WheelBlocks, blocks_of, per_sample
+from diagnosis.wheels.claims import as_claimed
 from diagnosis.wheels.effectiveness import relative_losses
 from diagnosis.wheels.filter import JointPass
 from diagnosis.wheels.filter_identification import joint_model
@@ -81,7 +82,8 @@ def assess_wheels(data: WheelsData, limits: Limits, *, gains: bool) -> WheelsJud
     doubted = without_many_weak(with_frozen(data, swings.found))
     out = {}
     for i, path in paths.items():
-        sensor, actuator = _assessments(data, i, path, doubted.found[i], gains=gains)
+        claimed = as_claimed(doubted.found[i], limits.clear_at, measured=bool(data.measured[i]))
+        sensor, actuator = _assessments(data, i, path, claimed, gains=gains)
         out[i] = sensor, actuator if data.measured[i] else replace(actuator, loss=losses[i])
     events = ((swinging(swings.sentence),) if swings.spans else ()) + (
         (foreign(doubted.sentence),) if doubted.wheels else ()

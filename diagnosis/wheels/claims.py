@@ -1,0 +1,73 @@
+"""What a row that a wheel's model finds is worth on machines of other structure than those that it learned from.
+
+The trees state how often a row was right on simulated machines. On tuning missions of nine others, of which some have motors, load
+sensing or gears instead of its valves, three kinds of claims were right less often than stated: a valve that is stuck, by its
+command and the speed alone, where the sensor was off instead; a small loss of a sensor, where the machine's own ground or
+geometry makes as much; a wheel that swings (see `diagnosis.wheels.own_swings`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from diagnosis.results.assessment import Finding
+from diagnosis.results.limited import limited
+from diagnosis.results.result import Hypothesis
+from diagnosis.wheels.findings import WheelFindings
+from replay.faults import FaultMode, Side, State
+
+_STUCK_AT_ALL, _SURELY_STUCK = 0.8, 0.95  # right were 2 of 14 below the one, 10 of 15 up to the other, 7 of 7 above
+_KEPT = 0.2  # of the probability: what a stuck valve keeps below the first
+_MOST_STUCK = 0.7
+_MOST_SMALL = 0.5  # of a loss that would not count, right in 1 of 6 where another part was at fault
+_UNTOLD = (
+    "The {wheel} does not follow its command, but whether its {valve} is stuck, or its sensor is off by an offset or a share, "
+    "command and speed do not tell: log the {valve}'s position."
+)
+_LESS_SURE = (
+    "By command and speed alone, what seemed a stuck {valve} was something else of the same {wheel} in one of three."
+)
+_SMALL = "Machines of other build differ by as much where nothing is wrong with this sensor."
+
+
+def as_claimed(found: WheelFindings, clear_at: float, *, measured: bool) -> WheelFindings:
+    """Findings as sure as they turned out to be.
+
+    Parameters
+    ----------
+    found : WheelFindings
+        Of one wheel.
+    clear_at : float
+        The loss that counts [1].
+    measured : bool
+        Whether the valve's position is measured.
+    """
+    return replace(found, findings=[_claimed(f, clear_at, measured=measured) for f in found.findings])
+
+
+def _claimed(f: Finding, clear_at: float, *, measured: bool) -> Finding:
+    if f.side is Side.SENSOR_OR_ACTUATOR and f.mode is FaultMode.NOISY:  # it swings, or deviates slowly
+        return _unexplained(f, tuple(h for h in f.hypotheses if h.mode == f.mode.value))
+    if f.side is Side.ACTUATOR and f.mode is FaultMode.STUCK and not measured:
+        if f.probability < _STUCK_AT_ALL:
+            return _untold(f)
+        return f if f.probability >= _SURELY_STUCK else limited(f, _MOST_STUCK, _LESS_SURE)
+    small = f.mode is FaultMode.INEFFICIENT and f.epsilon is not None and f.epsilon.value < clear_at
+    return limited(f, _MOST_SMALL, _SMALL) if small and f.side is not Side.ACTUATOR else f
+
+
+def _untold(f: Finding) -> Finding:
+    """A valve that is probably not stuck, but whose wheel does not follow: neither side, and no row of the tables."""
+    stuck = _KEPT * f.probability
+    return replace(
+        _unexplained(f, (Hypothesis(Side.ACTUATOR.value, f.mode.value, stuck),)), evidence=(_UNTOLD, *f.evidence)
+    )
+
+
+def _unexplained(f: Finding, kept: tuple[Hypothesis, ...] = ()) -> Finding:
+    """A finding of neither side and no row of the tables, but for what rows `kept` have; that nothing is wrong stays as probable."""
+    either, outside = Side.SENSOR_OR_ACTUATOR, FaultMode.OUTSIDE_TABLE
+    none = tuple(h for h in f.hypotheses if h.mode == State.HEALTHY.value)
+    p = 1.0 - sum(h.p for h in (*none, *kept))
+    rows = sorted((Hypothesis(either.value, outside.value, p), *kept, *none), key=lambda h: -h.p)
+    return replace(f, side=either, mode=outside, probability=p, epsilon=None, sat=None, hypotheses=tuple(rows))

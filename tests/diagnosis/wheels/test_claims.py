@@ -1,0 +1,72 @@
+"""Claims of the wheel model are as sure as they turned out to be on machines of other build."""
+
+from __future__ import annotations
+
+import pytest
+
+from diagnosis.results.assessment import Finding
+from diagnosis.results.result import Epsilon, Hypothesis
+from diagnosis.results.vocabulary import Tier
+from diagnosis.wheels.claims import as_claimed
+from diagnosis.wheels.findings import WheelFindings
+from replay.faults import FaultMode, Side
+
+CLEAR_AT = 0.25
+
+
+def finding(side: Side, mode: FaultMode, p: float, epsilon: float | None = None) -> Finding:
+    rows = (Hypothesis(side.value, mode.value, p), Hypothesis("none", "healthy", 1.0 - p))
+    size = None if epsilon is None else Epsilon(epsilon, epsilon - 0.1, epsilon + 0.1)
+    return Finding(1000, 2000, side, mode, p, rows, size, None, ("So it looks.",), Tier.MODEL)
+
+
+def claimed(f: Finding, *, measured: bool = False) -> Finding:
+    (got,) = as_claimed(WheelFindings([f]), CLEAR_AT, measured=measured).findings
+    assert sum(h.p for h in got.hypotheses) == pytest.approx(1.0)
+    assert got.evidence[0 if got.mode is f.mode else -1] == "So it looks."
+    assert [h.p for h in got.hypotheses] == sorted((h.p for h in got.hypotheses), reverse=True)
+    return got
+
+
+@pytest.mark.parametrize(("p", "most"), [(0.97, 0.97), (0.92, 0.7), (0.81, 0.7)])
+def test_a_stuck_valve_by_command_and_speed_alone_is_less_sure(p: float, most: float) -> None:
+    got = claimed(finding(Side.ACTUATOR, FaultMode.STUCK, p))
+    assert (got.side, got.mode, got.probability) == (Side.ACTUATOR, FaultMode.STUCK, pytest.approx(most))
+
+
+def test_one_that_is_hardly_probable_is_no_row_and_no_side() -> None:
+    got = claimed(finding(Side.ACTUATOR, FaultMode.STUCK, 0.7, 1.0))
+    assert (got.side, got.mode) == (Side.SENSOR_OR_ACTUATOR, FaultMode.OUTSIDE_TABLE)
+    assert got.probability == pytest.approx(0.56)
+    assert got.epsilon is None
+    assert [(h.side, h.mode) for h in got.hypotheses[1:]] == [("none", "healthy"), ("actuator", "stuck")]
+    assert got.hypotheses[1].p == pytest.approx(0.3)  # nothing becomes healthier by it
+
+
+def test_a_measured_position_decides() -> None:
+    f = finding(Side.ACTUATOR, FaultMode.STUCK, 0.7)
+    assert claimed(f, measured=True) is f
+
+
+@pytest.mark.parametrize(("epsilon", "most"), [(0.15, 0.5), (0.3, 0.85)])
+def test_a_small_loss_of_a_sensor_is_not_certain_enough_to_act_on(epsilon: float, most: float) -> None:
+    assert claimed(finding(Side.SENSOR, FaultMode.INEFFICIENT, 0.85, epsilon), measured=True).probability == most
+
+
+def test_a_swing_of_which_no_side_is_known_is_no_row() -> None:
+    either = Side.SENSOR_OR_ACTUATOR.value
+    rows = (
+        Hypothesis(either, "outside_table", 0.4),
+        Hypothesis(either, "noisy", 0.2),
+        Hypothesis("none", "healthy", 0.4),
+    )
+    f = Finding(
+        1000, 2000, Side.SENSOR_OR_ACTUATOR, FaultMode.NOISY, 0.2, rows, None, None, ("So it looks.",), Tier.MODEL
+    )
+    (got,) = as_claimed(WheelFindings([f]), CLEAR_AT, measured=True).findings
+    assert (got.mode, got.probability) == (FaultMode.OUTSIDE_TABLE, pytest.approx(0.4))
+    assert {h.mode: h.p for h in got.hypotheses} == {
+        "outside_table": pytest.approx(0.4),
+        "noisy": 0.2,
+        "healthy": 0.4,
+    }
