@@ -1,9 +1,9 @@
 """What a row that a wheel's model finds is worth on machines of other structure than those that it learned from.
 
 The trees state how often a row was right on simulated machines. On tuning missions of nine others, of which some have motors, load
-sensing or gears instead of its valves, three kinds of claims were right less often than stated: a valve that is stuck, by its
-command and the speed alone, where the sensor was off instead; a small loss of a sensor, where the machine's own ground or
-geometry makes as much; a wheel that swings (see `diagnosis.wheels.own_swings`).
+sensing or gears instead of its valves, these claims were right less often than stated: by command and speed alone, that a valve is
+stuck, where the sensor was off instead, or answers less or roughly, where another wheel failed; a small loss of a sensor, where
+the machine's own ground or geometry makes as much; a wheel that swings (see `diagnosis.wheels.own_swings`).
 """
 
 from __future__ import annotations
@@ -19,7 +19,8 @@ from replay.faults import FaultMode, Side, State
 _STUCK_AT_ALL, _SURELY_STUCK = 0.8, 0.95  # right were 2 of 14 below the one, 10 of 15 up to the other, 7 of 7 above
 _KEPT = 0.2  # of the probability: what a stuck valve keeps below the first
 _MOST_STUCK = 0.7
-_MOST_SMALL = 0.5  # of a loss that would not count, right in 1 of 6 where another part was at fault
+_SURE, _MOST_SMALL = 0.9, 0.5  # of a small loss of a sensor: right were 6 of 6 beyond the one, 8 of 18 below
+_PARTLY, _MOST_PARTLY = 0.75, 0.4  # a valve that answers, but less or roughly, right in 5 of 26 below the first
 _UNTOLD = (
     "The {wheel} does not follow its command, but whether its {valve} is stuck, or its sensor is off by an offset or a share, "
     "command and speed do not tell: log the {valve}'s position."
@@ -27,6 +28,8 @@ _UNTOLD = (
 _LESS_SURE = (
     "By command and speed alone, what seemed a stuck {valve} was something else of the same {wheel} in one of three."
 )
+_ANSWERING = (FaultMode.INEFFICIENT, FaultMode.NOISY)
+_OTHERS = "By command and speed alone, another {wheel} or the ground was the cause in four of five such cases."
 _SMALL = "Machines of other build differ by as much where nothing is wrong with this sensor."
 
 
@@ -52,8 +55,10 @@ def _claimed(f: Finding, clear_at: float, *, measured: bool) -> Finding:
         if f.probability < _STUCK_AT_ALL:
             return _untold(f)
         return f if f.probability >= _SURELY_STUCK else limited(f, _MOST_STUCK, _LESS_SURE)
+    if f.side is Side.ACTUATOR and f.mode in _ANSWERING and not measured and f.probability < _PARTLY:
+        return limited(f, _MOST_PARTLY, _OTHERS)
     small = f.mode is FaultMode.INEFFICIENT and f.epsilon is not None and f.epsilon.value < clear_at
-    return limited(f, _MOST_SMALL, _SMALL) if small and f.side is not Side.ACTUATOR else f
+    return limited(f, _MOST_SMALL, _SMALL) if small and f.side is not Side.ACTUATOR and f.probability < _SURE else f
 
 
 def _untold(f: Finding) -> Finding:

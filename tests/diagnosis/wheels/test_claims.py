@@ -25,6 +25,7 @@ def claimed(f: Finding, *, measured: bool = False) -> Finding:
     assert sum(h.p for h in got.hypotheses) == pytest.approx(1.0)
     assert got.evidence[0 if got.mode is f.mode else -1] == "So it looks."
     assert [h.p for h in got.hypotheses] == sorted((h.p for h in got.hypotheses), reverse=True)
+    assert sum(h.p for h in got.hypotheses if h.mode == "healthy") >= 1.0 - f.probability - 1e-9
     return got
 
 
@@ -48,9 +49,16 @@ def test_a_measured_position_decides() -> None:
     assert claimed(f, measured=True) is f
 
 
-@pytest.mark.parametrize(("epsilon", "most"), [(0.15, 0.5), (0.3, 0.85)])
-def test_a_small_loss_of_a_sensor_is_not_certain_enough_to_act_on(epsilon: float, most: float) -> None:
-    assert claimed(finding(Side.SENSOR, FaultMode.INEFFICIENT, 0.85, epsilon), measured=True).probability == most
+@pytest.mark.parametrize(("p", "epsilon", "most"), [(0.85, 0.15, 0.5), (0.95, 0.15, 0.95), (0.85, 0.3, 0.85)])
+def test_a_small_loss_of_a_sensor_is_not_certain_enough_to_act_on(p: float, epsilon: float, most: float) -> None:
+    assert claimed(finding(Side.SENSOR, FaultMode.INEFFICIENT, p, epsilon), measured=True).probability == most
+
+
+@pytest.mark.parametrize("mode", [FaultMode.INEFFICIENT, FaultMode.NOISY])
+def test_a_valve_that_answers_less_is_as_probably_another_wheel(mode: FaultMode) -> None:
+    assert claimed(finding(Side.ACTUATOR, mode, 0.7, 0.5)).probability == pytest.approx(0.4)
+    assert claimed(finding(Side.ACTUATOR, mode, 0.8, 0.5)).probability == 0.8
+    assert claimed(finding(Side.ACTUATOR, mode, 0.7, 0.5), measured=True).probability == 0.7
 
 
 def test_a_swing_of_which_no_side_is_known_is_no_row() -> None:
