@@ -140,7 +140,7 @@ def _wheels(cells: Cells) -> Iterator[Gauges]:
             continue
         twice, measured = _known(a) and _known(u), _known(x)
         motion = np.where(np.isfinite(cells.reference[:, i]), cells.reference[:, i], v)
-        moving = (np.abs(motion) > resp.MOVING * top / 0.36) & ~cells.told(name)
+        moving = (np.abs(motion) > resp.MOVING * top / resp.USUAL_TOP) & ~cells.told(name)
         ratio = None
         lasting: dict[Deviation, float] = {}
         if _known(used[:, i]) and speed.shape[1] > resp.OTHERS and (tells or not (twice and measured)):

@@ -13,7 +13,8 @@ from diagnosis.clearing.measure import alone, lowest_passed
 
 _LAG_S = 0.15  # of a valve and its drive
 _SETTLED_S, _SETTLED = 0.6, 0.03  # a command that has changed by less than this [m/s] over this time
-MOVING = 0.08  # m/s, for a machine of .36 m/s
+USUAL_TOP = 0.36  # m/s, of the machine for which speeds here are
+MOVING = 0.08  # m/s, for such a machine
 _LEAST_CELLS = 0.5  # of a window
 _LEAST_WINDOWS, _PART = 8, 0.2  # before and after a change, at least
 _ALIKE = 0.5  # of the limit: where half of the wheels deviate by more, openings tell little of speeds
@@ -79,19 +80,20 @@ class Responses(NamedTuple):
     changes: list[float | None]
 
 
-def responses_of(cells: Cells, speed: Array, opening: Array, reference: Array) -> Responses:
+def responses_of(cells: Cells, speed: Array, opening: Array, reference: Array, moving: float = MOVING) -> Responses:
     """Speed per opening beside the other wheels', arrays (cells, wheels).
 
-    Only where a command (without one: the wheel) has settled; forward and reverse have usual ones of their own.
+    Only where a command (without one: the wheel) has settled beyond `moving` [m/s, for a machine of `USUAL_TOP`]; forward and reverse
+    have usual ones of their own.
     """
     frame = cells.frame
-    scale = cells.machine.max_speed / 0.36
+    scale = cells.machine.max_speed / USUAL_TOP
     known = np.isfinite(reference)
     motion = np.where(known, reference, speed)
     back = max(1, round(_SETTLED_S / cells.dt))
     before = np.concatenate([np.full((min(back, len(motion)), motion.shape[1]), np.nan), motion[:-back]])
     with np.errstate(invalid="ignore"):
-        settled = (np.abs(motion) > MOVING * scale) & (np.abs(motion - before) < _SETTLED * scale)
+        settled = (np.abs(motion) > moving * scale) & (np.abs(motion - before) < _SETTLED * scale)
     settled &= np.isfinite(speed) & np.isfinite(opening)
     passed = lowest_passed(opening, cells.dt, _LAG_S)
     moved, opened = (frame.sums(np.where(settled, np.abs(x), 0.0)) for x in (speed, passed))
@@ -214,7 +216,9 @@ def _explained(cells: Cells) -> float:
     used = lowest_passed(np.where(np.isfinite(opening), opening, command), cells.dt, _LAG_S)
     explained = []
     for v, u in zip(speed.T, used.T, strict=True):
-        moves = np.isfinite(v) & np.isfinite(u) & (np.abs(np.nan_to_num(v)) > MOVING * cells.machine.max_speed / 0.36)
+        moves = (
+            np.isfinite(v) & np.isfinite(u) & (np.abs(np.nan_to_num(v)) > MOVING * cells.machine.max_speed / USUAL_TOP)
+        )
         v, u = v[moves], u[moves]
         power = float(u @ u) * float(v @ v)
         explained.append(float(u @ v) ** 2 / power if power > 0.0 else 1.0)

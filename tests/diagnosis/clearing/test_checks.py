@@ -259,3 +259,21 @@ def test_a_creeping_wheel_is_held_to_what_the_others_do() -> None:
     assert most_creeping([0.33, 0.05, 0.32, 0.06], 0, 0.25) == 0.25
     assert most_creeping([0.44, 0.31, 0.48, 0.3], 2, 0.25) == pytest.approx(1.5 * 0.31)
     assert most_creeping([0.3, np.nan, np.nan, np.nan], 0, 0.25) == 0.25
+
+
+@pytest.mark.parametrize(("left", "passed"), [(1.0, True), (0.6, False)])
+def test_speed_per_opening_is_asked_of_a_wheel_that_creeps(left: float, passed: bool) -> None:
+    mission = simulated()
+    seconds = (mission.stamps - mission.stamps[0]) * 1e-9
+    creeps = (seconds > 5.0) & (seconds < 12.0)
+    slow = {"v_ref": 0.04, "v": 0.04, "u": 0.12, "u_applied": 0.12}
+    columns = {
+        name: np.where(creeps, slow[leaf], x)
+        if name.startswith("wheel.") and (leaf := name.split(".")[2]) in slow
+        else x
+        for name, x in mission.columns.items()
+    }
+    columns["wheel.FR.u"] = np.where(creeps, slow["u"] / left, mission.columns["wheel.FR.u"])
+    checks = checks_by_part(replace(mission, columns=columns), base=True)
+    assert checks["FR", "sensor_or_actuator", Check.RESPONSE].passed is passed
+    assert checks["RR", "sensor_or_actuator", Check.RESPONSE].passed
