@@ -109,23 +109,28 @@ def _since_repair(m: Machine, repaired_ns: int) -> str:
     """What is known of a machine since its repairs, where no mission after the last one was judged as a whole."""
     day = utc(repaired_ns)[:10]
     repaired = [f for f in m.faults if f.status == "repaired" and f.repaired_ns is not None]
-    clean = [f for f in repaired if f.since]
-    if not clean:
+    told = [(f, _judged_since(m, f)) for f in repaired]
+    waiting = [f for f, seen in told if not seen]
+    if len(waiting) == len(repaired):
         return f"{Verdict.NOT_ASSESSED.short} since the repair on {day}"
-    shown = "; ".join(f"{_parts(m, faults)} clean in {seen}" for seen, faults in _by_repair(clean).items())
-    waiting = [f for f in repaired if not f.since]
+    days: dict[str, list[tuple[FleetFault, int]]] = {}
+    for f, seen in told:
+        if seen:
+            days.setdefault(utc(f.repaired_ns or 0)[:10], []).append((f, seen))
+    shown = "; ".join(
+        f"{_parts(m, [f for f, _ in fs])} clean in {count(min(n for _, n in fs), 'mission')} since the repair on {d}"
+        for d, fs in days.items()
+    )
     if not waiting:
         return f"{shown}, other parts not judged"
     since = max(f.repaired_ns or 0 for f in waiting)
     return f"{shown}; {_parts(m, waiting)} not judged since the repair on {utc(since)[:10]}"
 
 
-def _by_repair(faults: Sequence[FleetFault]) -> dict[str, list[FleetFault]]:
-    """Faults whose parts were repaired on one day, by the missions since: ``4 missions since the repair on 2026-11-10``."""
-    days: dict[str, list[FleetFault]] = {}
-    for f in faults:
-        days.setdefault(utc(f.repaired_ns or 0)[:10], []).append(f)
-    return {f"{count(min(f.since for f in fs), 'mission')} since the repair on {d}": fs for d, fs in days.items()}
+def _judged_since(m: Machine, f: FleetFault) -> int:
+    """Missions that began after the repair of a part and assessed it."""
+    after = [r for r in m.dated if (r.result.start_ns or 0) >= (f.repaired_ns or 0)]
+    return sum(r.assessed(f.component, f.side, m.limits) for r in after)
 
 
 def _parts(m: Machine, faults: Sequence[FleetFault]) -> str:
