@@ -23,6 +23,7 @@ _EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 _WITHOUT_INDEX = ("csv", "twincat")
 _END_NS = (1 << 63) - 10**10  # where 64 bits end, no clock stands
 _LONG_VALUE = 60
+_UNSHOWN = ("integrity", "rosbag2.serialized_metadata")  # told elsewhere; the recorder's own summary of what is listed
 _SHOWN_METADATA = 12
 _SHOWN_ODD, _SHOWN_NAMES = 8, 6
 _WIDE, _WIDE_LIST = 100, 110
@@ -207,7 +208,7 @@ def _stored(report: InspectReport) -> list[str]:
         f"attachment {a['name']}, {a['media_type'] or 'of no type'}, {_bytes(float(str(a['size'])))}"
         for a in report.attachments
     ]
-    shown = {k: v for k, v in report.metadata.items() if k != "integrity" and v}
+    shown = {k: v for k, v in report.metadata.items() if k not in _UNSHOWN and v}
     for key, value in list(shown.items())[:_SHOWN_METADATA]:
         line = " ".join(str(value).split())
         lines.append(f"{key}: {line[:_LONG_VALUE]}{'…' if len(line) > _LONG_VALUE else ''}")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import PurePath
 from typing import TypedDict
 
@@ -106,7 +106,7 @@ def signals_document(files: Sequence[MissionFile], signals: Signals, machine: Ma
         ],
         "signals": [_signal(s, words) for s in signals.items.values()],
         "missing": [
-            {"name": name, "reason": reason, "cost": cost_of_missing(name, words)}
+            {"name": name, "reason": reason, "cost": cost_of_missing(name, words, signals.items, machine.wheels)}
             for name, reason in signals.missing.items()
             if applies(name, words)
         ],
@@ -167,7 +167,7 @@ def signals_parts(signals: Signals, machine: Machine, given: bool = True) -> lis
     if signals.questions:
         parts += [section("To be answered before anything is judged"), bullets(signals.questions, "red")]
     if signals.missing:
-        lines = [(name, _cost(cost, reason)) for name, cost, reason in _missing_groups(signals.missing, machine, words)]
+        lines = [(name, _cost(cost, reason)) for name, cost, reason in _missing_groups(signals, machine, words)]
         parts += [section("Missing signals and their effect"), table(("signal", "effect"), lines)]
     told = forecast(signals.items, machine, words)
     if signals.items and told:
@@ -224,16 +224,16 @@ def _is_doubt(note: str) -> bool:
     return " is taken from " not in note or "would fit as well" in note or "not stated" in note
 
 
-def _missing_groups(missing: Mapping[str, str], machine: Machine, words: MachineWords) -> list[tuple[str, str, str]]:
+def _missing_groups(signals: Signals, machine: Machine, words: MachineWords) -> list[tuple[str, str, str]]:
     """Missing signals of equal cost, and of a reason that is equal but for names of channels, in one line each: names, cost, reason."""
     groups: dict[tuple[str, str, str], dict[str, list[str]]] = {}
     first: dict[tuple[str, str, str], str] = {}
-    for name, reason in missing.items():
+    for name, reason in signals.missing.items():
         if not applies(name, words):
             continue
         group, _, rest = name.partition(".")
         part, _, leaf = rest.rpartition(".")
-        key = group, cost_of_missing(name, words), _CHANNEL.sub("…", reason)
+        key = group, cost_of_missing(name, words, signals.items, machine.wheels), _CHANNEL.sub("…", reason)
         leaves = groups.setdefault(key, {})
         leaves.setdefault(leaf, []).append(part)
         if first.setdefault(key, reason) != reason and not first[key].endswith(_LIKEWISE):

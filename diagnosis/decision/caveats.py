@@ -106,13 +106,13 @@ def by_model(assessments: Mapping[Part, Assessment], shown: Sequence[Detectable]
         said += [f"of a {name} {_from_size([r.size for r in rows])}"] if rows else []
     sizes = f"A loss that lasts ten seconds shows in 95 of 100 places: {join_words(said)}. " if said else ""
     if said and all(x.endswith(_NEVER) for x in said):
-        sizes = "No loss that lasts ten seconds, whatever its size, shows in 95 of 100 places. "
+        sizes = "Of losses that last ten seconds none, however large, shows in 95 of 100 places. "
     return (
         words.fill(
             "Sensors and {valve}s without a second measurement were judged by a {wheel} model identified from this mission. "
         )
         + f"{sizes}A loss that lasts the whole mission on every {words.part} does not show. A second measurement would show more; "
-        "a machine file with [plant] shows the last."
+        "a machine file with [plant], as `mfhca fit` writes it, shows the last."
     )
 
 

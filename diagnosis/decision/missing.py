@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Container, Sequence
+
 from diagnosis.results.machine_words import MachineWords
 from replay.machine.signal_table import signal_of
 
@@ -35,6 +37,8 @@ _COSTS = {
     "odom.yaw": "no effect on the verdict: it is only shown beside the evidence",
 }
 
+_OF_WHEELS = "little: the commanded speed of every {wheel} is recorded"
+
 
 def applies(name: str, words: MachineWords) -> bool:
     """Whether a machine of this kind can have a canonical signal at all: no motor has pressures or a spool, no valve an effort, no arm an odometry."""
@@ -48,6 +52,25 @@ def applies(name: str, words: MachineWords) -> bool:
     return words.part == "wheel" or group in ("wheel", "steer")
 
 
-def cost_of_missing(name: str, words: MachineWords) -> str:
-    """What the diagnosis loses without a canonical signal; raises `ConfigError` where the name is not canonical."""
+def cost_of_missing(name: str, words: MachineWords, items: Container[str] = (), wheels: Sequence[str] = ()) -> str:
+    """What the diagnosis loses without a canonical signal.
+
+    Parameters
+    ----------
+    name : str
+        The signal.
+    words : MachineWords
+        How parts of the machine are called.
+    items : Container[str]
+        Signals that were found.
+    wheels : Sequence[str]
+        Wheels of the machine.
+
+    Raises
+    ------
+    ConfigError
+        Where the name is not canonical.
+    """
+    if name in ("cmd.v", "cmd.omega") and wheels and all(f"wheel.{w}.v_ref" in items for w in wheels):
+        return words.fill(_OF_WHEELS)
     return words.fill(_COSTS[signal_of(name).kind])

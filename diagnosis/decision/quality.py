@@ -98,7 +98,7 @@ def _gaps(signal: Signal, period: int) -> tuple[int, float]:
 def missing_rows(signals: Signals, machine: Machine, words: MachineWords) -> list[MissingRow]:
     """Signals that would sharpen the diagnosis and are not in the log, with what that costs."""
     names = (name for name in machine.canonical_signals() if name not in signals.items and applies(name, words))
-    return [{"name": name, "cost": cost_of_missing(name, words)} for name in names]
+    return [{"name": name, "cost": cost_of_missing(name, words, signals.items, machine.wheels)} for name in names]
 
 
 def checks(

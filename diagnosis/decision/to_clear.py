@@ -88,7 +88,9 @@ def to_clear(
         out.append(
             ToClear(
                 f"{said.rstrip('.')}.",
-                "diagnose the files of one mission together, and others apart"
+                "do so, or record a moving signal in both files"
+                if left_out and "its clock could not be compared" in said
+                else "diagnose the files of one mission together, and others apart"
                 if left_out
                 else "copy the log from the machine once more, or record another mission",
             )

@@ -59,8 +59,10 @@ def _scaled(line: Timeline, machine: Machine, mean: NDArray[np.float64], step: i
         body = line.signals.get(name)
         if body is None:
             continue
-        own = np.abs(mean) if name == "gnss.speed" else mean
-        factor = gain_of(own, np.asarray(body[::step], dtype=np.float64), line.dt * step)
+        own, there = mean, np.asarray(body[::step], dtype=np.float64)
+        if name == "gnss.speed":  # of satellites it has no sign, of a radar one
+            own, there = np.abs(own), np.abs(there)
+        factor = gain_of(own, there, line.dt * step)
         if factor is None or factor <= 0.0:
             continue
         if 1 / most <= factor <= most:

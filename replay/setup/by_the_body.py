@@ -23,7 +23,7 @@ _LEAST_S = 10.0  # of motion
 _MOVES = 0.2  # of the largest speed
 _TRIMMED = 0.2  # of the moments are left out that fit worst, twice: slip, faults, jumps of a position
 _SOUND = 0.95  # share of the rest that the fit must explain
-_SPEEDS = (("odom.v", "odometry"), ("gnss.speed", "GNSS"))
+_SPEEDS = (("odom.v", "odometry"), ("gnss.speed", "the speed over ground"))
 
 
 class Measured(NamedTuple):
@@ -56,9 +56,10 @@ def radius_by_body(
             continue
         at = _moments([*(found.items[n] for n in names), body])
         mean = np.mean([_forward(found.items[n], origins, at) for n in names], axis=0)
-        if name == "gnss.speed":
-            mean = np.abs(mean)
-        gain = gain_of(mean, held(body, at))
+        there = held(body, at)
+        if name == "gnss.speed":  # of satellites it has no sign, of a radar one
+            mean, there = np.abs(mean), np.abs(there)
+        gain = gain_of(mean, there)
         if gain is not None and gain > 0.0:
             return Measured(gain, by)
     return None

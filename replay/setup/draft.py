@@ -8,6 +8,7 @@ from dataclasses import replace
 from pathlib import Path, PurePath
 
 from replay.clocks.align import align_clocks
+from replay.clocks.source_clock import SourceClock
 from replay.errors import LogError
 from replay.log.raw_log import Channel, RawLog
 from replay.log.source_options import SignalSource
@@ -20,6 +21,7 @@ from replay.setup.given import given_signals, odometry, table_sources
 from replay.setup.lengths import largest_angle, limits_for, wheel_places, wheel_radius, with_speeds, without_size
 from replay.setup.motion import WheelMotion, backwards, wheel_motion
 from replay.setup.numbered_wheels import ask_for_numbers, ordered_by_turns
+from replay.setup.one_clock import lags
 from replay.setup.preset import Preset
 from replay.setup.read import options_of
 from replay.setup.robot_description import RobotDescription, parse_description
@@ -95,9 +97,12 @@ def draft_machine(logs: Sequence[RawLog], preset: Preset | None = None) -> Draft
     given = given_signals(structure, {n: c for n, c in channels.items() if n not in empty}, logs)
     for array in dict.fromkeys(empty.values()):
         draft.say("signals", f"Not used: {unfilled_note(array)}.")
-    sources = table_sources(logs, draft)
-    raw = replace(structure.machine(1.0), signals=given, sources=sources)
+    raw = replace(structure.machine(1.0), signals=given)
     found = map_signals(logs, raw)
+    left = [w for w, p in (structure.places or {}).items() if p.y > 0]
+    raw = replace(
+        raw, sources=table_sources(logs, draft, lags(found, structure.wheels, left, [log.source for log in logs]))
+    )
     numbered = by_number(found.items, raw)
     turned = ordered_by_turns(structure, _motions(found, structure.wheels)) if numbered else None
     if turned is not None:
@@ -113,12 +118,15 @@ def draft_machine(logs: Sequence[RawLog], preset: Preset | None = None) -> Draft
         if units:
             raw = replace(raw, signals={**raw.signals, **units})
             found = map_signals(logs, raw)
+    every = found
     if len(logs) > 1:  # lengths and directions are of signals at one time
-        logs = align_clocks(logs, raw, [options_of(Path(log.source), raw) for log in logs])[0]
-        found = map_signals(logs, raw)
+        logs, clocks = align_clocks(logs, raw, [options_of(Path(log.source), raw) for log in logs])
+        every = map_signals(logs, raw)
+        found = _of_one_clock(every, clocks)
     motions = _motions(found, structure.wheels)
     origins = _in_one_direction(draft, structure, found, motions)
-    _ask_for_what_is_missing(draft, found)
+    origins = {name: signal.origin for name, signal in every.items.items()} | origins
+    _ask_for_what_is_missing(draft, every)
     motions = in_turn_with_commands(draft, structure, found, motions, origins)
     straight = [w for w, p in (structure.places or {}).items() if p.axle == "fixed"]
     radius = wheel_radius(
@@ -130,7 +138,7 @@ def draft_machine(logs: Sequence[RawLog], preset: Preset | None = None) -> Draft
         origins = {n: without_size(o, radius) if n.startswith("wheel.") else o for n, o in origins.items()}
     origins = {n: origins[n] for n in raw.canonical_signals() if n in origins}
     machine = replace(
-        raw, name=draft.machine.name, geometry=geometry, signals=origins, control=_control(found),
+        raw, name=draft.machine.name, geometry=geometry, signals=origins, control=_control(every),
         max_steer=largest_angle(draft, structure, found),
     )  # fmt: skip
     draft.machine = with_speeds(draft, machine, logs)
@@ -197,6 +205,12 @@ def _name(description: RobotDescription | None, logs: Sequence[RawLog]) -> str:
     if description is not None and description.name:
         return description.name
     return f"machine of {PurePath(logs[0].source).name}"
+
+
+def _of_one_clock(found: Signals, clocks: Sequence[SourceClock]) -> Signals:
+    """Signals without those of files whose clock is not known against the first one's: compared, they would tell of a delay."""
+    apart = {c.source for c in clocks if c.reason}
+    return replace(found, items={n: s for n, s in found.items.items() if s.source not in apart})
 
 
 def _motions(found: Signals, wheels: Sequence[str]) -> Mapping[str, WheelMotion]:

@@ -12,6 +12,7 @@ from replay.log.source_options import SignalSource, SourceOptions
 from replay.log.time_zone import NO_ZONE
 from replay.machine.geometry import own_axle
 from replay.setup.draft_notes import Draft
+from replay.setup.one_clock import Lag
 from replay.setup.structure import ONE, Structure
 
 _DATED = 10**18  # ns; stamps before are of a clock without a date
@@ -88,42 +89,67 @@ def _command(channels: Mapping[str, Channel]) -> SignalSource | None:
     return None
 
 
-def table_sources(logs: Sequence[RawLog], draft: Draft) -> dict[str, SourceOptions]:
-    """Several tables with dated stamps are taken to come from one recorder, if they are of one format and begin and end together.
+def table_sources(
+    logs: Sequence[RawLog], draft: Draft, lags: Mapping[str, Lag] | None = None
+) -> dict[str, SourceOptions]:
+    """Several tables with dated stamps are taken to come from one recorder, if they are of one format and begin and end together, or their signals fit.
 
     The zone of dates that state none is asked for.
+
+    Parameters
+    ----------
+    logs : Sequence[RawLog]
+        Files of one mission.
+    draft : Draft
+        Gets the questions.
+    lags : Mapping[str, Lag] or None
+        Of tables behind the first, where their signals tell.
     """
+    lags = lags or {}
     tables = [log for log in logs if all(not c.topic for c in log.channels.values())]
     options = SourceOptions()
+    if any(NO_ZONE in note for log in tables for note in log.summary.notes):
+        options = replace(options, time_zone="UTC")
+    pattern = f"*{PurePath(tables[0].source).suffix}" if tables else ""
     if len(tables) > 1 and all(t.summary.start_ns >= _DATED for t in tables):
-        apart = _apart([t.summary for t in tables])
+        apart = _apart([t.summary for t in tables], lags)
         if apart:
+            add = (
+                'add clock = "as recorded" to'
+                if options.time_zone
+                else f'write "{pattern}" = {{ clock = "as recorded" }} into'
+            )
             draft.ask(
                 "sources",
                 f"were all tables stamped by one computer? It is not taken so, for {apart}: clocks are estimated from what both "
-                'recorded. If it was one, add clock = "as recorded" here.',
+                f"recorded, and a table that shares no moving signal with the first is left out. If it was one, {add} [sources].",
             )
         else:
+            why = ", for their signals fit" if all(t.source in lags for t in tables[1:]) else ""
             draft.ask(
                 "sources",
-                "were all tables stamped by one computer? It is taken so; else remove clock, and it is estimated.",
+                f"were all tables stamped by one computer? It is taken so{why}; else remove clock, and it is estimated.",
             )
             options = replace(options, clock="as recorded")
-    if any(NO_ZONE in note for log in tables for note in log.summary.notes):
+    if options.time_zone:
         draft.ask(
             "sources", "in which time zone are the dates? They state none; UTC is written, Europe/Berlin is another."
         )
-        options = replace(options, time_zone="UTC")
-    return {} if options == SourceOptions() else {f"*{PurePath(tables[0].source).suffix}": options}
+    return {} if options == SourceOptions() else {pattern: options}
 
 
-def _apart(tables: Sequence[LogSummary]) -> str:
+def _apart(tables: Sequence[LogSummary], lags: Mapping[str, Lag]) -> str:
     """Why tables are not taken to be of one recorder; empty where they are."""
     formats = sorted({t.format for t in tables})
     if len(formats) > 1:
         return f"they are of different formats ({', '.join(formats)})"
+    for source, lag in lags.items():
+        if lag.apart:
+            side = "later" if lag.seconds > 0 else "earlier"
+            return f"{lag.by} in {PurePath(source).name} is about {abs(lag.seconds):.1f} s {side} than what it goes with in {PurePath(lag.other).name}"
     far = max(t.start_ns for t in tables) - min(t.start_ns for t in tables)
     late = max(t.stop_ns for t in tables) - min(t.stop_ns for t in tables)
-    if min(far, late) > _TOGETHER:
+    fit = all(t.source in lags and lags[t.source].fits for t in tables[1:])
+    if max(far, late) > _TOGETHER and not fit:
         return f"they begin {far / 1e9:.0f} s and end {late / 1e9:.0f} s apart"
     return ""

@@ -58,10 +58,14 @@ def wheel_radius(
             )
         return structure.radius
     if by_body is not None and turning and _RADII[0] <= by_body.length <= _RADII[1]:
+        right = (
+            "odometry is as right as the radius that its own software has"
+            if by_body.by == "odometry"
+            else "it tells nothing if it is made of the wheels"
+        )
         draft.ask(
             "geometry",
-            f"is the wheel radius {by_body.length:.3g} m? By {by_body.by} beside the turns of the wheels; odometry is as right as the radius that "
-            "its own software has. Measure the wheel.",
+            f"is the wheel radius {by_body.length:.3g} m? By {by_body.by} beside the turns of the wheels; {right}. Measure the wheel.",
         )
         return float(_round(by_body.length))
     # a ROS joint that is called a wheel turns as the wheel; symbols of a PLC called so often hold its motor's turns

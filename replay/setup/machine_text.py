@@ -49,7 +49,7 @@ def machine_text(draft: Draft, logs: str, rows: Sequence[ChannelRow] = ()) -> st
         "[control]",
         *_control(machine),
     ]
-    if machine.sources:
+    if machine.sources or draft.notes.get("sources"):
         lines += ["", "[sources]", *_said(draft, "sources"), *(source_line(k, v) for k, v in machine.sources.items())]
     lines += ["", "[signals]", *_said(draft, "signals")]
     for name, origin in machine.signals.items():

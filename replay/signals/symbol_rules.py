@@ -227,6 +227,8 @@ def _by_word(channel: Channel, text: str, last: Sequence[str], unit: str) -> Ite
     if re.search(r"wheel|steer|valve|axle", text) or any(is_place(w) and w != "fwd" for w in last):
         return
     signal = next((signal for signal, pattern in _MACHINE_PATTERNS if re.search(pattern, text)), None)
+    if signal == "gnss.speed" and (ASKING & {*last} or any(_NO_SIGNAL.search(w) for w in text.split("_"))):
+        return
     asks, named = role(last), True
     turns = "yaw_rate" in last or ({*last} - MEASURED == {"yaw", "rate"} and not re.search(r"odom|est", text))
     if turns and asks != "both":

@@ -106,14 +106,35 @@ def standing(m: Machine) -> str:
 
 
 def _since_repair(m: Machine, repaired_ns: int) -> str:
-    """What is known of a machine since its last repair, where no mission after it was judged as a whole."""
+    """What is known of a machine since its repairs, where no mission after the last one was judged as a whole."""
     day = utc(repaired_ns)[:10]
-    clean = [f for f in m.faults if f.status == "repaired" and f.since]
-    if not clean:
+    repaired = [f for f in m.faults if f.status == "repaired" and f.repaired_ns is not None]
+    told = [(f, _judged_since(m, f)) for f in repaired]
+    waiting = [f for f, seen in told if not seen]
+    if len(waiting) == len(repaired):
         return f"{Verdict.NOT_ASSESSED.short} since the repair on {day}"
-    parts = dict.fromkeys(m.limits.words.part_words(f.kind, f.component, f.side) for f in clean)
-    seen = count(min(f.since for f in clean), "mission")
-    return f"{join_words(list(parts))} clean in {seen} since the repair on {day}, other parts not judged"
+    days: dict[str, list[tuple[FleetFault, int]]] = {}
+    for f, seen in told:
+        if seen:
+            days.setdefault(utc(f.repaired_ns or 0)[:10], []).append((f, seen))
+    shown = "; ".join(
+        f"{_parts(m, [f for f, _ in fs])} clean in {count(min(n for _, n in fs), 'mission')} since the repair on {d}"
+        for d, fs in days.items()
+    )
+    if not waiting:
+        return f"{shown}, other parts not judged"
+    since = max(f.repaired_ns or 0 for f in waiting)
+    return f"{shown}; {_parts(m, waiting)} not judged since the repair on {utc(since)[:10]}"
+
+
+def _judged_since(m: Machine, f: FleetFault) -> int:
+    """Missions that began after the repair of a part and assessed it."""
+    after = [r for r in m.dated if (r.result.start_ns or 0) >= (f.repaired_ns or 0)]
+    return sum(r.assessed(f.component, f.side, m.limits) for r in after)
+
+
+def _parts(m: Machine, faults: Sequence[FleetFault]) -> str:
+    return join_words(list(dict.fromkeys(m.limits.words.part_words(f.kind, f.component, f.side) for f in faults)))
 
 
 def _is_open(m: Machine) -> bool:
@@ -276,7 +297,7 @@ def _named(machines: Sequence[Machine]) -> str:
     names = [m.label for m in machines[:_NAMED]]
     if machines[0].verdict is Verdict.NOT_ASSESSED:
         names = [
-            m.label + (f" ({words.partition(' ')[2]})" if (words := standing(m)) != Verdict.NOT_ASSESSED.short else "")
+            m.label + (f" ({words})" if (words := standing(m).removeprefix(Verdict.NOT_ASSESSED.short).strip()) else "")
             for m in machines[:_NAMED]
         ]
         names = [t.replace("(assessed since", "(since").replace("(assessed: ", "(") for t in names]

@@ -245,3 +245,11 @@ def test_stamps_where_64_bits_end_are_no_date(capsys: pytest.CaptureFixture[str]
     out = capsys.readouterr().out
     assert "no usable stamps" in out
     assert "2262" not in out
+
+
+def test_the_summary_that_a_recorder_leaves_is_not_printed_raw(capsys: pytest.CaptureFixture[str]) -> None:
+    kept = {"ros_distro": "jazzy", "rosbag2.serialized_metadata": "version: 9\nstorage_identifier: mcap"}
+    Terminal().show(*inspect_parts(InspectReport("a.mcap", "mcap", 0, 10**9, (), (), metadata=kept)))
+    out = capsys.readouterr().out
+    assert "ros_distro: jazzy" in out
+    assert "serialized_metadata" not in out

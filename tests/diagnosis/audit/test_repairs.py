@@ -160,6 +160,33 @@ def test_nor_is_one_whose_part_no_later_mission_assessed(tmp_path: Path, days: s
     assert standing(tmp_path)[2] == "repaired"
 
 
+def test_each_repair_is_told_with_its_own_date(tmp_path: Path) -> None:
+    """The part that was repaired early was clean since; the one that was repaired after the last mission waits."""
+    valve = Fault("RL", "actuator", "stuck", "high")
+    days = [([SILENT], "stop"), ([], "ready"), ([], "ready"), ([valve], "stop")]
+    stored(tmp_path, [Sample(f"m{k}", day=float(k), verdict=v, faults=f) for k, (f, v) in enumerate(days)])
+    repair(tmp_path, "HX-1 FR sensor", 0.5)
+    repair(tmp_path, "HX-1 RL actuator", 3.5)
+    early, late = utc(at(0.5))[:10], utc(at(3.5))[:10]
+    repair(tmp_path, "HX-1 FR actuator", 3.5)  # of which nothing was found: no part of the list
+    words = (
+        f"FR speed sensor clean in 3 missions since the repair on {early}; "
+        f"RL drive valve not judged since the repair on {late}"
+    )
+    assert standing(tmp_path)[:2] == ("not_assessed", words)
+    assert f"HX-1 ({words})" in " ".join(document(tmp_path)["verdict"]["text"])
+
+
+def test_missions_before_a_repair_say_nothing_of_it(tmp_path: Path) -> None:
+    """Clean missions between the fault and its repair are not told as clean since the repair."""
+    valve = Fault("RL", "actuator", "stuck", "high")
+    days = [([SILENT], "stop"), ([], "ready"), ([valve], "stop")]
+    stored(tmp_path, [Sample(f"m{k}", day=float(k), verdict=v, faults=f) for k, (f, v) in enumerate(days)])
+    repair(tmp_path, "HX-1 FR sensor", 2.5)
+    repair(tmp_path, "HX-1 RL actuator", 2.5)
+    assert standing(tmp_path)[:2] == ("not_assessed", f"Not assessed since the repair on {utc(at(2.5))[:10]}")
+
+
 def test_a_fault_that_comes_back_is_open_again(tmp_path: Path) -> None:
     stored(tmp_path, course("..x..x"))
     repair(tmp_path, "HX-1 FR sensor", 3.5)

@@ -26,3 +26,9 @@ def test_sensor_and_actuator_differ() -> None:
     assert "drive valve is judged by its effort alone" in cost_of_missing("wheel.RL.u", HYDRAULIC)
     assert "rests on a model" in cost_of_missing("wheel.RL.v_true", HYDRAULIC)
     assert cost_of_missing("steer.front.u", HYDRAULIC) != cost_of_missing("wheel.FR.u", HYDRAULIC)
+
+
+def test_a_command_of_the_body_costs_little_where_every_wheel_has_its_own() -> None:
+    wheels = ("FR", "FL")
+    assert "little" in cost_of_missing("cmd.v", HYDRAULIC, {"wheel.FR.v_ref", "wheel.FL.v_ref"}, wheels)
+    assert "no wheel has a command" in cost_of_missing("cmd.v", HYDRAULIC, {"wheel.FR.v_ref"}, wheels)

@@ -41,7 +41,16 @@ def robot(rng: np.random.Generator, speed: str = "odom.v") -> Signals:
     return Signals({s.name: s for s in items}, {}, ())
 
 
-@pytest.mark.parametrize(("speed", "by"), [("odom.v", "odometry"), ("gnss.speed", "GNSS")])
+def test_a_speed_over_ground_may_have_a_sign() -> None:
+    found = robot(np.random.default_rng(3))
+    named = {"gnss.speed" if n == "odom.v" else n: s for n, s in found.items.items()}
+    radar = Signals(named, {}, ())
+    radius = radius_by_body(radar, ("R", "L"), ("R", "L"), {})
+    assert radius is not None
+    assert radius.length == pytest.approx(RADIUS, rel=0.02)
+
+
+@pytest.mark.parametrize(("speed", "by"), [("odom.v", "odometry"), ("gnss.speed", "the speed over ground")])
 def test_radius_and_track_are_measured(speed: str, by: str) -> None:
     found = robot(np.random.default_rng(3), speed)
     radius = radius_by_body(found, ("R", "L"), ("R", "L"), {})

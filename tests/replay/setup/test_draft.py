@@ -307,19 +307,46 @@ def test_currents_of_valves_in_percent_keep_their_unit(tmp_path: Path) -> None:
     assert sum("100 %" in q for q in draft.questions) == 1
 
 
-@pytest.mark.parametrize(("late", "clock"), [(0, "as recorded"), (42, "estimate")])
-def test_tables_that_begin_and_end_apart_are_not_taken_to_share_a_clock(
-    tmp_path: Path, late: float, clock: str
+@pytest.mark.parametrize(
+    ("late", "rows", "clock"),
+    [(0, 600, "as recorded"), (42, 600, "estimate"), (0, 400, "estimate"), (-10, 400, "estimate")],
+    ids=["together", "apart", "begin together", "end together"],
+)
+def test_tables_that_begin_or_end_apart_are_not_taken_to_share_a_clock(
+    tmp_path: Path, late: float, rows: int, clock: str
 ) -> None:
     v = np.repeat(np.random.default_rng(1).uniform(-0.5, 0.5, 15), 40)
     t = pd.Timestamp("2026-10-14T06:00:00Z") + pd.to_timedelta(np.arange(600) * 0.05, "s")
     wheels = {f"{w} {what}": v for w in ("FR", "FL") for what in ("speed setpoint [m/s]", "speed [m/s]")}
     pd.DataFrame({"time": t, **wheels}).to_csv(tmp_path / "a.csv", index=False)
     later = t - pd.Timedelta(seconds=late)
-    pd.DataFrame({"time": later, "yaw_rate [rad/s]": 0.1 * v}).to_csv(tmp_path / "b.csv", index=False)
+    table = pd.DataFrame({"time": later, "yaw_rate [rad/s]": 0.1 * v})
+    table.iloc[:rows].to_csv(tmp_path / "b.csv", index=False)
     draft = draft_machine(read_everything([tmp_path / "a.csv", tmp_path / "b.csv"]))
     assert [o.clock for o in draft.machine.sources.values() or [SourceOptions()]] == [clock]
     assert any("stamped by one computer" in q for q in draft.questions)
+
+
+@pytest.mark.parametrize(("late", "shared"), [(0, True), (3, False)])
+def test_tables_that_only_begin_together_share_a_clock_where_their_signals_fit(
+    tmp_path: Path, late: float, shared: bool
+) -> None:
+    """A delay is no length: of a table whose clock is not known nothing is measured, and the file says so."""
+    rng = np.random.default_rng(3)
+    v, w = (np.convolve(np.repeat(rng.uniform(-1, 1, 40), 75), np.ones(25) / 25, "same") for _ in range(2))
+    t = pd.Timestamp("2026-10-14T06:00:00Z") + pd.to_timedelta(np.arange(3000) * 0.04, "s")
+    sides = {"FL": v - 0.4 * w, "FR": v + 0.4 * w, "RL": v - 0.4 * w, "RR": v + 0.4 * w}
+    wheels = {f"{n} {what}": x for n, x in sides.items() for what in ("speed setpoint [m/s]", "speed [m/s]")}
+    pd.DataFrame({"time": t, **wheels}).to_csv(tmp_path / "a.csv", index=False)
+    table = pd.DataFrame({"time": t + pd.Timedelta(seconds=late), "yaw_rate [rad/s]": w})
+    table.iloc[:2000].to_csv(tmp_path / "b.csv", index=False)
+    draft = draft_machine(read_everything([tmp_path / "a.csv", tmp_path / "b.csv"]))
+    assert ("as recorded" in [o.clock for o in draft.machine.sources.values()]) == shared
+    (asked,) = [q for q in draft.questions if "stamped by one computer" in q]
+    assert ("their signals fit" if shared else "imu.yaw_rate in b.csv is about 3.0 s later") in asked
+    assert any("By the yaw rate" in q for q in draft.questions) == shared
+    assert "# QUESTION: were all tables stamped" in machine_text(draft, "a.csv, b.csv", [])
+    assert "imu.yaw_rate" in draft.machine.signals
 
 
 def test_directions_and_lengths_are_of_signals_at_one_time(tmp_path: Path) -> None:
