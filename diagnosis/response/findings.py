@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from diagnosis.response.at_once import FADES_S, STARTS_S, STOPS_S, Jump, sensor_by_jumps, to_zero
 from diagnosis.response.channel import Samples
 from diagnosis.response.jumps import Jumps, onset_of
 from diagnosis.response.models import Blocks
@@ -20,13 +21,14 @@ Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 SENSOR_SHARE = 0.96  # that what a channel alone shows is the sensor's
-_ONE_JUMP, _TWO_JUMPS = 0.92, 0.97
+_KIN, _OWN = 0.92, 0.97  # another view of this wheel contradicts a share of its speed; its own position does
 _EITHER = 0.6  # that it is the sensor's, up to which its side is left open
 _BY_BODY = 0.08  # that it is the sensor's although the body turns as the reading says
 _LEAST_PULLS, _AS_USUAL = 8, (0.6, 1.5)  # blocks with an effort, and its size by the usual one
 _CHANGES = 0.1  # of the readings, as a dead sensor's do not
 _MOVING = 0.2  # of the usual speed
-_SHARP_S = 0.012  # between readings: a wheel that jams, or comes free, takes longer
+_AT_ONCE_P = 0.9  # that it is the sensor's, from which on a jump is said to be none of a drive's
+_LEVEL_S = 0.5  # before a fall, or after a rise, in which a speed has its level
 _WHOLE = 0.75  # of the speed: what rises, or falls, by less from one reading to the next is no whole jump
 _IN_SHARE, _VARIES = 0.06, 0.2  # misfit of a share of another speed, by its own size, and how much that speed varies
 _LOUD = 2.0  # times the usual change from reading to reading, the other wheels' at that time included
@@ -68,12 +70,6 @@ class Wheel(NamedTuple):
     own: bool = False
     pull: Array | None = None
     spiky: bool = True
-
-    @property
-    def sharp(self) -> bool:
-        """Whether readings follow each other so fast that a jump between two of them is none that a drive could make."""
-        step = self.samples.step
-        return step.size > 1 and float(np.median(np.diff(step))) * self.dt <= _SHARP_S
 
 
 def finding_of(spell: Spell, wheel: Wheel, speed: Array | None) -> Finding | None:
@@ -129,16 +125,10 @@ def _silent(spell: Spell, wheel: Wheel, first: int, last: int, speed: Array | No
     end = last if rose is None else int(wheel.samples.step[rose])
     texts = [f"{wheel.name} read 0 for {(end - begin) * wheel.dt:.2f} s while its command asked for motion."]
     # a wheel that comes free leaps ahead, for its loop has wound up
-    sensor = _by_jumps(wheel, 0 if fell is None else 1 + (rose is not None))
+    jumps = [] if fell is None else [Jump(fell, STOPS_S), *([] if rose is None else [Jump(rose, STARTS_S)])]
+    sensor = sensor_by_jumps(wheel.samples, jumps, wheel.dt)
     if fell is not None or rose is not None:
-        texts.append(
-            "It fell to 0, or rose from it, from one reading to the next"
-            + (
-                ": no drive stops or starts like that."
-                if wheel.sharp and fell is not None
-                else ", and readings are too far apart to tell a jam from that."
-            )
-        )
+        texts.append("It fell to 0, or rose from it, from one reading to the next" + _seldom(sensor, "stops or starts"))
     seen = speed is not None and np.nanmedian(np.abs(speed[part])) > _MOVING * np.nanquantile(np.abs(speed), 0.9)
     if speed is not None and wheel.own and not spell.own and not seen:
         sensor = 0.5  # another view of this wheel has it at rest, too
@@ -173,13 +163,14 @@ def _by_body(spell: Spell, sensor: float, texts: list[str]) -> float:
     """Probability that a spell is the sensor's [1], beside how the body turns; says so in `texts`."""
     if not spell.turns:
         return sensor
-    if sensor > _EITHER:  # two that contradict each other
+    if sensor >= _AT_ONCE_P:  # two that contradict each other
         return 0.5
+    odds = sensor / (1.0 - sensor) * _BY_BODY / (1.0 - _BY_BODY)
     texts.append(
         "The measured yaw rate follows this reading, not what the {wheel} should do: the {wheel} really turns so, and its {valve} does not do "
         "what it is told."
     )
-    return _BY_BODY
+    return odds / (1.0 + odds)
 
 
 def _pulls_as_usual(wheel: Wheel, part: slice) -> bool:
@@ -188,19 +179,30 @@ def _pulls_as_usual(wheel: Wheel, part: slice) -> bool:
     return share.size >= _LEAST_PULLS and bool(_AS_USUAL[0] < np.median(share) < _AS_USUAL[1])
 
 
-def _by_jumps(wheel: Wheel, jumps: int) -> float:
-    """Probability that what begins, or ends, within one reading is the sensor's [1]."""
-    return (0.5, _ONE_JUMP, _TWO_JUMPS)[jumps] if wheel.sharp else 0.5
+def _seldom(sensor: float, does: str) -> str:
+    """What jumps say that are the sensor's with a probability `sensor` [1], as the end of a sentence of what no drive `does`."""
+    if sensor >= _AT_ONCE_P:
+        return f": no drive {does} like that."
+    if sensor > _EITHER:
+        return ": few drives do so within the pause between two readings."
+    return ", and readings are too far apart to tell a drive's fault from that."
 
 
 def _whole_jump(wheel: Wheel, expected: Array, at: int, ratio: float) -> int | None:
     """Sample behind a jump to 0, or from it, that is as large as the speed itself was to be; None where there is none."""
     found = onset_of(wheel.jumps, wheel.samples, at, ratio, wheel.dt)
+    if found is None:  # no calm moment, or a slow wheel
+        found = to_zero(wheel.samples, at, wheel.dt, ends=ratio != 0.0)
     if found is None:
         return None
     width = int(wheel.blocks.start[1]) if wheel.blocks.start.size > 1 else 1
     block = min(int(wheel.samples.step[found]) // width, expected.size - 1)
+    near = np.abs(wheel.samples.step - wheel.samples.step[found]) * wheel.dt <= _LEVEL_S
+    side = np.arange(near.size) >= found
+    level = wheel.samples.value[near & (side if ratio != 0.0 else ~side)]
     size = abs(float(np.nan_to_num(expected[block])))
+    if np.isfinite(level).any():  # it may turn slower than it should
+        size = min(size, abs(float(np.nanmedian(level))))
     return found if abs(float(np.nan_to_num(wheel.samples.change[found]))) > _WHOLE * size else None
 
 
@@ -231,7 +233,8 @@ def _scaled(spell: Spell, wheel: Wheel, span: tuple[int, int], speed: Array | No
         return None
     fell = onset_of(wheel.jumps, wheel.samples, span[0], gain, wheel.dt)
     rose = onset_of(wheel.jumps, wheel.samples, span[1], 1.0 / gain, wheel.dt)
-    bare = speed is None and _by_jumps(wheel, (fell is not None) + (rose is not None)) <= _EITHER
+    sensor = sensor_by_jumps(wheel.samples, [Jump(k, FADES_S) for k in (fell, rose) if k is not None], wheel.dt)
+    bare = speed is None and sensor <= _EITHER
     if bare and (spell.p < _BARE_P or (span[1] - span[0]) * wheel.dt < _BARE_S):
         return None
     begin = span[0] if fell is None else int(wheel.samples.step[fell])
@@ -243,7 +246,7 @@ def _scaled(spell: Spell, wheel: Wheel, span: tuple[int, int], speed: Array | No
         )
     if fell is not None or rose is not None:
         texts.append(
-            f"It changed by a factor of about {gain:.2f} from one reading to the next{', which no drive does' if wheel.sharp else ''}."
+            f"It changed by a factor of about {gain:.2f} from one reading to the next{_seldom(sensor, 'changes')}"
         )
     if bare:
         texts.append(
@@ -251,15 +254,14 @@ def _scaled(spell: Spell, wheel: Wheel, span: tuple[int, int], speed: Array | No
             "the speed of this {wheel}: a weak drive and a wrong sensor cannot be distinguished; {or_view}the drive's effort would tell them apart."
         )
     misfit = float(np.sqrt(np.mean((y - gain * x) ** 2)) / np.sqrt(np.mean(x * x)))
-    sensor = _by_jumps(wheel, (fell is not None) + (rose is not None))
     if spell.own:  # one encoder, two channels
-        sensor = _TWO_JUMPS
+        sensor = _OWN
     elif spell.kin or (speed is not None and wheel.own):
-        sensor = max(sensor, _ONE_JUMP)
+        sensor = max(sensor, _KIN)
     elif (
         spell.turns is False and misfit < _IN_SHARE * min(gain, 1.0) and np.std(x) > _VARIES * np.sqrt(np.mean(x * x))
     ):  # a share that stays the same at every speed is no slip, and no weak drive where the body does not turn with it
-        sensor = max(sensor, _ONE_JUMP)
+        sensor = max(sensor, _KIN)
         texts.append("The measured yaw rate does not follow this reading.")
     sensor = _by_body(spell, sensor, texts)
     if 1.0 - _EITHER <= sensor <= _EITHER and not bare:
