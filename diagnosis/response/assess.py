@@ -60,6 +60,7 @@ _OWN, _OTHERS = 4, 2  # holds of a channel that may be faults: of the one in que
 _LEAST_S, _TURNS_S = 1.0, 5.0
 _LEAST_OTHERS = 2  # wheels that answer, beside one that does not
 _BODY_COMMANDS = 2  # speed and yaw rate
+_PAIR = 2  # wheels, of which each moves one side of the machine
 
 
 @dataclass(frozen=True)
@@ -108,7 +109,8 @@ def assess_response(
     rest = {w: samples_of(d.y, d.fresh) for w, d in data.items() if w not in found}
     found = by_each_other(found, width * dt, rest)
     holds = {w: holds_of(j.wheel.samples, _MOVES * limits.driving_speed, dt) for w, j in found.items()}
-    found = {w: j._replace(wheel=j.wheel._replace(habit=_habit(w, holds))) for w, j in found.items()}
+    lone = len(data) == _PAIR and len(found) == _PAIR and turns_by_wheels(*(j.wheel.blocks.mean for j in found.values()))
+    found = {w: j._replace(wheel=j.wheel._replace(habit=_habit(w, holds), lone=lone)) for w, j in found.items()}
     sideways = any(d.commands.shape[1] > _BODY_COMMANDS for d in drives) or goes_sideways(
         {w: j.wheel.blocks.mean for w, j in found.items()}, geometry, width * dt
     )

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnosis.response.at_once import STARTS_S, STOPS_S, Jump, sensor_by_jumps
 from diagnosis.response.channel import Samples
 from diagnosis.response.findings import SENSOR_SHARE, Wheel, sensor_finding
 from diagnosis.results.assessment import Finding
@@ -159,7 +158,6 @@ def broken_off(wheel: Wheel, others: Sequence[Array], driving_speed: float) -> l
             f"{(last - first) * wheel.dt:.1f} s while another {{wheel}} went on turning; nothing says what it should have done."
         )
         p = _BREAKS_OFF_P[all(at_once)]
-        jumps = [Jump(a, STOPS_S)] * at_once[0] + [Jump(b, STARTS_S)] * (at_once[0] and at_once[1])
-        sensor = sensor_by_jumps(wheel.samples, jumps, wheel.dt)
+        sensor = SENSOR_SHARE if wheel.sharp else 0.5
         out.append(sensor_finding(first, last, FaultMode.NO_SIGNAL, p, Epsilon(1.0, 1.0, 1.0), None, (text,), sensor))
     return out

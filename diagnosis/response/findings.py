@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnosis.response.at_once import FADES_S, STARTS_S, STOPS_S, Jump, sensor_by_jumps, to_zero
+from diagnosis.response.at_once import back_at_once, sensor_by_jumps, times_harder, too_hard
 from diagnosis.response.channel import Samples
 from diagnosis.response.jumps import Jumps, onset_of
 from diagnosis.response.models import Blocks
@@ -21,14 +22,13 @@ Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 SENSOR_SHARE = 0.96  # that what a channel alone shows is the sensor's
-_KIN, _OWN = 0.92, 0.97  # another view of this wheel contradicts a share of its speed; its own position does
+_ONE_JUMP, _TWO_JUMPS = 0.92, 0.97
 _EITHER = 0.6  # that it is the sensor's, up to which its side is left open
 _BY_BODY = 0.08  # that it is the sensor's although the body turns as the reading says
 _LEAST_PULLS, _AS_USUAL = 8, (0.6, 1.5)  # blocks with an effort, and its size by the usual one
 _CHANGES = 0.1  # of the readings, as a dead sensor's do not
 _MOVING = 0.2  # of the usual speed
-_AT_ONCE_P = 0.9  # that it is the sensor's, from which on a jump is said to be none of a drive's
-_LEVEL_S = 0.5  # before a fall, or after a rise, in which a speed has its level
+_SHARP_S = 0.012  # between readings: a wheel that jams, or comes free, takes longer
 _WHOLE = 0.75  # of the speed: what rises, or falls, by less from one reading to the next is no whole jump
 _IN_SHARE, _VARIES = 0.06, 0.2  # misfit of a share of another speed, by its own size, and how much that speed varies
 _LOUD = 2.0  # times the usual change from reading to reading, the other wheels' at that time included
@@ -58,6 +58,8 @@ class Wheel(NamedTuple):
         Effort of its drive by its share of the load [1]; NaN where nothing is pulled, None where it is not logged.
     spiky : bool
         Whether single readings are far off more often than those of the other wheels.
+    lone : bool
+        Whether nothing but this wheel moves its side of the machine.
     """
 
     name: str
@@ -70,6 +72,13 @@ class Wheel(NamedTuple):
     own: bool = False
     pull: Array | None = None
     spiky: bool = True
+    lone: bool = False
+
+    @property
+    def sharp(self) -> bool:
+        """Whether readings follow each other so fast that a jump between two of them is none that a drive could make."""
+        step = self.samples.step
+        return step.size > 1 and float(np.median(np.diff(step))) * self.dt <= _SHARP_S
 
 
 def finding_of(spell: Spell, wheel: Wheel, speed: Array | None) -> Finding | None:
@@ -125,10 +134,20 @@ def _silent(spell: Spell, wheel: Wheel, first: int, last: int, speed: Array | No
     end = last if rose is None else int(wheel.samples.step[rose])
     texts = [f"{wheel.name} read 0 for {(end - begin) * wheel.dt:.2f} s while its command asked for motion."]
     # a wheel that comes free leaps ahead, for its loop has wound up
-    jumps = [] if fell is None else [Jump(fell, STOPS_S), *([] if rose is None else [Jump(rose, STARTS_S)])]
-    sensor = sensor_by_jumps(wheel.samples, jumps, wheel.dt)
+    sensor = _by_jumps(wheel, 0 if fell is None else 1 + (rose is not None))
     if fell is not None or rose is not None:
-        texts.append("It fell to 0, or rose from it, from one reading to the next" + _seldom(sensor, "stops or starts"))
+        texts.append(
+            "It fell to 0, or rose from it, from one reading to the next"
+            + (
+                ": no drive stops or starts like that."
+                if wheel.sharp and fell is not None
+                else ", and readings are too far apart to tell a jam from that."
+            )
+        )
+    freed = back_at_once(wheel.samples, last, wheel.dt) if wheel.lone and not spell.turns else None
+    if freed is not None and (shown := sensor_by_jumps(wheel.samples, freed[1:], wheel.dt)) > max(sensor, _EITHER):
+        sensor, (begin, end) = shown, (int(wheel.samples.step[k]) for k in freed)
+        texts.append(f"It was back at its speed from one reading to the next{_hard(wheel, freed[1:])}.")
     seen = speed is not None and np.nanmedian(np.abs(speed[part])) > _MOVING * np.nanquantile(np.abs(speed), 0.9)
     if speed is not None and wheel.own and not spell.own and not seen:
         sensor = 0.5  # another view of this wheel has it at rest, too
@@ -163,14 +182,13 @@ def _by_body(spell: Spell, sensor: float, texts: list[str]) -> float:
     """Probability that a spell is the sensor's [1], beside how the body turns; says so in `texts`."""
     if not spell.turns:
         return sensor
-    if sensor >= _AT_ONCE_P:  # two that contradict each other
+    if sensor > _EITHER:  # two that contradict each other
         return 0.5
-    odds = sensor / (1.0 - sensor) * _BY_BODY / (1.0 - _BY_BODY)
     texts.append(
         "The measured yaw rate follows this reading, not what the {wheel} should do: the {wheel} really turns so, and its {valve} does not do "
         "what it is told."
     )
-    return odds / (1.0 + odds)
+    return _BY_BODY
 
 
 def _pulls_as_usual(wheel: Wheel, part: slice) -> bool:
@@ -179,30 +197,33 @@ def _pulls_as_usual(wheel: Wheel, part: slice) -> bool:
     return share.size >= _LEAST_PULLS and bool(_AS_USUAL[0] < np.median(share) < _AS_USUAL[1])
 
 
-def _seldom(sensor: float, does: str) -> str:
-    """What jumps say that are the sensor's with a probability `sensor` [1], as the end of a sentence of what no drive `does`."""
-    if sensor >= _AT_ONCE_P:
-        return f": no drive {does} like that."
-    if sensor > _EITHER:
-        return ": few drives do so within the pause between two readings."
-    return ", and readings are too far apart to tell a drive's fault from that."
+def _by_jumps(wheel: Wheel, jumps: int) -> float:
+    """Probability that what begins, or ends, within one reading is the sensor's [1]."""
+    return (0.5, _ONE_JUMP, _TWO_JUMPS)[jumps] if wheel.sharp else 0.5
+
+
+def _changes(wheel: Wheel, at: int, ratio: float) -> int | None:
+    """Sample behind the jump by a ratio near a step: in a calm moment, or at any time one that is too hard for the drive."""
+    found = onset_of(wheel.jumps, wheel.samples, at, ratio, wheel.dt)
+    return too_hard(wheel.samples, at, ratio, wheel.dt) if found is None else found
+
+
+def _hard(wheel: Wheel, places: Sequence[int]) -> str:
+    """How much more a speed changed at samples `places` than the drive makes it change, as the end of a sentence; empty where it is no more."""
+    if wheel.sharp:
+        return ", which no drive does"
+    times = times_harder(wheel.samples, places)
+    return f", {times:.1f} times as much as at the hardest starts and stops of this {{wheel}}" if times > 1.0 else ""
 
 
 def _whole_jump(wheel: Wheel, expected: Array, at: int, ratio: float) -> int | None:
     """Sample behind a jump to 0, or from it, that is as large as the speed itself was to be; None where there is none."""
     found = onset_of(wheel.jumps, wheel.samples, at, ratio, wheel.dt)
-    if found is None:  # no calm moment, or a slow wheel
-        found = to_zero(wheel.samples, at, wheel.dt, ends=ratio != 0.0)
     if found is None:
         return None
     width = int(wheel.blocks.start[1]) if wheel.blocks.start.size > 1 else 1
     block = min(int(wheel.samples.step[found]) // width, expected.size - 1)
-    near = np.abs(wheel.samples.step - wheel.samples.step[found]) * wheel.dt <= _LEVEL_S
-    side = np.arange(near.size) >= found
-    level = wheel.samples.value[near & (side if ratio != 0.0 else ~side)]
     size = abs(float(np.nan_to_num(expected[block])))
-    if np.isfinite(level).any():  # it may turn slower than it should
-        size = min(size, abs(float(np.nanmedian(level))))
     return found if abs(float(np.nan_to_num(wheel.samples.change[found]))) > _WHOLE * size else None
 
 
@@ -231,9 +252,11 @@ def _scaled(spell: Spell, wheel: Wheel, span: tuple[int, int], speed: Array | No
     gain = float(x @ y / (x @ x))
     if not 0.02 < gain < 20.0:
         return None
-    fell = onset_of(wheel.jumps, wheel.samples, span[0], gain, wheel.dt)
-    rose = onset_of(wheel.jumps, wheel.samples, span[1], 1.0 / gain, wheel.dt)
-    sensor = sensor_by_jumps(wheel.samples, [Jump(k, FADES_S) for k in (fell, rose) if k is not None], wheel.dt)
+    fell, rose = (_changes(wheel, at, ratio) for at, ratio in zip(span, (gain, 1.0 / gain), strict=True))
+    places = [k for k in (fell, rose) if k is not None]
+    sensor = _by_jumps(wheel, len(places))
+    if not spell.turns:  # where the body turns so the wheel does, however fast it came
+        sensor = max(sensor, sensor_by_jumps(wheel.samples, places, wheel.dt))
     bare = speed is None and sensor <= _EITHER
     if bare and (spell.p < _BARE_P or (span[1] - span[0]) * wheel.dt < _BARE_S):
         return None
@@ -246,7 +269,7 @@ def _scaled(spell: Spell, wheel: Wheel, span: tuple[int, int], speed: Array | No
         )
     if fell is not None or rose is not None:
         texts.append(
-            f"It changed by a factor of about {gain:.2f} from one reading to the next{_seldom(sensor, 'changes')}"
+            f"It changed by a factor of about {gain:.2f} from one reading to the next{_hard(wheel, places)}."
         )
     if bare:
         texts.append(
@@ -255,13 +278,13 @@ def _scaled(spell: Spell, wheel: Wheel, span: tuple[int, int], speed: Array | No
         )
     misfit = float(np.sqrt(np.mean((y - gain * x) ** 2)) / np.sqrt(np.mean(x * x)))
     if spell.own:  # one encoder, two channels
-        sensor = _OWN
+        sensor = _TWO_JUMPS
     elif spell.kin or (speed is not None and wheel.own):
-        sensor = max(sensor, _KIN)
+        sensor = max(sensor, _ONE_JUMP)
     elif (
         spell.turns is False and misfit < _IN_SHARE * min(gain, 1.0) and np.std(x) > _VARIES * np.sqrt(np.mean(x * x))
     ):  # a share that stays the same at every speed is no slip, and no weak drive where the body does not turn with it
-        sensor = max(sensor, _KIN)
+        sensor = max(sensor, _ONE_JUMP)
         texts.append("The measured yaw rate does not follow this reading.")
     sensor = _by_body(spell, sensor, texts)
     if 1.0 - _EITHER <= sensor <= _EITHER and not bare:
