@@ -41,7 +41,7 @@ from diagnosis.response.models import (
     scores,
 )
 from diagnosis.response.power import powers_of
-from diagnosis.response.rivals import by_each_other, held_back_together, jumped, others_fault, shared
+from diagnosis.response.rivals import by_each_other, held_back_together, jumped, others_fault, shared, told_and_doing_alike
 from diagnosis.response.sides import sides_of
 from diagnosis.response.sideways import goes_sideways
 from diagnosis.response.spells import spells_of, until_back, where_asked
@@ -131,7 +131,10 @@ def assess_response(
         w: [
             less_sure(s, w, judged, width * dt)
             for s in j.spells
-            if not others_fault(s, w, judged) and not consequence(s, w, judged) and not wrong_yaw_rate(s, j)
+            if not others_fault(s, w, judged)
+            and not told_and_doing_alike(s, w, judged)
+            and not consequence(s, w, judged)
+            and not wrong_yaw_rate(s, j)
         ]
         for w, j in judged.items()
     }

@@ -56,7 +56,7 @@ def sensor_by_jumps(samples: Samples, places: Sequence[int], dt: float) -> float
     for at in places:
         size = abs(float(np.nan_to_num(samples.change[at])))
         gap = max(pause, float(samples.step[at] - samples.step[at - 1]) * dt if at else 0.0)
-        if size > hardest:
+        if size > 0.0 and np.isfinite(gap + hardest):
             drive *= within_a_pause(gap, pause * size / hardest)
     return min(1.0 / (1.0 + drive), _MOST[len(places)])
 

@@ -145,8 +145,9 @@ def _silent(spell: Spell, wheel: Wheel, first: int, last: int, speed: Array | No
             )
         )
     freed = back_at_once(wheel.samples, last, wheel.dt) if wheel.lone and not spell.turns else None
-    if freed is not None and (shown := sensor_by_jumps(wheel.samples, freed[1:], wheel.dt)) > max(sensor, _EITHER):
-        sensor, (begin, end) = shown, (int(wheel.samples.step[k]) for k in freed)
+    if freed is not None and sensor <= _EITHER and times_harder(wheel.samples, freed[1:]) > 1.0:
+        sensor = sensor_by_jumps(wheel.samples, freed[1:], wheel.dt)
+        begin, end = (int(wheel.samples.step[k]) for k in freed)
         texts.append(f"It was back at its speed from one reading to the next{_hard(wheel, freed[1:])}.")
     seen = speed is not None and np.nanmedian(np.abs(speed[part])) > _MOVING * np.nanquantile(np.abs(speed), 0.9)
     if speed is not None and wheel.own and not spell.own and not seen:
@@ -257,7 +258,7 @@ def _scaled(spell: Spell, wheel: Wheel, span: tuple[int, int], speed: Array | No
     sensor = _by_jumps(wheel, len(places))
     if not spell.turns:  # where the body turns so the wheel does, however fast it came
         sensor = max(sensor, sensor_by_jumps(wheel.samples, places, wheel.dt))
-    bare = speed is None and sensor <= _EITHER
+    bare = speed is None and _by_jumps(wheel, len(places)) <= _EITHER
     if bare and (spell.p < _BARE_P or (span[1] - span[0]) * wheel.dt < _BARE_S):
         return None
     begin = span[0] if fell is None else int(wheel.samples.step[fell])
@@ -272,9 +273,11 @@ def _scaled(spell: Spell, wheel: Wheel, span: tuple[int, int], speed: Array | No
             f"It changed by a factor of about {gain:.2f} from one reading to the next{_hard(wheel, places)}."
         )
     if bare:
+        texts.insert(0, f"{wheel.name} is {gain:.2f} × what its command makes it do.")
+    if bare and sensor <= _EITHER:
         texts.append(
-            f"{wheel.name} is {gain:.2f} × what its command makes it do. It came while the speed was changing, and nothing else shows "
-            "the speed of this {wheel}: a weak drive and a wrong sensor cannot be distinguished; {or_view}the drive's effort would tell them apart."
+            "It came while the speed was changing, or not faster than this drive is, and nothing else shows the speed of this {wheel}: "
+            "a weak drive and a wrong sensor cannot be distinguished; {or_view}the drive's effort would tell them apart."
         )
     misfit = float(np.sqrt(np.mean((y - gain * x) ** 2)) / np.sqrt(np.mean(x * x)))
     if spell.own:  # one encoder, two channels
