@@ -41,7 +41,14 @@ from diagnosis.response.models import (
     scores,
 )
 from diagnosis.response.power import powers_of
-from diagnosis.response.rivals import by_each_other, held_back_together, jumped, others_fault, shared, told_and_doing_alike
+from diagnosis.response.rivals import (
+    by_each_other,
+    held_back_together,
+    jumped,
+    others_fault,
+    shared,
+    told_and_doing_alike,
+)
 from diagnosis.response.sides import sides_of
 from diagnosis.response.sideways import goes_sideways
 from diagnosis.response.spells import spells_of, until_back, where_asked
@@ -109,7 +116,9 @@ def assess_response(
     rest = {w: samples_of(d.y, d.fresh) for w, d in data.items() if w not in found}
     found = by_each_other(found, width * dt, rest)
     holds = {w: holds_of(j.wheel.samples, _MOVES * limits.driving_speed, dt) for w, j in found.items()}
-    lone = len(data) == _PAIR and len(found) == _PAIR and turns_by_wheels(*(j.wheel.blocks.mean for j in found.values()))
+    lone = (
+        len(data) == _PAIR and len(found) == _PAIR and turns_by_wheels(*(j.wheel.blocks.mean for j in found.values()))
+    )
     found = {w: j._replace(wheel=j.wheel._replace(habit=_habit(w, holds), lone=lone)) for w, j in found.items()}
     sideways = any(d.commands.shape[1] > _BODY_COMMANDS for d in drives) or goes_sideways(
         {w: j.wheel.blocks.mean for w, j in found.items()}, geometry, width * dt

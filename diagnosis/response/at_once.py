@@ -29,7 +29,10 @@ _LEAST = 100  # such changes, from which on they show what a drive can do
 _TOO_HARD, _ALIKE = 2.0, 1.35  # times such a change; by which the ratio of a jump may differ from the deviation's
 _PAUSE = 0.75  # of the pauses between new values of a turning wheel are no longer than usual
 _TURNS = 0.1  # of the usual top speed
-_NEAR_S, _LEVEL_S = 1.0, 0.5  # around a step at which a spell ends, about; before a fall, or after a rise, in which a speed has its level
+_NEAR_S, _LEVEL_S = (
+    1.0,
+    0.5,
+)  # around a step at which a spell ends, about; before a fall, or after a rise, in which a speed has its level
 _WHOLE = 0.75  # of that level, or the other way round: less from one reading to the next is no whole step, and more overshoots
 
 
@@ -111,6 +114,12 @@ def times_harder(samples: Samples, places: Sequence[int]) -> float:
     """How many times as large as the hardest change of the drive the smallest of jumps `places` is [1]; 0 where that is not known."""
     hardest = hardest_change(samples, places)
     return min((abs(float(np.nan_to_num(samples.change[k]))) / hardest for k in places), default=0.0)
+
+
+def how_hard(samples: Samples, places: Sequence[int]) -> str:
+    """How much more a speed changes at samples `places` than at its hardest, as the end of a sentence; empty where it is no more."""
+    times = times_harder(samples, places)
+    return f", {times:.1f} times as much as at the hardest starts and stops of this {{wheel}}" if times > 1.0 else ""
 
 
 def hardest_change(samples: Samples, but: Sequence[int] = ()) -> float:

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnosis.response.at_once import back_at_once, sensor_by_jumps, times_harder, too_hard
+from diagnosis.response.at_once import back_at_once, how_hard, sensor_by_jumps, times_harder, too_hard
 from diagnosis.response.channel import Samples
 from diagnosis.response.jumps import Jumps, onset_of
 from diagnosis.response.models import Blocks
@@ -148,7 +147,10 @@ def _silent(spell: Spell, wheel: Wheel, first: int, last: int, speed: Array | No
     if freed is not None and sensor <= _EITHER and times_harder(wheel.samples, freed[1:]) > 1.0:
         sensor = sensor_by_jumps(wheel.samples, freed[1:], wheel.dt)
         begin, end = (int(wheel.samples.step[k]) for k in freed)
-        texts.append(f"It was back at its speed from one reading to the next{_hard(wheel, freed[1:])}.")
+        hard = how_hard(wheel.samples, freed[1:])
+        texts.append(
+            f"It was back at its speed from one reading to the next{hard}: a {{wheel}} that comes free has the machine to set going."
+        )
     seen = speed is not None and np.nanmedian(np.abs(speed[part])) > _MOVING * np.nanquantile(np.abs(speed), 0.9)
     if speed is not None and wheel.own and not spell.own and not seen:
         sensor = 0.5  # another view of this wheel has it at rest, too
@@ -209,14 +211,6 @@ def _changes(wheel: Wheel, at: int, ratio: float) -> int | None:
     return too_hard(wheel.samples, at, ratio, wheel.dt) if found is None else found
 
 
-def _hard(wheel: Wheel, places: Sequence[int]) -> str:
-    """How much more a speed changed at samples `places` than the drive makes it change, as the end of a sentence; empty where it is no more."""
-    if wheel.sharp:
-        return ", which no drive does"
-    times = times_harder(wheel.samples, places)
-    return f", {times:.1f} times as much as at the hardest starts and stops of this {{wheel}}" if times > 1.0 else ""
-
-
 def _whole_jump(wheel: Wheel, expected: Array, at: int, ratio: float) -> int | None:
     """Sample behind a jump to 0, or from it, that is as large as the speed itself was to be; None where there is none."""
     found = onset_of(wheel.jumps, wheel.samples, at, ratio, wheel.dt)
@@ -254,6 +248,8 @@ def _scaled(spell: Spell, wheel: Wheel, span: tuple[int, int], speed: Array | No
     if not 0.02 < gain < 20.0:
         return None
     fell, rose = (_changes(wheel, at, ratio) for at, ratio in zip(span, (gain, 1.0 / gain), strict=True))
+    if fell is not None and rose is not None and fell >= rose:
+        fell = rose = None
     places = [k for k in (fell, rose) if k is not None]
     sensor = _by_jumps(wheel, len(places))
     if not spell.turns:  # where the body turns so the wheel does, however fast it came
@@ -270,7 +266,7 @@ def _scaled(spell: Spell, wheel: Wheel, span: tuple[int, int], speed: Array | No
         )
     if fell is not None or rose is not None:
         texts.append(
-            f"It changed by a factor of about {gain:.2f} from one reading to the next{_hard(wheel, places)}."
+            f"It changed by a factor of about {gain:.2f} from one reading to the next{', which no drive does' if wheel.sharp else how_hard(wheel.samples, places)}."
         )
     if bare:
         texts.insert(0, f"{wheel.name} is {gain:.2f} × what its command makes it do.")

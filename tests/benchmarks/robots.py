@@ -23,6 +23,8 @@ from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # small matrices: more threads only wait for each other
+
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
