@@ -41,7 +41,14 @@ from diagnosis.response.models import (
     scores,
 )
 from diagnosis.response.power import powers_of
-from diagnosis.response.rivals import by_each_other, held_back_together, jumped, others_fault, shared
+from diagnosis.response.rivals import (
+    by_each_other,
+    held_back_together,
+    jumped,
+    others_fault,
+    shared,
+    told_and_doing_alike,
+)
 from diagnosis.response.sides import sides_of
 from diagnosis.response.sideways import goes_sideways
 from diagnosis.response.spells import spells_of, until_back, where_asked
@@ -60,6 +67,7 @@ _OWN, _OTHERS = 4, 2  # holds of a channel that may be faults: of the one in que
 _LEAST_S, _TURNS_S = 1.0, 5.0
 _LEAST_OTHERS = 2  # wheels that answer, beside one that does not
 _BODY_COMMANDS = 2  # speed and yaw rate
+_PAIR = 2  # wheels, of which each moves one side of the machine
 
 
 @dataclass(frozen=True)
@@ -108,7 +116,10 @@ def assess_response(
     rest = {w: samples_of(d.y, d.fresh) for w, d in data.items() if w not in found}
     found = by_each_other(found, width * dt, rest)
     holds = {w: holds_of(j.wheel.samples, _MOVES * limits.driving_speed, dt) for w, j in found.items()}
-    found = {w: j._replace(wheel=j.wheel._replace(habit=_habit(w, holds))) for w, j in found.items()}
+    lone = (
+        len(data) == _PAIR and len(found) == _PAIR and turns_by_wheels(*(j.wheel.blocks.mean for j in found.values()))
+    )
+    found = {w: j._replace(wheel=j.wheel._replace(habit=_habit(w, holds), lone=lone)) for w, j in found.items()}
     sideways = any(d.commands.shape[1] > _BODY_COMMANDS for d in drives) or goes_sideways(
         {w: j.wheel.blocks.mean for w, j in found.items()}, geometry, width * dt
     )
@@ -129,7 +140,10 @@ def assess_response(
         w: [
             less_sure(s, w, judged, width * dt)
             for s in j.spells
-            if not others_fault(s, w, judged) and not consequence(s, w, judged) and not wrong_yaw_rate(s, j)
+            if not others_fault(s, w, judged)
+            and not told_and_doing_alike(s, w, judged)
+            and not consequence(s, w, judged)
+            and not wrong_yaw_rate(s, j)
         ]
         for w, j in judged.items()
     }

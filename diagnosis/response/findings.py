@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from diagnosis.response.at_once import back_at_once, how_hard, sensor_by_jumps, times_harder, too_hard
 from diagnosis.response.channel import Samples
 from diagnosis.response.jumps import Jumps, onset_of
 from diagnosis.response.models import Blocks
@@ -56,6 +57,8 @@ class Wheel(NamedTuple):
         Effort of its drive by its share of the load [1]; NaN where nothing is pulled, None where it is not logged.
     spiky : bool
         Whether single readings are far off more often than those of the other wheels.
+    lone : bool
+        Whether nothing but this wheel moves its side of the machine.
     """
 
     name: str
@@ -68,6 +71,7 @@ class Wheel(NamedTuple):
     own: bool = False
     pull: Array | None = None
     spiky: bool = True
+    lone: bool = False
 
     @property
     def sharp(self) -> bool:
@@ -139,6 +143,14 @@ def _silent(spell: Spell, wheel: Wheel, first: int, last: int, speed: Array | No
                 else ", and readings are too far apart to tell a jam from that."
             )
         )
+    freed = back_at_once(wheel.samples, last, wheel.dt) if wheel.lone and not spell.turns else None
+    if freed is not None and sensor <= _EITHER and times_harder(wheel.samples, freed[1:]) > 1.0:
+        sensor = sensor_by_jumps(wheel.samples, freed[1:], wheel.dt)
+        begin, end = (int(wheel.samples.step[k]) for k in freed)
+        hard = how_hard(wheel.samples, freed[1:])
+        texts.append(
+            f"It was back at its speed from one reading to the next{hard}: a {{wheel}} that comes free has the machine to set going."
+        )
     seen = speed is not None and np.nanmedian(np.abs(speed[part])) > _MOVING * np.nanquantile(np.abs(speed), 0.9)
     if speed is not None and wheel.own and not spell.own and not seen:
         sensor = 0.5  # another view of this wheel has it at rest, too
@@ -193,6 +205,12 @@ def _by_jumps(wheel: Wheel, jumps: int) -> float:
     return (0.5, _ONE_JUMP, _TWO_JUMPS)[jumps] if wheel.sharp else 0.5
 
 
+def _changes(wheel: Wheel, at: int, ratio: float) -> int | None:
+    """Sample behind the jump by a ratio near a step: in a calm moment, or at any time one that is too hard for the drive."""
+    found = onset_of(wheel.jumps, wheel.samples, at, ratio, wheel.dt)
+    return too_hard(wheel.samples, at, ratio, wheel.dt) if found is None else found
+
+
 def _whole_jump(wheel: Wheel, expected: Array, at: int, ratio: float) -> int | None:
     """Sample behind a jump to 0, or from it, that is as large as the speed itself was to be; None where there is none."""
     found = onset_of(wheel.jumps, wheel.samples, at, ratio, wheel.dt)
@@ -229,9 +247,14 @@ def _scaled(spell: Spell, wheel: Wheel, span: tuple[int, int], speed: Array | No
     gain = float(x @ y / (x @ x))
     if not 0.02 < gain < 20.0:
         return None
-    fell = onset_of(wheel.jumps, wheel.samples, span[0], gain, wheel.dt)
-    rose = onset_of(wheel.jumps, wheel.samples, span[1], 1.0 / gain, wheel.dt)
-    bare = speed is None and _by_jumps(wheel, (fell is not None) + (rose is not None)) <= _EITHER
+    fell, rose = (_changes(wheel, at, ratio) for at, ratio in zip(span, (gain, 1.0 / gain), strict=True))
+    if fell is not None and rose is not None and fell >= rose:
+        fell = rose = None
+    places = [k for k in (fell, rose) if k is not None]
+    sensor = _by_jumps(wheel, len(places))
+    if not spell.turns:  # where the body turns so the wheel does, however fast it came
+        sensor = max(sensor, sensor_by_jumps(wheel.samples, places, wheel.dt))
+    bare = speed is None and _by_jumps(wheel, len(places)) <= _EITHER
     if bare and (spell.p < _BARE_P or (span[1] - span[0]) * wheel.dt < _BARE_S):
         return None
     begin = span[0] if fell is None else int(wheel.samples.step[fell])
@@ -243,15 +266,16 @@ def _scaled(spell: Spell, wheel: Wheel, span: tuple[int, int], speed: Array | No
         )
     if fell is not None or rose is not None:
         texts.append(
-            f"It changed by a factor of about {gain:.2f} from one reading to the next{', which no drive does' if wheel.sharp else ''}."
+            f"It changed by a factor of about {gain:.2f} from one reading to the next{', which no drive does' if wheel.sharp else how_hard(wheel.samples, places)}."
         )
     if bare:
+        texts.insert(0, f"{wheel.name} is {gain:.2f} × what its command makes it do.")
+    if bare and sensor <= _EITHER:
         texts.append(
-            f"{wheel.name} is {gain:.2f} × what its command makes it do. It came while the speed was changing, and nothing else shows "
-            "the speed of this {wheel}: a weak drive and a wrong sensor cannot be distinguished; {or_view}the drive's effort would tell them apart."
+            "It came while the speed was changing, or not faster than this drive is, and nothing else shows the speed of this {wheel}: "
+            "a weak drive and a wrong sensor cannot be distinguished; {or_view}the drive's effort would tell them apart."
         )
     misfit = float(np.sqrt(np.mean((y - gain * x) ** 2)) / np.sqrt(np.mean(x * x)))
-    sensor = _by_jumps(wheel, (fell is not None) + (rose is not None))
     if spell.own:  # one encoder, two channels
         sensor = _TWO_JUMPS
     elif spell.kin or (speed is not None and wheel.own):

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.response.channel import Samples
+from diagnosis.response.inputs import cells
 from diagnosis.response.machine import Judged
 from diagnosis.response.models import Beside, held_long
 from diagnosis.response.spells import Spell
@@ -27,6 +28,7 @@ _TURNS = 0.05  # of the usual speed
 _ALSO_HELD = 0.05  # of the driving in which another wheel stays at one value for long: then it is a habit
 _WITHIN, _LONGER = 0.9, 2.0  # of a spell, and times its length: what lies so within another wheel's is its consequence
 _STEADIER = 1.3  # times the misfit beside one gain: the wheel whose gain is the steadier one is at fault
+_SAME_ASKED, _MOSTLY, _CLOSE = 0.05, 0.5, 0.5  # of what is asked; of a spell; of the misfit beside the command
 _CLEARLY = 2.0  # times the misfit of another wheel beside its command: then it is clear whose fault it is
 
 
@@ -105,6 +107,30 @@ def others_fault(spell: Spell, wheel: str, judged: Mapping[str, Judged]) -> bool
                     return True  # one gain at every speed explains the other wheel, none this one
             elif s.mode.scaled and (s.p > spell.p or spell.mode is FaultMode.OUTSIDE_TABLE):
                 return True  # a sensor loses more often than it gains
+    return False
+
+
+def told_and_doing_alike(spell: Spell, wheel: str, judged: Mapping[str, Judged]) -> bool:
+    """Whether another wheel that is told the same turns the same where this one is off its command alone: nothing is wrong with one of them.
+
+    What a command makes of a wheel depends on the others, too: a limit, or a turn, that was seldom driven is no fault.
+    """
+    one, b = judged[wheel], judged[wheel].wheel.blocks
+    if (
+        one.speed is not None
+        or not one.response.answered
+        or not (spell.mode.scaled or spell.mode is FaultMode.OUTSIDE_TABLE)
+    ):
+        return False
+    part, width = slice(spell.start, spell.stop), int(b.start[1]) if b.start.size > 1 else 1
+    asked = {w: cells(j.data.asked, width)[part] for w, j in judged.items()}
+    off = np.abs(b.mean - np.clip(b.mean, b.low, b.high))[part]
+    for other, j in judged.items():
+        apart = np.abs(b.mean - j.wheel.blocks.mean)[part]
+        same = np.abs(asked[wheel] - asked[other]) < _SAME_ASKED * np.abs(asked[wheel])
+        same &= np.isfinite(apart) & np.isfinite(off)
+        if other != wheel and np.mean(same) > _MOSTLY and np.median(apart[same]) < _CLOSE * np.median(off[same]):
+            return True
     return False
 
 

@@ -16,11 +16,14 @@ An ignored command, an emergency stop, and a fault of gyro or odometry are no wh
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 import tempfile
 from collections import Counter, defaultdict
 from dataclasses import dataclass
 from pathlib import Path
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # small matrices: more threads only wait for each other
 
 import numpy as np
 

@@ -5,7 +5,8 @@ motor rig. What is printed:
 
 1. the two bags as they are: alarms, and the share of driving in which each speed sensor was judged;
 2. faults written into one wheel of them for ten seconds: dead, frozen at its value, half, ±1.5 rad/s of noise, spikes of 100 rad/s.
-   Places where the wheel hardly moves are left out for the first three. Whether it was found, and by the right wheel and side;
+   Places where the wheel hardly moves are left out for the first three. Whether it was found, and by the right wheel and side
+   (`--bare`: without the positions of their joints, which tell a sensor by themselves);
 3. the disabled Warthog: its title, and whether any wheel is blamed;
 4. the arm: motors that were commanded and stood still (by net travel) and whether they were found; other motors blamed;
 5. the rig with all channels of its rows repeated for three seconds.
@@ -22,6 +23,8 @@ import tempfile
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # small matrices: more threads only wait for each other
 
 import numpy as np
 import pandas as pd
@@ -79,10 +82,13 @@ def told(report: ReportDocument) -> Iterator[tuple[str, str, float, float]]:
             yield i["component"], str(i["side"]), i["start_s"], i["stop_s"]
 
 
-def bag(name: str, count: int, seed: int) -> tuple[int, int, int, int]:
+def bag(name: str, count: int, seed: int, *, positions: bool = True) -> tuple[int, int, int, int]:
     """Print a bag's scores; missions with a fault, found, found with wheel and side, alarms beside them."""
     machine = load_machine(data_folder() / f"robots/{name}.toml")
     mission = load_mission([data_folder() / "robots" / name], machine)
+    if not positions:
+        kept = {k: x for k, x in mission.timeline.signals.items() if not k.endswith("_position")}
+        mission = replace(mission, timeline=replace(mission.timeline, signals=kept))
     report = diagnose_mission(mission, machine).report
     shares = [
         f"{c['component']} {100 * c['decided_driving_s'] / c['driving_s']:.1f} %"
@@ -179,8 +185,11 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--count", type=int, default=12, help="missions of each kind and bag")
     parser.add_argument("--seed", type=int, default=101, help="of places and wheels")
+    parser.add_argument(
+        "--bare", action="store_true", help="without the positions of the joints: commands and speeds alone"
+    )
     args = parser.parse_args()
-    both = np.array([bag(name, args.count, args.seed) for name in RADIUS]).sum(axis=0)
+    both = np.array([bag(name, args.count, args.seed, positions=not args.bare) for name in RADIUS]).sum(axis=0)
     print(
         f"together: {both[0]} missions, found {100 * both[1] / both[0]:.1f} %, wheel and side right {100 * both[2] / both[0]:.1f} %, "
         f"alarms beside {both[3]}"
