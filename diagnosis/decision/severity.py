@@ -25,7 +25,6 @@ _MARKED_EPSILON = 0.3
 _SHORT_NOISE_S = 1.0
 _CERTAIN = 0.99  # probability of any fault from which on even brief noise is worth a check
 _LOST = 0.9  # ε̂ from which on so little is left that the part is as good as without signal
-_POSSIBLE = 0.1  # that it is a valve that does not answer, where no row of the tables is probable
 _PROBABLY_TOTAL = 0.75  # that the named side is stuck or without signal, from which on the machine is stopped
 _PARTIAL = (FaultMode.INEFFICIENT, FaultMode.OUTSIDE_TABLE)  # rows of which ε̂ says how much is left
 
@@ -47,17 +46,15 @@ def severity_of(
             return Severity.MEDIUM, words.fill(
                 "Probably a {valve} that does not answer: check it before the machine goes out again."
             )
-        if _may_be_a_valve(finding):
-            return Severity.MEDIUM, words.fill(
-                "No fault of the tables explains it, yet the {valve} may not answer: check it before the machine goes out again."
-            )
         return Severity.LOW, "Probable, not certain: check it at the next service, and compare with the next mission."
     if total:
         return _severity_of_total(finding, seconds, limits, words, kind)
     marked = finding.epsilon is not None and finding.epsilon.value >= _MARKED_EPSILON
     if finding.mode is FaultMode.OUTSIDE_TABLE:
-        what = "gives such a gain" if finding.epsilon is not None else "explains it"
-        return Severity.MEDIUM, f"Check scaling and sign of the channel: no fault of the tables {what}."
+        return (
+            Severity.MEDIUM,
+            "Check scaling and sign of the channel: no fault of the tables gives such a gain.",
+        )
     return Severity.MEDIUM if marked else Severity.LOW, "This alone is no reason to stop; check it before it grows."
 
 
@@ -96,12 +93,6 @@ def _severity_of_total(
     return Severity.HIGH, (
         f"Stop and repair the sensor: it delivered nothing usable for more than {limits.brief:g} s (Assumption 1)."
     )
-
-
-def _may_be_a_valve(finding: Finding) -> bool:
-    """Whether what no row explains may yet be a valve that does not answer."""
-    odds = sum(h.p for h in finding.hypotheses if h.side == Side.ACTUATOR.value and h.mode in TOTAL)
-    return finding.mode is FaultMode.OUTSIDE_TABLE and odds >= _POSSIBLE
 
 
 def _at_risk(finding: Finding) -> float:

@@ -11,11 +11,11 @@ Array = NDArray[np.float64]
 
 _TREMBLES = 0.3  # of the usual noise
 _ENDS = (0.05, 0.95)  # quantiles between which a command stays
-_LEAST, _SHARE = 0.05, 0.2  # m/s and of the command: further away, or moving by more, a sensor would show it
+_LEAST, _SHARE = 0.063, 0.2  # of the span and of the command: further away, or moving by more, a sensor would show it
 _FEW = 10
 
 
-def lives(y: Array, reference: Array, noise: float) -> bool:
+def lives(y: Array, reference: Array, noise: float, span: float) -> bool:
     """Whether a run of readings is what a healthy sensor gives at a steady command, or at rest where none is given; False where no command is known.
 
     Parameters
@@ -24,6 +24,8 @@ def lives(y: Array, reference: Array, noise: float) -> bool:
         Readings and commanded speed of the run [m/s]; NaN where unknown.
     noise : float
         White noise of the sensor elsewhere [m/s].
+    span : float
+        Largest plausible speed [m/s].
     """
     known = np.isfinite(y)
     asked = reference[np.isfinite(reference)]
@@ -32,9 +34,9 @@ def lives(y: Array, reference: Array, noise: float) -> bool:
         return False
     level = float(np.median(values))
     low, high = np.quantile(asked, _ENDS)
-    near = max(_LEAST, _SHARE * float(np.max(np.abs([low, high]))))
+    near = max(_LEAST * span, _SHARE * float(np.max(np.abs([low, high]))))
     if max(high - low, abs(high - level), abs(low - level)) > near:
         return False
-    if max(abs(low), abs(high)) <= _LEAST:
+    if max(abs(low), abs(high)) <= _LEAST * span:
         return True  # nobody asked for motion
     return float(np.sqrt(np.mean(white_part(values) ** 2))) > _TREMBLES * noise

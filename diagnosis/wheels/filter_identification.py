@@ -20,7 +20,7 @@ _LEAST_LOAD, _MOST_LOAD = 0.0175, 0.1  # of the span
 _GRIP_OF_LEAST = 3.2  # 1 + grip, from which on the least load grows with it
 _TYRES = (0.027, 0.057, 0.114)  # slip at which a tyre transmits its largest load, of the span
 _GRIP = 2.2  # where neither machine file nor mission shows it
-_DRIFT = 0.008  # least process noise of the speed [m/s/√s]
+_DRIFT = 0.0101  # least process noise of the speed, of the span per √s
 _TRIAL_S = 60.0
 
 
@@ -77,7 +77,7 @@ def filter_model(data: WheelsData, i: int) -> WheelFilterModel:
         offset=plant.offset,
         measured=data.measured[i],
         grip=_GRIP if plant.grip is None else plant.grip,
-        drift=max(_DRIFT, plant.wander or 0.0),
+        drift=max(_DRIFT * data.span, plant.wander or 0.0),
     )
 
 

@@ -142,7 +142,7 @@ def findings_of(path: WheelPath, limits: Limits) -> WheelFindings:
         if stop <= start:
             continue
         together = float(np.mean(path.stands[start:stop])) > _TOGETHER
-        alive = together or lives(y[start:stop], path.reference[start:stop], path.model.noise)
+        alive = together or lives(y[start:stop], path.reference[start:stop], path.model.noise, path.model.span)
         run = Run(start, stop, w.segment.side, w.segment.pooled, w.evidence, w.mean, w.cov, path.others, alive)
         verdict = judge(run, y[start:stop], path.model, limits, path.names, path.dt)
         if verdict.hidden:

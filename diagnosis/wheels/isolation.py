@@ -42,7 +42,7 @@ _LEAST_PART = 0.02  # a hypothesis below this is left out of the text
 _LEAST_HYPOTHESIS = 5e-4
 _AT_REST = ((Side.SENSOR, FaultMode.STUCK), (Side.SENSOR, FaultMode.NO_SIGNAL))
 _MEAN_S, _FEW_MEANS, _EDGE_S, _INNER = 0.1, 10, 0.5, (0.02, 0.98)
-_AT_MOST, _LEAST_MOVE = 6.0, 0.005  # times the noise of a mean; m/s
+_AT_MOST, _LEAST_MOVE = 6.0, 0.0063  # times the noise of a mean; of the span
 
 Ranking = list[tuple[Row | None, float]]
 
@@ -191,7 +191,7 @@ def _rests(y: Array, model: WheelFilterModel, dt: float) -> bool:
     if means.size < _FEW_MEANS:
         return True
     low, high = np.quantile(means, _INNER)
-    return bool(high - low <= _AT_MOST * model.noise / np.sqrt(width) + 2 * model.rounding + _LEAST_MOVE)
+    return bool(high - low <= _AT_MOST * model.noise / np.sqrt(width) + 2 * model.rounding + _LEAST_MOVE * model.span)
 
 
 def _stated(weighed: _Weighed, *, apart: bool) -> tuple[Side, float] | None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 
 from diagnosis.results.assessment import Finding
+from diagnosis.results.candidates import candidates
 from diagnosis.results.result import Epsilon, Hypothesis
 from diagnosis.results.vocabulary import Tier
 from diagnosis.wheels.claims import as_claimed
@@ -23,7 +24,7 @@ def finding(side: Side, mode: FaultMode, p: float, epsilon: float | None = None)
 def claimed(f: Finding, *, measured: bool = False) -> Finding:
     (got,) = as_claimed(WheelFindings([f]), CLEAR_AT, measured=measured).findings
     assert sum(h.p for h in got.hypotheses) == pytest.approx(1.0)
-    assert got.evidence[0 if got.mode is f.mode else -1] == "So it looks."
+    assert "So it looks." in got.evidence
     assert [h.p for h in got.hypotheses] == sorted((h.p for h in got.hypotheses), reverse=True)
     assert sum(h.p for h in got.hypotheses if h.mode == "healthy") >= 1.0 - f.probability - 1e-9
     return got
@@ -35,13 +36,12 @@ def test_a_stuck_valve_by_command_and_speed_alone_is_less_sure(p: float, most: f
     assert (got.side, got.mode, got.probability) == (Side.ACTUATOR, FaultMode.STUCK, pytest.approx(most))
 
 
-def test_one_that_is_hardly_probable_is_no_row_and_no_side() -> None:
+def test_one_that_is_hardly_probable_has_no_majority() -> None:
     got = claimed(finding(Side.ACTUATOR, FaultMode.STUCK, 0.7, 1.0))
-    assert (got.side, got.mode) == (Side.SENSOR_OR_ACTUATOR, FaultMode.OUTSIDE_TABLE)
-    assert got.probability == pytest.approx(0.56)
-    assert got.epsilon is None
-    assert [(h.side, h.mode) for h in got.hypotheses[1:]] == [("none", "healthy"), ("actuator", "stuck")]
-    assert got.hypotheses[1].p == pytest.approx(0.3)  # nothing becomes healthier by it
+    assert (got.side, got.mode) == (Side.ACTUATOR, FaultMode.STUCK)
+    assert got.probability == pytest.approx(0.32 * 0.7)
+    assert sum(h.p for h in got.hypotheses if h.mode == "healthy") == pytest.approx(0.3)  # as before
+    assert len(candidates(got.side.value, ((h.side, h.mode, h.p) for h in got.hypotheses))) == 3
 
 
 def test_a_measured_position_decides() -> None:
@@ -59,22 +59,3 @@ def test_a_valve_that_answers_less_is_as_probably_another_wheel(mode: FaultMode)
     assert claimed(finding(Side.ACTUATOR, mode, 0.7, 0.5)).probability == pytest.approx(0.4)
     assert claimed(finding(Side.ACTUATOR, mode, 0.8, 0.5)).probability == 0.8
     assert claimed(finding(Side.ACTUATOR, mode, 0.7, 0.5), measured=True).probability == 0.7
-
-
-def test_a_swing_of_which_no_side_is_known_is_no_row() -> None:
-    either = Side.SENSOR_OR_ACTUATOR.value
-    rows = (
-        Hypothesis(either, "outside_table", 0.4),
-        Hypothesis(either, "noisy", 0.2),
-        Hypothesis("none", "healthy", 0.4),
-    )
-    f = Finding(
-        1000, 2000, Side.SENSOR_OR_ACTUATOR, FaultMode.NOISY, 0.2, rows, None, None, ("So it looks.",), Tier.MODEL
-    )
-    (got,) = as_claimed(WheelFindings([f]), CLEAR_AT, measured=True).findings
-    assert (got.mode, got.probability) == (FaultMode.OUTSIDE_TABLE, pytest.approx(0.4))
-    assert {h.mode: h.p for h in got.hypotheses} == {
-        "outside_table": pytest.approx(0.4),
-        "noisy": 0.2,
-        "healthy": 0.4,
-    }
