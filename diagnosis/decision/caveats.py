@@ -26,6 +26,7 @@ from replay.signals.timeline import Timeline
 Part = tuple[str, str]
 
 _OPEN_S, _OPEN_SHARE = 1.0, 0.02  # driving that was not judged and is worth a word
+_HALF = 0.5  # of ε: a part that may have lost so much is no fault to drive on with
 _REASONS = 2  # that the heading names; all of them stand below it
 _EMPTY_S = 1.0  # without any wheel speed
 _NEVER = "at no size"
@@ -130,6 +131,11 @@ def doubt_of(watch: Sequence[FaultInterval], against: Reservations) -> str:
     """Why a mission with faults to watch is not cleared; empty where it is."""
     out = [
         f"the {against.words.part_words(f.kind, f.component, f.side)} may not answer" for f in watch if unanswered(f)
+    ]
+    out += [
+        f"the {against.words.part_words(f.kind, f.component, f.side)} may have lost {round(100 * f.epsilon.high)} %"
+        for f in watch
+        if f.mode.scaled and f.epsilon is not None and f.epsilon.high >= _HALF
     ]
     out = list(dict.fromkeys(out))
     if against.damage:

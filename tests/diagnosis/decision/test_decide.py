@@ -149,7 +149,7 @@ def test_a_fifth_of_the_driving_undecided_gives_no_all_clear() -> None:
     )
 
 
-WATCHED = finding(Side.ACTUATOR, FaultMode.INEFFICIENT, epsilon=0.5)
+WATCHED = finding(Side.ACTUATOR, FaultMode.INEFFICIENT, epsilon=0.4)
 
 
 def test_faults_to_watch_are_cleared_only_where_all_else_is_ready() -> None:
@@ -160,6 +160,9 @@ def test_faults_to_watch_are_cleared_only_where_all_else_is_ready() -> None:
     assert short.not_cleared == "2 parts were not judged long enough"
     damaged = verdict(parts, damage=("chunk 7 is cut off",))
     assert (damaged.status, damaged.cleared, damaged.not_cleared) == ("watch", False, "the log is damaged")
+    half = machine(FR_actuator=assessed(finding(Side.ACTUATOR, FaultMode.INEFFICIENT, epsilon=0.6)))
+    assert not verdict(half).cleared
+    assert verdict(half).not_cleared == "the FR drive valve may have lost 61 %"
     odd = parts | {("FL", "sensor"): replace(parts["FL", "sensor"], unexplained_s=6.0)}
     assert verdict(odd).not_cleared == "a residual is not explained by any fault"
 
