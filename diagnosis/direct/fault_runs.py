@@ -25,6 +25,7 @@ _BRIDGE_S, _APART_S = 5.0, 30.0
 _BRIEF_S = 0.1
 _NEAR = 20  # samples between runs that follow each other
 _ONE_GAIN = 0.1  # by which gains of one fault may differ
+_ZERO = 3.0  # times the noise: no reading
 _PLAYS = 3.0  # by which a command must move for a valve with a loss of gain to follow
 
 
@@ -62,8 +63,21 @@ def fault_runs(path: ModePath, samples: Samples, model: ModeModel, dt: float, sh
             if kept is None:
                 continue
             run = kept
+        elif run.row in VALUE_ROWS:
+            kept = _moving(run, samples, model)
+            if kept is None:
+                continue
+            run = kept
         out.append(run)
     return out
+
+
+def _moving(run: Run, samples: Samples, model: ModeModel) -> Run | None:
+    """A constant run without the ends in which nothing moves and nothing is read, for that is no fault; None where nothing is left."""
+    part = slice(run.start, run.stop)
+    rests = samples.quiet[part] & (np.abs(np.nan_to_num(samples.y[part], nan=np.inf)) <= _ZERO * model.noise)
+    kept = trim(Run(0, run.size, run.row), rests)
+    return None if kept is None else Run(run.start + kept.start, run.start + kept.stop, run.row)
 
 
 def _resting(runs: list[Run], samples: Samples, model: ModeModel, play: float) -> list[Run]:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 from troubles import Part, Trouble, troubles
 
 from diagnosis.results.document import IntervalRow, ReportDocument
-from replay.faults import FaultMode
+from replay.faults import FaultMode, Side
 
 _SURE = 0.9
 
@@ -90,9 +91,11 @@ def judged(task: Task, tier: str, name: str, report: ReportDocument, parts: froz
 
 
 def _modes(task: Task, finding: IntervalRow) -> set[str]:
-    """Rows that the simulated faults of a finding's part have."""
+    """Rows that the simulated faults of a finding's part have; a sensor that is held where it stood reads nothing, which is one row."""
     faults = task.trouble.faults if task.trouble else ()
-    return {f.mode.value for f in faults if _names(finding["component"], finding["side"], (f.component, f.side.value))}
+    own = [f for f in faults if _names(finding["component"], finding["side"], (f.component, f.side.value))]
+    held = any(f.mode is FaultMode.STUCK and f.side is Side.SENSOR and math.isnan(f.sat) for f in own)
+    return {f.mode.value for f in own} | ({FaultMode.NO_SIGNAL.value} if held else set())
 
 
 def _names(component: str, side: str, part: Part) -> bool:
