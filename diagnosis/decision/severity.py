@@ -25,6 +25,7 @@ _MARKED_EPSILON = 0.3
 _SHORT_NOISE_S = 1.0
 _CERTAIN = 0.99  # probability of any fault from which on even brief noise is worth a check
 _LOST = 0.9  # ε̂ from which on so little is left that the part is as good as without signal
+_EVEN = 0.5  # that a part delivers nothing usable, from which on that is what is said
 _PROBABLY_TOTAL = 0.75  # that the named side is stuck or without signal, from which on the machine is stopped
 _PARTIAL = (FaultMode.INEFFICIENT, FaultMode.OUTSIDE_TABLE)  # rows of which ε̂ says how much is left
 
@@ -43,9 +44,12 @@ def severity_of(
     total = finding.mode.total or _at_risk(finding) >= _PROBABLY_TOTAL
     if faulty < limits.min_probability:
         if total and finding.side is not Side.SENSOR:
-            return Severity.MEDIUM, words.fill(
-                "Probably a {valve} that does not answer: check it before the machine goes out again."
+            what = (
+                "Probably a {valve} that does not answer"
+                if _at_risk(finding) >= _EVEN
+                else "The {valve} may not answer"
             )
+            return Severity.MEDIUM, words.fill(f"{what}: check it before the machine goes out again.")
         return Severity.LOW, "Probable, not certain: check it at the next service, and compare with the next mission."
     if total:
         return _severity_of_total(finding, seconds, limits, words, kind)

@@ -82,7 +82,9 @@ def assess_wheels(data: WheelsData, limits: Limits, *, gains: bool) -> WheelsJud
     doubted = without_many_weak(with_frozen(data, swings.found))
     out = {}
     for i, path in paths.items():
-        claimed = as_claimed(doubted.found[i], limits.clear_at, measured=bool(data.measured[i]))
+        claimed = as_claimed(
+            doubted.found[i], limits.clear_at, measured=bool(data.measured[i]), swings=bool(swings.spans)
+        )
         sensor, actuator = _assessments(data, i, path, claimed, gains=gains)
         out[i] = sensor, actuator if data.measured[i] else replace(actuator, loss=losses[i])
     events = ((swinging(swings.sentence),) if swings.spans else ()) + (

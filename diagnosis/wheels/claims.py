@@ -34,7 +34,7 @@ _OTHERS = "By command and speed alone, another {wheel} or the ground was the cau
 _SMALL = "Machines of other build differ by as much where nothing is wrong with this sensor."
 
 
-def as_claimed(found: WheelFindings, clear_at: float, *, measured: bool) -> WheelFindings:
+def as_claimed(found: WheelFindings, clear_at: float, *, measured: bool, swings: bool = False) -> WheelFindings:
     """Findings as sure as they turned out to be.
 
     Parameters
@@ -45,8 +45,15 @@ def as_claimed(found: WheelFindings, clear_at: float, *, measured: bool) -> Whee
         The loss that counts [1].
     measured : bool
         Whether the valve's position is measured.
+    swings : bool
+        Whether the machine's wheels swing together: what then hardly seems stuck is left open.
     """
-    return replace(found, findings=[_claimed(f, clear_at, measured=measured) for f in found.findings])
+    claimed = [_claimed(f, clear_at, measured=measured) for f in found.findings]
+    untold = [f for f in claimed if swings and _is_untold(f)]
+    for f in untold:
+        for flags in (*found.opened.values(), *found.unexplained.values()):
+            flags[f.start : f.stop] = True
+    return replace(found, findings=[f for f in claimed if not any(f is u for u in untold)])
 
 
 def _claimed(f: Finding, clear_at: float, *, measured: bool) -> Finding:
@@ -58,6 +65,10 @@ def _claimed(f: Finding, clear_at: float, *, measured: bool) -> Finding:
         return limited(f, _MOST_PARTLY, _OTHERS)
     small = f.mode is FaultMode.INEFFICIENT and f.epsilon is not None and f.epsilon.value < clear_at
     return limited(f, _MOST_SMALL, _SMALL) if small and f.side is not Side.ACTUATOR and f.probability < _SURE else f
+
+
+def _is_untold(f: Finding) -> bool:
+    return f.evidence[:1] == (_UNTOLD,)
 
 
 def _untold(f: Finding) -> Finding:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 from diagnosis.results.assessment import Finding
@@ -42,6 +43,15 @@ def test_one_that_is_hardly_probable_has_no_majority() -> None:
     assert got.probability == pytest.approx(0.32 * 0.7)
     assert sum(h.p for h in got.hypotheses if h.mode == "healthy") == pytest.approx(0.3)  # as before
     assert len(candidates(got.side.value, ((h.side, h.mode, h.p) for h in got.hypotheses))) == 3
+
+
+def test_where_the_wheels_swing_together_it_is_left_open() -> None:
+    flags = {side: np.zeros(3000, dtype=np.bool_) for side in (Side.SENSOR, Side.ACTUATOR)}
+    weak, sure = finding(Side.ACTUATOR, FaultMode.STUCK, 0.7), finding(Side.ACTUATOR, FaultMode.STUCK, 0.97)
+    got = as_claimed(WheelFindings([weak, sure], flags, {}), CLEAR_AT, measured=False, swings=True)
+    assert got.findings == [sure]
+    assert flags[Side.ACTUATOR][1000:2000].all()
+    assert not flags[Side.ACTUATOR][2000:].any()
 
 
 def test_a_measured_position_decides() -> None:
