@@ -16,7 +16,7 @@ from diagnosis.results.left_out import is_left_out
 from diagnosis.results.machine_event import MachineEvent
 from diagnosis.results.machine_words import HYDRAULIC, MachineWords
 from diagnosis.results.result import FaultInterval
-from diagnosis.results.vocabulary import Kind, Tier
+from diagnosis.results.vocabulary import Kind, Severity, Tier
 from replay.faults import Side, State
 from replay.machine.config import Limits, Machine
 from replay.mission import Mission
@@ -132,11 +132,7 @@ def doubt_of(watch: Sequence[FaultInterval], against: Reservations) -> str:
     out = [
         f"the {against.words.part_words(f.kind, f.component, f.side)} may not answer" for f in watch if unanswered(f)
     ]
-    out += [
-        f"the {against.words.part_words(f.kind, f.component, f.side)} may have lost {round(100 * f.epsilon.high)} %"
-        for f in watch
-        if f.mode.scaled and f.epsilon is not None and f.epsilon.high >= _HALF
-    ]
+    out += [f"the {halved_words(f, against.words)}" for f in watch if is_halved(f)]
     out = list(dict.fromkeys(out))
     if against.damage:
         out.append("part of the log was left out" if is_left_out(against.damage[0]) else "the log is damaged")
@@ -154,6 +150,21 @@ def doubt_of(watch: Sequence[FaultInterval], against: Reservations) -> str:
         out.append(open_words(against.open))
     rest = len(out) - _REASONS
     return join_words([*out[:_REASONS], *([count_words(rest, "more reason")] if rest > 0 else [])])
+
+
+def is_halved(fault: FaultInterval) -> bool:
+    """Whether a part that is to be watched may have lost half or more, by the upper bound of ε̂."""
+    if fault.severity not in (Severity.MEDIUM, Severity.LOW) or fault.epsilon is None:
+        return False
+    return fault.mode.scaled and fault.epsilon.high >= _HALF
+
+
+def halved_words(fault: FaultInterval, words: MachineWords) -> str:
+    """That it may have lost so much, to follow *the*."""
+    assert fault.epsilon is not None
+    return (
+        f"{words.part_words(fault.kind, fault.component, fault.side)} may have lost {round(100 * fault.epsilon.high)} %"
+    )
 
 
 def open_words(checks: Sequence[Checked]) -> str:

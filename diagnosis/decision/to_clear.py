@@ -6,7 +6,7 @@ from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 
-from diagnosis.decision.caveats import Reservations
+from diagnosis.decision.caveats import Reservations, halved_words, is_halved
 from diagnosis.decision.short import Part, ToClear, short_parts, unjudged_axles
 from diagnosis.decision.wording import count_words, join_words
 from diagnosis.results.assessed import needed_s
@@ -103,6 +103,7 @@ def to_clear(
                 "diagnose the whole log, with every part (no --start, --end, --wheel)",
             )
         )
+    out += _of_halves(faults, words)
     twice = {c for (c, side), a in assessments.items() if a.tier is Tier.DIRECT and side == Side.SENSOR}
     blamed = {k: f for k, c in enumerate(against.open) if (f := _meanwhile(c, faults)) is not None}
     out += _of_faults([(against.open[k], f) for k, f in blamed.items()], words)
@@ -133,6 +134,18 @@ def _meanwhile(check: Checked, faults: Sequence[FaultInterval]) -> FaultInterval
     if check.check is Check.JUMP:
         counted = [f for f in counted if lasts_in(start, stop, (f.start_s, f.stop_s))]
     return max(counted, key=lambda f: (f.component == check.component, share[f.id]), default=None)
+
+
+def _of_halves(faults: Sequence[FaultInterval], words: MachineWords) -> list[ToClear]:
+    """Faults to watch of which half may be lost."""
+    return [
+        ToClear(
+            f"{f.id}: the {halved_words(f, words)}.",
+            f"repair the {words.part_words(f.kind, f.component, f.side)} ({f.id}), then diagnose the next mission",
+        )
+        for f in faults
+        if is_halved(f)
+    ]
 
 
 def _of_faults(blamed: Sequence[tuple[Checked, FaultInterval]], words: MachineWords) -> list[ToClear]:

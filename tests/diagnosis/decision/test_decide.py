@@ -163,6 +163,7 @@ def test_faults_to_watch_are_cleared_only_where_all_else_is_ready() -> None:
     half = machine(FR_actuator=assessed(finding(Side.ACTUATOR, FaultMode.INEFFICIENT, epsilon=0.6)))
     assert not verdict(half).cleared
     assert verdict(half).not_cleared == "the FR drive valve may have lost 61 %"
+    assert [x.act for x in verdict(half).to_clear] == ["repair the FR drive valve (F1), then diagnose the next mission"]
     odd = parts | {("FL", "sensor"): replace(parts["FL", "sensor"], unexplained_s=6.0)}
     assert verdict(odd).not_cleared == "a residual is not explained by any fault"
 
