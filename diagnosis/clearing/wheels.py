@@ -30,7 +30,7 @@ CREEPING, _CREEPS_ALIKE = (
     1.5,
 )  # the same beside a second speed; there it counts beyond so many times the median of the others
 #: Where a wheel hardly drives, its speed per opening counts beyond so much of the loss that counts, where it does not from less on
-#: elsewhere [ln]: dead bands differ. Healthy wheels of nine machines had 0.14 at most.
+#: elsewhere [ln]: dead bands differ. Healthy wheels of seven machines with valves, a tuning mission each, had 0.14 at most.
 _CREEPING_RESPONSE = 0.75
 OPENING = 0.03  # of full opening: likewise
 ROUGH, _ROUGHER = 0.15, 5.0  # quick changes: share of the speed, times those of the other wheels
@@ -55,8 +55,10 @@ def wheel_checks(cells: Cells, clear_at: float) -> Iterator[Checked]:
     responses = responses_of(cells, speed, used, reference)
     tells = openings_tell(cells, responses)
     windows, lasting, changes = responses.windows, responses.usual, responses.changes
-    slow = responses_of(cells, speed, used, reference, CREEPING * USUAL_TOP).windows
-    slow = np.where(np.isfinite(windows), np.nan, slow)
+    slow = np.full(windows.shape, np.nan)
+    if not all(second for _, second in twice):
+        slow = responses_of(cells, speed, used, reference, CREEPING * USUAL_TOP).windows
+        slow[np.isfinite(windows)] = np.nan
     limits = response_limits(responses, twice, clear_at)
     tracking, rough = _tracking(cells, speed, reference), _rough_beside_others(roughness_of(cells, speed))
     rough = np.fmax(rough, wild_readings(cells, speed, FLOOR * cells.machine.max_speed))
@@ -89,9 +91,11 @@ def wheel_checks(cells: Cells, clear_at: float) -> Iterator[Checked]:
             own = limits[i]
             response = (*about, either, Check.RESPONSE)
             driven = worst(cells, response, -windows[:, i], own.below, apart=True)
-            most_slow = max(own.below, -_CREEPING_RESPONSE * float(np.log1p(-clear_at)))
-            creeps = worst(cells, response, -slow[:, i], most_slow, apart=True)
-            yield driven if twice[i][1] else max(driven, creeps, key=times)
+            if twice[i][1]:
+                yield driven
+            else:
+                most_slow = max(own.below, -_CREEPING_RESPONSE * float(np.log1p(-clear_at)))
+                yield max(driven, worst(cells, response, -slow[:, i], most_slow, apart=True), key=times)
             below = lasts(cells, (*about, either, Check.LASTING_RESPONSE), lasting[i].below, own.lasting_below)
             changed = lasts(cells, (*about, either, Check.LASTING_RESPONSE), changes[i], own.changed)
             yield max(below, changed, key=times)

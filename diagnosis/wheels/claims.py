@@ -48,27 +48,29 @@ def as_claimed(found: WheelFindings, clear_at: float, *, measured: bool, swings:
     swings : bool
         Whether the machine's wheels swing together: what then hardly seems stuck is left open.
     """
-    claimed = [_claimed(f, clear_at, measured=measured) for f in found.findings]
-    untold = [f for f in claimed if swings and _is_untold(f)]
-    for f in untold:
+    left_open = [f for f in found.findings if swings and _hardly_stuck(f, measured=measured)]
+    for f in left_open:
         for flags in (*found.opened.values(), *found.unexplained.values()):
             flags[f.start : f.stop] = True
-    return replace(found, findings=[f for f in claimed if not any(f is u for u in untold)])
+    kept = [f for f in found.findings if not any(f is x for x in left_open)]
+    return replace(found, findings=[_claimed(f, clear_at, measured=measured) for f in kept])
+
+
+def _hardly_stuck(f: Finding, *, measured: bool) -> bool:
+    stuck = f.side is Side.ACTUATOR and f.mode is FaultMode.STUCK
+    return stuck and not measured and f.probability < _STUCK_AT_ALL
 
 
 def _claimed(f: Finding, clear_at: float, *, measured: bool) -> Finding:
-    if f.side is Side.ACTUATOR and f.mode is FaultMode.STUCK and not measured:
-        if f.probability < _STUCK_AT_ALL:
-            return _untold(f)
-        return f if f.probability >= _SURELY_STUCK else limited(f, _MOST_STUCK, _LESS_SURE)
-    if f.side is Side.ACTUATOR and f.mode in _ANSWERING and not measured and f.probability < _PARTLY:
-        return limited(f, _MOST_PARTLY, _OTHERS)
+    if _hardly_stuck(f, measured=measured):
+        return _untold(f)
+    if f.side is Side.ACTUATOR and not measured:
+        if f.mode is FaultMode.STUCK and f.probability < _SURELY_STUCK:
+            return limited(f, _MOST_STUCK, _LESS_SURE)
+        if f.mode in _ANSWERING and f.probability < _PARTLY:
+            return limited(f, _MOST_PARTLY, _OTHERS)
     small = f.mode is FaultMode.INEFFICIENT and f.epsilon is not None and f.epsilon.value < clear_at
     return limited(f, _MOST_SMALL, _SMALL) if small and f.side is not Side.ACTUATOR and f.probability < _SURE else f
-
-
-def _is_untold(f: Finding) -> bool:
-    return f.evidence[:1] == (_UNTOLD,)
 
 
 def _untold(f: Finding) -> Finding:
