@@ -12,7 +12,8 @@ from replay.arrays.blocks import blocks
 
 Array = NDArray[np.float64]
 
-READINGS = 3  # on either side of a jump: the middle of them is no spike
+READINGS = 3  # from before a jump to after it; the middle of three is no spike
+_COARSE_READINGS = 1  # the same of readings further apart than `_FINE_S`
 LEAST_RAD, LARGEST_RAD = 0.06, 0.24  # of what a jump is a share: an offset counts whatever the angle
 _FEW = 100  # readings
 _OVERLAP_S = 0.5  # of blocks
@@ -22,7 +23,7 @@ _QUICKER, _SLOWEST = 1.3, 0.1  # times that rate, and rad/s at least
 _NOISES, _STEPS = 8.0, 2.0  # times the noise, and the smallest step, of readings
 _BEYOND = 1.5  # times what an axle may turn meanwhile, and noise may add
 _GAP = 1.5  # times the usual time between readings, over which nothing is said
-_COARSE_S = 0.03  # readings further apart show no jumps
+_FINE_S, _COARSE_S = 0.03, 0.06  # readings further apart than the latter show no jumps
 _MOVING = 0.02  # rad in `_LASTING_S`
 
 
@@ -104,20 +105,24 @@ def _held(t: Array, y: Array) -> float:
 
 def _jumps(t: Array, y: Array, quickest: float) -> Jumps:
     usual, held = float(np.median(np.diff(t))), _held(t, y)
-    if y.size < 2 * READINGS + 1 or held > _COARSE_S:
+    apart = READINGS if usual <= _FINE_S else _COARSE_READINGS
+    if y.size < apart + 4 or held > max(_FINE_S, _BEYOND * usual):
         return Jumps(np.zeros(0), np.zeros(0), np.zeros(0))
     a, b, c = y[:-2], y[1:-1], y[2:]
     middle = np.maximum(np.minimum(a, b), np.minimum(np.maximum(a, b), c))
-    before, after = middle[:-READINGS], middle[READINGS:]
-    span = t[2 * READINGS - 1 :] - t[: -2 * READINGS + 1]
+    before, after = middle[:-apart], middle[apart:]
+    span = t[apart + 2 :] - t[: -apart - 2]
     moved = np.abs(after - before)
     moved = np.where(np.abs(moved - 2.0 * np.pi) < _WRAP, 0.0, moved)
     noise = float(np.median(np.abs(np.diff(y, 2)))) / 0.6745 / np.sqrt(6.0)
     steps = np.abs(np.diff(y))
     step = float(np.min(steps[steps > 0.0], initial=np.inf))
     step = step if np.isfinite(step) else 0.0
-    may = max(_QUICKER * quickest, _SLOWEST) * (READINGS * usual + held) + max(_NOISES * noise, _STEPS * step)
-    whole = span <= _GAP * (2 * READINGS - 1) * usual
+    lapse = held + (
+        apart * usual if usual <= _FINE_S else 0.0
+    )  # a reading is at most as old as the time to the one that differs
+    may = max(_QUICKER * quickest, _SLOWEST) * lapse + max(_NOISES * noise, _STEPS * step)
+    whole = span <= _GAP * (apart + 2) * usual
     found = np.flatnonzero(whole & (moved > _BEYOND * may))
     size = np.clip(np.maximum(np.abs(before), np.abs(after))[found], LEAST_RAD, LARGEST_RAD)
-    return Jumps(moved[found], size, t[READINGS + found])
+    return Jumps(moved[found], size, t[found + 1 + (apart + 1) // 2])

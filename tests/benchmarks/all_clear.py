@@ -8,7 +8,8 @@ mission is
     named             a fault worth an action is on a part that fails; where a machine file is wrong, on any
     wrong part        of what is not named: a fault of severity high on a part that does not fail
     abstained         neither cleared nor named
-    (not counted)     no part that fails was driven, or steered, for three seconds of its fault
+    (not counted)     no part that fails was driven, or steered, for three seconds of its fault; of one that fades, from where
+                      it has lost what counts
 
 Tune on ``--seeds tuning``; the structures of ``reporting`` are others.
 """
@@ -45,7 +46,7 @@ from variation import recorded_signals
 
 from diagnosis.pipeline import diagnose_mission, diagnose_signals
 from replay.errors import MfhcaError
-from replay.machine.config import haulotte
+from replay.machine.config import Limits, haulotte
 from replay.simulation.options import SimulationOptions
 from replay.simulation.run import simulate_mission
 from replay.simulation.structures import STRUCTURES, StructureOptions
@@ -148,8 +149,9 @@ def exercised(t: np.ndarray, asked: Mapping[str, np.ndarray], trouble: Trouble |
     for f in trouble.faults:
         wheel = f.component not in ("front", "rear")
         used = np.abs(asked[f.component]) > _DRIVEN if wheel else np.abs(np.gradient(asked[f.component], t)) > _STEERED
+        counts = f.start_s + f.ramp_s * min(1.0, Limits().clear_at / f.epsilon)  # a fault that grows, from then on
         time[f.component] = time.get(f.component, 0.0) + float(np.mean(np.diff(t))) * float(
-            np.count_nonzero(used & (t >= f.start_s) & (t < f.stop_s))
+            np.count_nonzero(used & (t >= counts) & (t < f.stop_s))
         )
     return any(s >= (_STEERED_S if c in ("front", "rear") else _DRIVEN_S) for c, s in time.items())
 

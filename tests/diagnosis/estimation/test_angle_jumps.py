@@ -69,6 +69,29 @@ def test_rare_readings_show_nothing() -> None:
     assert quickest_of(readings(turned(), FRESH, 0.1)) is None
 
 
+def recorded_at_20_hz(angle: np.ndarray, seed: int = 4) -> tuple[np.ndarray, np.ndarray]:
+    """What a recorder that is up to 20 ms late keeps of an angle, and when, on the steps of `DT`."""
+    rng, out, fresh = np.random.default_rng(seed), np.full(N, np.nan), np.zeros(N, dtype=np.bool_)
+    for k in range(0, N - 5, 5):
+        late = k + int(rng.integers(0, 3))
+        out[late], fresh[late] = angle[k], True
+    return out, fresh
+
+
+def test_a_loss_jumps_at_20_hz_too() -> None:
+    angle = turned()
+    angle[3500:3900] *= 0.6
+    jumps = found(*recorded_at_20_hz(angle))
+    assert {round(t, 1) for t in jumps.at_s} == {35.0, 39.0}
+
+
+@pytest.mark.parametrize("noise", [0.0, 5e-4, 5e-3])
+def test_an_axle_that_turns_does_not_at_20_hz_either(noise: float) -> None:
+    angle = turned(noise=noise)
+    angle[[1000, 2500, 4000]] += 0.3
+    assert found(*recorded_at_20_hz(angle)).size.size == 0
+
+
 def test_blocks_do_not_hide_a_jump(monkeypatch: pytest.MonkeyPatch) -> None:
     angle = turned()
     angle[3000:3300] *= 0.6
