@@ -32,6 +32,10 @@ _FOLLOWS = 0.9  # correlation with the reference of a channel that is neither st
 # that a cause which explains so much is it; of a loss beside an offset that does
 _P, _P_EITHER, _P_OFFSET = 0.95, 0.5, 0.4
 _EARLY_S = 0.5  # by which a piece may begin before what deviates
+_P_FADES, _P_DRIFTS = 0.7, 0.2  # the same of a gain that fades beside a drift
+_P_UNCLEAR, _P_UNCLEAR_DRIFTS = 0.5, 0.1  # and beside other rows as well
+_UNCLEAR = "It stays nearly where it is while its reference moves, so that other rows explain nearly as much."
+_EITHER_DRIFTS = "Its reference hardly changes meanwhile, so that a drift explains as much."
 _EITHER = "Its reference hardly changes meanwhile, so that an offset explains as much."
 _NOTHING_WRONG = Hypothesis("none", State.HEALTHY.value, 1.0 - _P)
 # of the root mean square: a deviation that is no healthy one; of the pieces, that it takes at most
@@ -83,10 +87,14 @@ def _cause_of(near: Sequence[Finding], measured: Measured) -> Cause | None:
         inside[f.start - first : f.stop - first] = True
     y, x = measured.y[first:last], measured.x[first:last]
     inside &= measured.use[first:last] & np.isfinite(y) & np.isfinite(x)
-    least = max(_LEAST, _LEAST_S / measured.dt)
-    if np.count_nonzero(inside) < least:
-        return None
     at = np.flatnonzero(inside)
+    if at.size < _LEAST:
+        return None
+    least = max(
+        _LEAST, _LEAST_S / (measured.dt * float(np.median(np.diff(at))))
+    )  # readings may be further apart than steps
+    if at.size < least:
+        return None
     at = at[:: -(-at.size // _MOST)]
     y, x, at = y[at], x[at], first + at
     if all(f.mode.total for f in near) and _rests(y, np.searchsorted([f.start for f in near], at, "right"), measured):
@@ -137,16 +145,32 @@ def _explanation(y: Array, x: Array, at: NDArray[np.intp], measured: Measured) -
         return replace(losses[0], alone=False) if losses else None
     steady_offset = not best.changes and best.epsilon is None
     if best.left > _LEFT or not _far(min(others, stuck), best, _NEAR if steady_offset else _RIVAL_LEFT):
-        return None
+        return _fading(y, x, found, stuck, measured)
     if not best.late and best.left > _NOTHING and float(np.corrcoef(x, y)[0, 1]) < _FOLLOWS:
         return None
-    both = np.column_stack([x, np.ones(x.size)])  # a loss with a bias is the row of noise
-    rest = power(y - both @ np.linalg.lstsq(both, y, rcond=None)[0], measured) / max(power(y - x, measured), 1e-30)
+    rest = _biased(y, x, measured)
     if best.changes:
-        return best if _far(rest, best, _RIVAL_LEFT) else None
+        return best if _far(rest, best, _RIVAL_LEFT) else _fading(y, x, found, stuck, measured)
     if best.mode is FaultMode.INEFFICIENT and _restless(y, x, measured):
         return None
     return best if best.left < max(_NOTHING, _RIVAL * rest) else None
+
+
+def _biased(y: Array, x: Array, measured: Measured) -> float:
+    """Share of a deviation's power that a loss with a bias leaves, which is the row of noise."""
+    both = np.column_stack([x, np.ones(x.size)])
+    return power(y - both @ np.linalg.lstsq(both, y, rcond=None)[0], measured) / max(power(y - x, measured), 1e-30)
+
+
+def _fading(y: Array, x: Array, found: Sequence[Cause], stuck: float, measured: Measured) -> Cause | None:
+    """A gain that fades and leaves nothing, whatever else may leave as little; None where that is not so."""
+    fades = next(c for c in found if c.changes and c.epsilon is not None)
+    steadily = next(c.left for c in found if c.epsilon is not None and not c.changes)
+    if fades.mode is not FaultMode.INEFFICIENT or fades.left > _NOTHING or not _far(steadily, fades, _RIVAL_LEFT):
+        return None
+    steady = (c.left for c in found if c.mode is not fades.mode and (c.late or not c.changes))
+    far = min(*steady, stuck) > _RIVAL_LEFT and _far(_biased(y, x, measured), fades, _RIVAL_LEFT)
+    return replace(fades, alone=False, clear=far)
 
 
 def _restless(y: Array, x: Array, measured: Measured) -> bool:
@@ -162,10 +186,19 @@ def _far(rival: float, best: Cause, least: float) -> bool:
     return rival >= (max(_FAR * best.left, _FAR_LEFT) if best.left <= _NOTHING else max(_RIVAL * best.left, least))
 
 
+def _said(cause: Cause) -> tuple[float, float, tuple[str, ...]]:
+    """How probable a cause is, and an offset or a drift in its place, and a sentence on its rivals, if it has any."""
+    if cause.alone:
+        return _P, 0.0, ()
+    if not cause.changes:
+        return _P_EITHER, _P_OFFSET, (_EITHER,)
+    return (_P_FADES, _P_DRIFTS, (_EITHER_DRIFTS,)) if cause.clear else (_P_UNCLEAR, _P_UNCLEAR_DRIFTS, (_UNCLEAR,))
+
+
 def _joined(near: Sequence[Finding], cause: Cause) -> Finding:
     """One finding over all pieces."""
     longest = max(near, key=lambda f: f.stop - f.start)
-    p, offset = (_P, 0.0) if cause.alone else (_P_EITHER, _P_OFFSET)
+    p, offset, rival = _said(cause)
     stated = {cause.mode.value, *(() if cause.alone else (FaultMode.OUTSIDE_TABLE.value,))}
     rest = {h.mode: h for h in longest.hypotheses if h.mode not in stated}
     total = sum(h.p for h in rest.values())
@@ -189,6 +222,6 @@ def _joined(near: Sequence[Finding], cause: Cause) -> Finding:
         hypotheses=(named, *sorted(others, key=lambda h: -h.p)),
         epsilon=cause.epsilon,
         sat=None,
-        evidence=(cause.words, *(() if cause.alone else (_EITHER,)), *((pieces,) if len(near) > 1 else ()), *figures),
+        evidence=(cause.words, *rival, *((pieces,) if len(near) > 1 else ()), *figures),
         detected=min(raised, default=None),
     )

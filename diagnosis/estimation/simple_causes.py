@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +19,7 @@ _ABOUT = 0.03  # by which a gain is uncertain, and may be beyond the table
 _LATEST_S, _DELAYS = 1.0, 41
 _USUAL = 0.9  # of the samples
 _OWN = 1.5  # times the noise: a healthy channel's own deviation
+_LATER, _STARTS = 0.5, 11  # of a piece, within which a gain may begin to fade, and moments that are tried
 
 
 @dataclass(frozen=True)
@@ -71,8 +72,8 @@ class Cause:
         What is lost; None: it is no loss.
     changes, late : bool
         Whether it changes with time; whether it is a delay.
-    alone : bool
-        Whether no other one explains as much.
+    alone, clear : bool
+        Whether no other one explains as much; whether none of another row does but such as change likewise.
     start : int or None
         Step where it begins, if later than the pieces.
     """
@@ -85,6 +86,7 @@ class Cause:
     changes: bool = False
     late: bool = False
     alone: bool = True
+    clear: bool = True
     start: int | None = None
 
 
@@ -120,8 +122,12 @@ def causes(y: Array, x: Array, at: NDArray[np.intp], measured: Measured) -> Iter
     when = (at - at[0]) * measured.dt
     shapes = np.column_stack([x, x * when])
     (start, slope), *_ = np.linalg.lstsq(shapes, y, rcond=None)
-    ends = (float(start), float(start + slope * when[-1]))
-    yield _loss(left(y - shapes @ np.array([start, slope])), ends, measured)
+    if start > 1.0 + _ABOUT and slope < 0.0:  # the piece begins too early
+        begins, rest, last = _later(off, x, when)
+        yield replace(_loss(left(rest), (1.0, last), measured), start=int(at[begins]))
+    else:
+        ends = (float(start), float(start + slope * when[-1]))
+        yield _loss(left(y - shapes @ np.array([start, slope])), ends, measured)
     line = np.column_stack([np.ones(at.size), when])
     drift, *_ = np.linalg.lstsq(line, off, rcond=None)
     yield Cause(
@@ -143,6 +149,18 @@ def causes(y: Array, x: Array, at: NDArray[np.intp], measured: Measured) -> Iter
         changes=True,
         late=True,
     )
+
+
+def _later(off: Array, x: Array, when: Array) -> tuple[int, Array, float]:
+    """A gain that fades from 1 on within a piece: where it begins, what it leaves [unit], shape (k,), and the gain at last [1]."""
+    tried = []
+    for begins in np.linspace(0.0, _LATER * when[-1], _STARTS)[1:]:
+        shape = x * np.maximum(when - begins, 0.0)
+        slope = float(shape @ off) / max(float(shape @ shape), 1e-30)
+        rest = off - slope * shape
+        tried.append((float(rest @ rest), int(np.searchsorted(when, begins)), slope * (when[-1] - begins), rest))
+    _, k, lost, rest = min(tried, key=lambda one: one[0])
+    return k, rest, 1.0 + float(lost)
 
 
 def _loss(left: tuple[float, float], gains: tuple[float, float], measured: Measured) -> Cause:

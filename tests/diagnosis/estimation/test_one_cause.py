@@ -146,3 +146,38 @@ def test_a_channel_that_is_held_again_and_again_is_stuck_each_time() -> None:
     near = pieces([(a, b, FaultMode.STUCK) for a, b in spans])
     one = Measured(y, X, np.ones(SIZE, np.bool_), DT, ("a", "b"), "m/s", NOISE, 0.02)
     assert with_one_cause(near, one) == near
+
+
+def short(gain: Array, x: Array, every: int = 1) -> list[Finding]:
+    """What is found of a noisy piece of three seconds, with a reading every so many steps."""
+    use = np.zeros(SIZE, np.bool_)
+    use[::every] = True
+    y = np.where((T >= 10.0) & (T < 13.0), gain * x, x) + NOISE * RNG.standard_normal(SIZE)
+    return with_one_cause(
+        pieces([(1000, 1300, FaultMode.NOISY)]), Measured(y, x, use, DT, ("a", "b"), "m/s", NOISE, 0.02)
+    )
+
+
+@pytest.mark.parametrize("every", [1, 5])
+def test_a_short_fade_at_a_steady_speed_may_be_a_drift_and_is_no_noise(every: int) -> None:
+    (found,) = short(1.0 - 0.2 * (T - 10.0), 0.8 + 0.02 * np.sin(3.0 * T), every)
+    assert (found.mode, found.probability) == (FaultMode.INEFFICIENT, pytest.approx(0.7))
+    assert "a drift explains as much" in found.evidence[1]
+    assert {h.mode: h.p for h in found.hypotheses}[FaultMode.OUTSIDE_TABLE] == pytest.approx(0.2)
+
+
+def test_a_fade_that_a_controller_makes_up_for_is_unclear() -> None:
+    gain = 1.0 - 0.2 * np.clip(T - 10.0, 0.0, 3.0)
+    (found,) = short(gain, 0.5 / gain)
+    assert (found.mode, found.probability) == (FaultMode.INEFFICIENT, pytest.approx(0.5))
+    assert "other rows explain nearly as much" in found.evidence[1]
+    assert sum(h.p for h in found.hypotheses) == pytest.approx(1.0)
+
+
+def test_a_fade_begins_within_its_piece() -> None:
+    gain = 1.0 - 0.25 * np.maximum(T - 11.0, 0.0)
+    (found,) = short(gain, 0.7 + 0.25 * np.sin(2.0 * T))
+    assert found.mode is FaultMode.INEFFICIENT
+    assert 1080 <= found.start <= 1130
+    assert found.epsilon is not None
+    assert found.epsilon.high == pytest.approx(0.53, abs=0.03)
