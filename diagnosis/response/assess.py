@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -22,13 +22,14 @@ from diagnosis.response.common_cause import (
 from diagnosis.response.drive import as_a_peer, by_peers, unanswered
 from diagnosis.response.effort import idle_drives, idle_spans, own_pull, powered, shares_of
 from diagnosis.response.findings import Wheel
+from diagnosis.response.ground import by_drag, by_slip
 from diagnosis.response.gyro import wrong_gyro
 from diagnosis.response.identification import Response, identify_response, without_command
 from diagnosis.response.inputs import FollowerData, cell_of, cells
 from diagnosis.response.joint import cut, joint_of
 from diagnosis.response.jumps import jumps_of
 from diagnosis.response.kernel import posterior
-from diagnosis.response.late import late_neighbour, late_wheels, smallest_delay
+from diagnosis.response.late import late_neighbour, late_wheels, left_open, smallest_delay
 from diagnosis.response.machine import Judged, lasting_losses, otherwise, standstills, unexplained, unlike
 from diagnosis.response.models import (
     BLOCK_S,
@@ -144,6 +145,8 @@ def assess_response(
             and not told_and_doing_alike(s, w, judged)
             and not consequence(s, w, judged)
             and not wrong_yaw_rate(s, j)
+            and not by_slip(s, w, judged, bodies.yaw)
+            and not by_drag(s, w, judged)
         ]
         for w, j in judged.items()
     }
@@ -168,10 +171,13 @@ def assess_response(
     }
     weak = {w: without_consequences(found, w, judged, width) for w, found in weak.items()}
     late = late_wheels(judged, width * dt)
+    unclear = left_open(late, judged)
+    late = {w: [f for f in found if f not in unclear[w]] for w, found in late.items()}
     kept = {w: [x for x in spells if not late_neighbour(x, w, late, width)] for w, spells in kept.items()}
     parts = {
         w: sides_of(j, kept[w], (weak[w], late[w]), (left_out[w], together), limits, dt) for w, j in judged.items()
     }
+    parts = {w: (_left_open(sensor, unclear[w]), drive) for w, (sensor, drive) in parts.items()}
     astray, lasts = otherwise(judged, width * dt)
     remarks = (*astray, *left_notes)
     doubts = {w: j.joint.unlike for w, j in judged.items() if j.joint is not None and j.joint.unlike}
@@ -184,7 +190,11 @@ def assess_response(
         delay, told = smallest_delay(j, width * dt)
         powers = powers._replace(rows=(*powers.rows, delay))
         parts[w] = replace(sensor, powers=powers, notes=(*sensor.notes, told, *remarks)), drive
-    gyro = wrong_gyro(judged, kept, turning, width * dt)
+    unsettled = {
+        w: [*kept[w], *(s for s in j.spells if not wrong_yaw_rate(s, j) and by_slip(s, w, judged, bodies.yaw))]
+        for w, j in judged.items()
+    }
+    gyro = wrong_gyro(judged, unsettled, turning, width * dt)
     ignored = () if any(j.response.answered for j in judged.values()) else unexplained(drives, limits, dt)
     return Judgement(parts, (*standstills(idle, dt), *(astray if lasts else ()), *ignored), gyro)
 
@@ -199,6 +209,15 @@ def _doubted(sensor: Assessment, why: str) -> Assessment:
     """A sensor of which nothing healthy can be said."""
     states = np.where(sensor.states == CODE[State.HEALTHY], CODE[State.NOT_ASSESSED], sensor.states).astype(np.int8)
     return replace(sensor, states=states, reasons={**sensor.reasons, State.NOT_ASSESSED: why})
+
+
+def _left_open(sensor: Assessment, unclear: Sequence[Finding]) -> Assessment:
+    """A sensor that is not healthy at times of which the ground may be the cause."""
+    states = sensor.states.copy()
+    for f in unclear:
+        part = states[f.start : f.stop]
+        part[part == CODE[State.HEALTHY]] = CODE[State.NOT_ASSESSED]
+    return replace(sensor, states=states)
 
 
 def _wheels(

@@ -6,12 +6,13 @@ rate beside the wheels of the other side, or a sensor of the body, shows as well
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.response.beside import same_side
+from diagnosis.response.ground import dragged
 from diagnosis.response.identification import Response, as_another
 from diagnosis.response.inputs import cells
 from diagnosis.response.jumps import falls_dead
@@ -37,7 +38,10 @@ _CLOSER = (
     0.5  # of the misfit beside the command: so much less is that beside the other view, and that of the other wheels
 )
 _GAP_S, _LEAST_S = 0.75, 2.0
+_GAP_BLOCKS, _TWICE = 3, 2  # blocks near its command that a time off it may have; times that are a habit
 _MUCH_S = 0.4, 0.8, 1.6  # of the top speed, missing for as long
+_DRAGGED = 4.0  # the same, where the other side holds it back, or drags it along, as it does elsewhere
+_HABIT = 2.0  # times what other drives miss of their commands now and then: as much is a load, or the ground
 _P = 0.8, 0.9, 0.95  # that the drive is at fault, by how much is missing
 _ALONE_P = 0.6  # that a single drive is at fault, not its commands
 _STANDS, _FULL = 0.1, 0.9  # of what the command makes it do
@@ -133,9 +137,11 @@ def unanswered(
     beside = np.nan_to_num(np.abs(blocks.mean - view.speed), nan=np.inf)
     top = float(np.nanquantile(np.abs(np.r_[blocks.low, blocks.high]), 0.95))
     there = off > np.maximum(_FAR * blocks.noise, _OFF_OF_TOP * top)
+    habit = _habit(there, off, [j.wheel.blocks for w, j in judged.items() if w != wheel], top)
     there &= (beside < _AGREES * np.nan_to_num(view.noise)) & (beside < _CLOSER * off)
     there &= np.logical_and.reduce([x < _CLOSER * off for x in others]) if others else True
     there &= _off_asked(one, block_s) > _CLOSER * off
+    there &= ~_eager(one, blocks)
     # where all wheels stand the machine stands, and one of them is no worse than the others
     there &= np.nanmax([np.abs(np.nan_to_num(j.wheel.blocks.mean)) for j in judged.values()], axis=0) > _MOVES * top
     # where all of them do something else their commands are ignored, or held, and each may meet its own by chance
@@ -147,10 +153,31 @@ def unanswered(
         if np.count_nonzero(all_off[max(0, start - reach) : stop + reach]) * block_s >= _ASTRAY_S:
             continue
         much = float(np.sum(off[start:stop][there[start:stop]])) * block_s / top
+        held = dragged(slice(start, stop), wheel, judged, 0.0)
+        if much < (_DRAGGED if held else _HABIT) * habit * block_s:
+            continue
         long = (stop - start) * block_s >= _LEAST_S and np.mean(there[start:stop]) > 0.5 and much > least
         if long and _proven(one, beside / top, slice(max(0, start - reach // 2), stop + reach // 2)):
             found.append(_finding(one, blocks, view, (start, stop), much, block_s, alike=len(judged) > _PAIR))
     return found
+
+
+def _habit(astray: Flags, off: Array, others: Sequence[Blocks], top: float) -> float:
+    """What other drives miss of their commands more than once, over the time that it is missing and by the top speed [blocks].
+
+    Sides drag each other along, and turn each other back. Times in which the wheel itself misses more are left out: these are its doing.
+
+    `astray`, `off` of shape (b,): where the wheel in question is off its command, and how far [m/s]; `top` in m/s.
+    """
+    own = [(a, b, float(np.sum(off[a:b]))) for a, b in _spans(astray, _GAP_BLOCKS)]
+    least = 0.0
+    for blocks in others:
+        away = np.nan_to_num(_off(blocks))
+        spans = _spans(away > np.maximum(_FAR * blocks.noise, _OFF_OF_TOP * top), _GAP_BLOCKS)
+        missed = [(a, b, float(np.sum(away[a:b]))) for a, b in spans]
+        alone = [m for a, b, m in missed if not any(c < b and a < d and much > m for c, d, much in own)]
+        least = max([least, *sorted(alone)[-_TWICE:][:1]]) if len(alone) >= _TWICE else least
+    return least / top
 
 
 def _proven(one: Judged, apart: Array, around: slice) -> bool:
@@ -175,6 +202,13 @@ def _off_asked(one: Judged, block_s: float) -> Array:
     recent = [np.r_[np.full(k, np.nan), asked[: asked.size - k]] for k in range(back + 1)]
     low, high = (pick.reduce(recent) for pick in (np.fmin, np.fmax))
     return np.nan_to_num(np.abs(blocks.mean - np.clip(blocks.mean, low, high)), nan=np.inf)
+
+
+def _eager(one: Judged, blocks: Blocks) -> Flags:
+    """Blocks in which a drive is nearer to what it is asked for than its usual limit lets it be: it has less of a load."""
+    asked = cells(one.data.asked, int(blocks.start[1]) if blocks.start.size > 1 else 1)
+    low, high = np.fmin(blocks.low, asked), np.fmax(blocks.high, asked)
+    return np.asarray((blocks.mean >= low) & (blocks.mean <= high))
 
 
 _AT_ONCE = (

@@ -27,6 +27,7 @@ _BY_BODY = 0.08  # that it is the sensor's although the body turns as the readin
 _LEAST_PULLS, _AS_USUAL = 8, (0.6, 1.5)  # blocks with an effort, and its size by the usual one
 _CHANGES = 0.1  # of the readings, as a dead sensor's do not
 _MOVING = 0.2  # of the usual speed
+_CREEPS = 0.03  # of the top speed
 _SHARP_S = 0.012  # between readings: a wheel that jams, or comes free, takes longer
 _WHOLE = 0.75  # of the speed: what rises, or falls, by less from one reading to the next is no whole jump
 _IN_SHARE, _VARIES = 0.06, 0.2  # misfit of a share of another speed, by its own size, and how much that speed varies
@@ -124,13 +125,15 @@ def _stuck(spell: Spell, wheel: Wheel, first: int, last: int) -> Finding | None:
     return sensor_finding(begin, end, FaultMode.STUCK, spell.p * SENSOR_SHARE, Epsilon(1.0, 1.0, 1.0), sat, (text,))
 
 
-def _silent(spell: Spell, wheel: Wheel, first: int, last: int, speed: Array | None) -> Finding:
+def _silent(spell: Spell, wheel: Wheel, first: int, last: int, speed: Array | None) -> Finding | None:
     part = slice(spell.start, spell.stop)
     middle = 0.5 * (wheel.blocks.low + wheel.blocks.high) if speed is None else speed
     fell = _whole_jump(wheel, middle, first, 0.0)
     rose = _whole_jump(wheel, middle, last, np.inf)
     begin = first if fell is None else int(wheel.samples.step[fell])
     end = last if rose is None else int(wheel.samples.step[rose])
+    if fell is None and rose is None and _asked_little(wheel, part) and _lives(wheel, begin, end):
+        return None
     texts = [f"{wheel.name} read 0 for {(end - begin) * wheel.dt:.2f} s while its command asked for motion."]
     # a wheel that comes free leaps ahead, for its loop has wound up
     sensor = _by_jumps(wheel, 0 if fell is None else 1 + (rose is not None))
@@ -173,6 +176,15 @@ def _silent(spell: Spell, wheel: Wheel, first: int, last: int, speed: Array | No
     return sensor_finding(
         begin, max(end, begin + 1), FaultMode.NO_SIGNAL, spell.p, Epsilon(1.0, 1.0, 1.0), sat, tuple(texts), sensor
     )
+
+
+def _asked_little(wheel: Wheel, part: slice) -> bool:
+    """Whether the command asks for less than this drive usually misses it by, or for hardly anything: friction holds such a wheel."""
+    b = wheel.blocks
+    low, high = b.low[part], b.high[part]
+    known = np.isfinite(low) & np.isfinite(high)
+    least = np.maximum(b.noise[part], _CREEPS * float(np.nanquantile(np.abs(b.mean), 0.95)))
+    return bool(known.any() and np.mean((np.abs(low + high) < 2.0 * least)[known]) > _EITHER)
 
 
 def _lives(wheel: Wheel, begin: int, end: int) -> bool:
@@ -224,7 +236,8 @@ def _whole_jump(wheel: Wheel, expected: Array, at: int, ratio: float) -> int | N
 
 def _noisy(spell: Spell, wheel: Wheel, first: int, last: int) -> Finding | None:
     part = slice(spell.start, spell.stop)
-    if np.median(wheel.blocks.rough[part] / wheel.blocks.usual[part]) < _LOUD:
+    came = wheel.blocks.readings[part] > 0  # a gap is neither loud nor quiet
+    if np.median((wheel.blocks.rough[part] / wheel.blocks.usual[part])[came]) < _LOUD:
         return None  # what shakes other wheels too, or hardly more than usual, is no sensor's noise
     inside = (wheel.samples.step >= first) & (wheel.samples.step < last)
     rms = float(np.sqrt(np.mean(wheel.samples.white[inside] ** 2)))

@@ -54,7 +54,7 @@ def wrong_gyro(
     judged : Mapping[str, Judged]
         All wheels.
     faults : Mapping[str, Sequence[Spell]]
-        What is known of the wheels: these times are left out.
+        What is known of the wheels, or may be the ground: these times are left out.
     turning : Turning or None
         How the body is turned.
     block_s : float

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.response.common_cause import evident, overlaps
+from diagnosis.response.ground import dragged
 from diagnosis.response.kernel import posterior
 from diagnosis.response.machine import Judged
 from diagnosis.response.spells import Spell
@@ -37,6 +38,7 @@ _LEAST_P, _LEAST_S = 0.8, 3.0
 _SURE = 0.95
 _OWN = 0.95  # that it is the sensor's where another view shows how this wheel turns
 _LENGTH_S = 10.0
+_GROUND_S = 20.0  # for which the ground may hold a wheel up: a few manoeuvres
 
 
 class Past(NamedTuple):
@@ -188,6 +190,19 @@ def late_neighbour(spell: Spell, wheel: str, late: Mapping[str, Sequence[Finding
     )
 
 
+def left_open(late: Mapping[str, Sequence[Finding]], judged: Mapping[str, Judged]) -> dict[str, list[Finding]]:
+    """Of times in which a speed comes late, those that the ground explains: nothing healthy can be said of them, either.
+
+    Parameters
+    ----------
+    late : Mapping[str, Sequence[Finding]]
+        Times by wheel.
+    judged : Mapping[str, Judged]
+        All wheels.
+    """
+    return {w: [f for f in found if _by_ground(f, w, judged)] for w, found in late.items()}
+
+
 def late_wheels(judged: Mapping[str, Judged], block_s: float) -> dict[str, list[Finding]]:
     """Times in which the speed of each wheel comes late.
 
@@ -213,6 +228,20 @@ def late_wheels(judged: Mapping[str, Judged], block_s: float) -> dict[str, list[
             and not any(overlaps(span, (f.start, f.stop)) for span in others)
         ]
     return out
+
+
+def _by_ground(found: Finding, wheel: str, judged: Mapping[str, Judged]) -> bool:
+    """Whether a wheel only gives way to the other side, which takes a while, or is at once what it is told: then tyres slip, or a body spins on."""
+    one = judged[wheel]
+    width = int(one.wheel.blocks.start[1])
+    part = slice(found.start // width, -(-found.stop // width))
+    if (part.stop - part.start) * width * one.wheel.dt > _GROUND_S:
+        return False
+    if not one.response.answered or (one.speed is not None and one.across is None):
+        return False
+    by_command, block_s = pasts_of(one._replace(speed=None), width * one.wheel.dt), width * one.wheel.dt
+    score = scores(one.wheel.blocks.mean, by_command, block_s)[part].sum(axis=0)
+    return bool(score[0] >= score[1:-1].max()) or dragged(part, wheel, judged, 0.0)
 
 
 def _beside_sound(wheel: str, judged: Mapping[str, Judged]) -> Judged:
