@@ -38,7 +38,6 @@ _LEAST_P, _LEAST_S = 0.8, 3.0
 _SURE = 0.95
 _OWN = 0.95  # that it is the sensor's where another view shows how this wheel turns
 _LENGTH_S = 10.0
-_GROUND_S = 20.0  # for which the ground may hold a wheel up: a few manoeuvres
 
 
 class Past(NamedTuple):
@@ -235,8 +234,6 @@ def _by_ground(found: Finding, wheel: str, judged: Mapping[str, Judged]) -> bool
     one = judged[wheel]
     width = int(one.wheel.blocks.start[1])
     part = slice(found.start // width, -(-found.stop // width))
-    if (part.stop - part.start) * width * one.wheel.dt > _GROUND_S:
-        return False
     if not one.response.answered or (one.speed is not None and one.across is None):
         return False
     by_command, block_s = pasts_of(one._replace(speed=None), width * one.wheel.dt), width * one.wheel.dt
