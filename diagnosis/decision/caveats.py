@@ -96,7 +96,7 @@ def smallest_loads(assessments: Mapping[Part, Assessment], words: MachineWords) 
 def by_model(assessments: Mapping[Part, Assessment], shown: Sequence[Detectable], words: MachineWords) -> str:
     """What limits parts that a wheel model of this mission judged, with the losses of ten seconds that it would have shown of them."""
     judged = {part for part, a in assessments.items() if a.tier is Tier.MODEL}
-    said = []
+    said, sizes_known = [], False
     for side, name in ((Side.SENSOR, "sensor"), (Side.ACTUATOR, words.drive)):
         about = (Kind.WHEEL, side, Deviation.INEFFICIENT, _TOLD_S)
         rows = [
@@ -105,15 +105,16 @@ def by_model(assessments: Mapping[Part, Assessment], shown: Sequence[Detectable]
             if (r.component, r.side.value) in judged and (r.kind, r.side, r.deviation, r.for_s) == about
         ]
         said += [f"of a {name} {_from_size([r.size for r in rows])}"] if rows else []
-    sizes = f"A loss that lasts ten seconds shows in 95 of 100 places: {join_words(said)}. " if said else ""
-    if said and all(x.endswith(_NEVER) for x in said):
-        sizes = "Of losses that last ten seconds none, however large, shows in 95 of 100 places. "
+        sizes_known |= any(r.size for r in rows)
+    sizes = f"A loss of theirs that lasts ten seconds shows in 95 of 100 places: {join_words(said)}. " if said else ""
+    if said and not sizes_known:
+        sizes = "A loss of theirs that lasts only ten seconds need not show, however large. "
     return (
         words.fill(
             "Sensors and {valve}s without a second measurement were judged by a {wheel} model identified from this mission. "
         )
         + f"{sizes}A loss that lasts the whole mission on every {words.part} does not show. A second measurement would show more; "
-        "a machine file with [plant], as `mfhca fit` writes it, shows the last."
+        "a machine file with [plant], as `mfhca fit` writes it, shows a loss on all of them, too."
     )
 
 

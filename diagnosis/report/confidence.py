@@ -79,6 +79,9 @@ def _judged_words(share: float, moving: str) -> str:
     return f"{_share(share)} of its {moving} was judged"
 
 
+_OF_A_FAULT = re.compile(r"F\d+: ")
+
+
 def _likely(p: float) -> str:
     return next((words for least, words in _WORDS if round(p, 3) >= least), "Possible" if p < 0.5 else "Probable")
 
@@ -133,6 +136,8 @@ def _cleared(report: ReportDocument) -> list[tuple[str, str]]:
     }
     named: set[str] = set()
     for row in verdict["to_clear"]:
+        if _OF_A_FAULT.match(row["reason"]):
+            continue  # its part is among the faulty ones
         mine = {
             c for c in components if re.search(rf"(?<!\w){re.escape(c.removesuffix('_steer'))}(?!\w)", row["reason"])
         }

@@ -195,11 +195,20 @@ def test_a_model_of_this_mission_says_what_it_does_not_show() -> None:
     model = WheelModelFit((None,) * 4, 0.02, 30, reliable=True, note="")
     (words,) = verdict(parts, model=model).caveats
     assert "95 of 100" not in words
-    rows = [
-        Detectable(Kind.WHEEL, w, side, Deviation.INEFFICIENT, 10.0, size, "1", None, 9, side)
-        for side, sizes in ((Side.SENSOR, (0.12, 0.31, 0.2, 0.2)), (Side.ACTUATOR, (0.4, None, None, 0.4)))
-        for w, size in zip(MACHINE.wheels, sizes, strict=True)
-    ]
+
+    def shown(of_sensors: tuple[float | None, ...], of_valves: tuple[float | None, ...]) -> list[Detectable]:
+        return [
+            Detectable(Kind.WHEEL, w, side, Deviation.INEFFICIENT, 10.0, size, "1", None, 9, side)
+            for side, sizes in ((Side.SENSOR, of_sensors), (Side.ACTUATOR, of_valves))
+            for w, size in zip(MACHINE.wheels, sizes, strict=True)
+        ]
+
+    none = (None,) * 4
+    (some,) = verdict(parts, model=model, shown=shown((0.37, None, None, None), none)).caveats
+    assert "of a sensor from 37 %, on 1 of 2 at no size" in some
+    (nothing,) = verdict(parts, model=model, shown=shown(none, none)).caveats
+    assert "need not show, however large" in nothing
+    rows = shown((0.12, 0.31, 0.2, 0.2), (0.4, None, None, 0.4))
     (told,) = verdict(parts, model=model, shown=rows).caveats
     assert "of a sensor from 12 to 31 % (by part) and of a valve from 40 %, on 1 of 2 at no size" in told
     assert verdict(parts, model=replace(model, identified=False)).caveats == ()

@@ -121,6 +121,10 @@ def test_parts_that_were_judged_and_those_that_were_cleared_are_counted_apart() 
     about = {"status": "watch", "cleared": True, "to_clear": []}
     found = samples.report_with(coverage=rows, intervals=[watched], verdict=about)
     assert judged(found) == "4 of 4 parts judged, 3 cleared"
+    about["to_clear"] = [{"reason": "F1: the FR speed sensor may have lost 51 %.", "act": "repair it"}]
+    assert judged(samples.report_with(coverage=rows, intervals=[watched], verdict=about)) == (
+        "4 of 4 parts judged, 3 cleared"
+    )
     about["to_clear"] = [{"reason": "The speed of FL per opening falls below the others' by 30 %.", "act": "lift it"}]
     assert judged(samples.report_with(coverage=rows, intervals=[watched], verdict=about)) == (
         "4 of 4 parts judged, 1 cleared"

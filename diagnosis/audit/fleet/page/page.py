@@ -65,7 +65,8 @@ _DEFINITIONS = (
     "Outliers (×) are excluded. A step or bend (↓ ↑ ∠), such as a repair, starts a new line. "
     "The band is its 90 % interval, the bar on the limit the 90 % interval of the crossing.",
     "The limit of ε̂ is the loss from which on a report states a fault to watch. A loss alone is no reason to stop, so a machine with one may go "
-    "out; one whose loss is beyond the limit for certain, though no report states the fault, is not known to be fit to.",
+    "out, unless the part may have lost half or more; one whose loss is beyond the limit for certain, though no report states the fault, is not "
+    "known to be fit to.",
     "A forecast needs five missions since the last change, and reaches at most three times as far ahead as the time that "
     "they cover. It gives the time at which the mean of missions reaches the limit if wear continues at this rate.",
     "Copies of a log count once, and for one machine: that in whose folder an audit saw the log first.",
