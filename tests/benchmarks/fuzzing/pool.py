@@ -9,33 +9,25 @@ import re
 import shutil
 import signal
 import sys
+import threading
 import time
-from collections import Counter
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
 from pathlib import Path
 from typing import Any
 
+from tests.benchmarks.fuzzing import watch
 from tests.benchmarks.fuzzing.case import Sample
 from tests.benchmarks.fuzzing.formats import TARGETS
+from tests.benchmarks.fuzzing.tally import Score
+from tests.benchmarks.fuzzing.watch import Watch, taken_by
 from tests.benchmarks.fuzzing.worker import Answer, input_of, lay_out, sound_samples, work
 
-HANG_CPU_S, HANG_WALL_S = 10.0, 60.0
 BATCH, KEPT = 200, 3
 _CONTEXT = multiprocessing.get_context("fork")
-_TICKS = os.sysconf("SC_CLK_TCK")
-
-
-@dataclass
-class Score:
-    """What was counted of one format."""
-
-    inputs: int = 0
-    cpu_s: float = 0.0
-    slowest_s: float = 0.0
-    outcomes: Counter[str] = field(default_factory=Counter)
-    findings: Counter[str] = field(default_factory=Counter)
+_UNWATCHED = ("starting", "making", "compiling")
 
 
 @dataclass
@@ -48,7 +40,7 @@ class Slot:
     link: Connection | None = None
     todo: list[int] = field(default_factory=list)
     since: float = 0.0
-    cpu_at: float = 0.0
+    watch: Watch = field(default_factory=Watch)
     stage: str = ""
 
 
@@ -63,16 +55,45 @@ class Pool:
         self._spent = dict.fromkeys(names, 0.0)
         self._slots = [Slot(k) for k in range(jobs)]
         self._samples: dict[str, list[Sample]] = {}
+        self._ended = threading.Event()
         for name in names:  # here, so that workers are forked with what was loaded and compiled for them
             place = folder / f"corpus-{name}"
             place.mkdir()
             self._samples[name] = sound_samples(TARGETS[name](), place)
 
-    def run(self, seconds: float, most: int) -> None:
-        """Run for a time, or until each format had its number of inputs."""
+    def stop(self) -> None:
+        """End a run soon; what was counted is kept, what a worker is reading is not. Fit for a handler of signals."""
+        self._ended.set()
+
+    @property
+    def stopped(self) -> bool:
+        """Whether somebody asked for an end."""
+        return self._ended.is_set()
+
+    def cpu_s(self) -> float:
+        """Time of a processor of all that was done: making, reading and checking [s]."""
+        return sum(os.times()[:4]) + sum(map(_cpu, self._slots))
+
+    def run(self, seconds: float, most: int, tell: Callable[[], None] = lambda: None) -> None:
+        """Run for a time, or until each format had its number of inputs, or until it is stopped.
+
+        Parameters
+        ----------
+        seconds : float
+            How long inputs are given out [s].
+        most : int
+            Inputs of each format.
+        tell : Callable
+            Called a few times a second.
+
+        Raises
+        ------
+        RuntimeError
+            Where a worker ends while it makes an input.
+        """
         end = time.monotonic() + seconds
         try:
-            while time.monotonic() < end or any(slot.todo for slot in self._slots):
+            while not self.stopped and (time.monotonic() < end or any(slot.todo for slot in self._slots)):
                 for slot in self._slots:
                     if not slot.todo and time.monotonic() < end:
                         self._give(slot, most)
@@ -83,6 +104,7 @@ class Pool:
                     self._take(next(s for s in self._slots if s.link is link))
                 for slot in self._slots:
                     self._watch(slot)
+                tell()
         finally:
             for slot in self._slots:
                 self._stop(slot)
@@ -113,7 +135,7 @@ class Pool:
     def _send(self, slot: Slot) -> None:
         assert slot.link is not None
         slot.link.send(slot.todo)
-        slot.since, slot.cpu_at, slot.stage = time.monotonic(), _cpu(slot), "starting"
+        slot.since, slot.stage, slot.watch = time.monotonic(), "starting", Watch()
 
     def _take(self, slot: Slot) -> None:
         assert slot.link is not None
@@ -122,9 +144,11 @@ class Pool:
                 got: Any = slot.link.recv()
                 if slot.stage != "starting":
                     self._spent[slot.name] += time.monotonic() - slot.since
-                slot.since, slot.cpu_at = time.monotonic(), _cpu(slot)
+                slot.since = time.monotonic()
                 if isinstance(got, str):
                     slot.stage = got
+                    if got not in _UNWATCHED:
+                        slot.watch = Watch(_cpu(slot))
                     continue
                 slot.stage = "making"
                 slot.todo.remove(got["number"])
@@ -133,15 +157,14 @@ class Pool:
             self._lost(slot, "crash")
 
     def _watch(self, slot: Slot) -> None:
-        if slot.process is None or not slot.todo or slot.stage in ("starting", "making"):
+        if slot.process is None or not slot.todo or slot.stage in _UNWATCHED:
             return
-        busy, waited = _cpu(slot) - slot.cpu_at, time.monotonic() - slot.since
-        if busy > HANG_CPU_S or waited > HANG_WALL_S:
-            assert slot.process.pid is not None
+        assert slot.process.pid is not None
+        if kind := slot.watch.over(taken_by(slot.process.pid)):
             os.kill(slot.process.pid, signal.SIGUSR1)
             time.sleep(0.2)
             os.kill(slot.process.pid, signal.SIGKILL)
-            self._lost(slot, "hang")
+            self._lost(slot, kind)
 
     def _lost(self, slot: Slot, kind: str) -> None:
         """Record the input that a worker died of, and start another worker with the rest."""
@@ -149,16 +172,17 @@ class Pool:
         slot.process.join(5)
         code, number = slot.process.exitcode, slot.todo.pop(0)
         trace = (self.folder / f"worker-{slot.number}.trace").read_text(errors="replace")
-        if slot.stage in ("starting", "making") and kind == "crash":
+        if slot.stage in _UNWATCHED and kind == "crash":
             raise RuntimeError(f"{slot.name} {self.seed}:{number}: the worker ended (exit code {code}): {trace}")
         what = {
-            "hang": f"no end after {HANG_CPU_S:g} s of a processor",
+            "hang": f"no end after {watch.HANG_CPU_S:g} s of a processor",
+            "waited": f"no end after {watch.WAITED_S:g} s asleep",
             "crash": f"the interpreter died (exit code {code})",
         }
         if slot.stage == "checking":
             kind, what["peer"] = "peer", "another library hangs or dies"
         answer = Answer(
-            number=number, sample="", what="", outcome=kind, cpu_s=HANG_CPU_S if kind == "hang" else 0.0,
+            number=number, sample="", what="", outcome=kind, cpu_s=watch.HANG_CPU_S if kind == "hang" else 0.0,
             kind="" if kind == "peer" else kind, text=what[kind], trace=trace,
         )  # fmt: skip
         self._count(slot.name, answer)
@@ -200,13 +224,7 @@ class Pool:
 
 
 def _cpu(slot: Slot) -> float:
-    """Seconds of a processor that a worker has taken."""
-    try:
-        assert slot.process is not None
-        fields = Path(f"/proc/{slot.process.pid}/stat").read_text().rpartition(")")[2].split()
-    except (OSError, AssertionError):
-        return 0.0
-    return (int(fields[11]) + int(fields[12])) / _TICKS
+    return taken_by(slot.process.pid).cpu_s if slot.process is not None and slot.process.pid is not None else 0.0
 
 
 def _mark(answer: Answer) -> str:
