@@ -22,7 +22,7 @@ from tests.benchmarks.fuzzing import watch
 from tests.benchmarks.fuzzing.case import Sample
 from tests.benchmarks.fuzzing.formats import TARGETS
 from tests.benchmarks.fuzzing.tally import Score
-from tests.benchmarks.fuzzing.watch import Watch, taken_by
+from tests.benchmarks.fuzzing.watch import Watch, end, taken_by
 from tests.benchmarks.fuzzing.worker import Answer, input_of, lay_out, sound_samples, work
 
 BATCH, KEPT = 200, 3
@@ -91,11 +91,11 @@ class Pool:
         RuntimeError
             Where a worker ends while it makes an input.
         """
-        end = time.monotonic() + seconds
+        until = time.monotonic() + seconds
         try:
-            while not self.stopped and (time.monotonic() < end or any(slot.todo for slot in self._slots)):
+            while not self.stopped and (time.monotonic() < until or any(slot.todo for slot in self._slots)):
                 for slot in self._slots:
-                    if not slot.todo and time.monotonic() < end:
+                    if not slot.todo and time.monotonic() < until:
                         self._give(slot, most)
                 links = [slot.link for slot in self._slots if slot.link is not None and slot.todo]
                 if not links:
@@ -125,12 +125,12 @@ class Pool:
         self._send(slot)
 
     def _start(self, slot: Slot) -> None:
-        slot.link, end = _CONTEXT.Pipe()
+        slot.link, far = _CONTEXT.Pipe()
         place = self.folder / f"worker-{slot.number}"
-        arguments = (end, slot.name, self._samples[slot.name], place, self.seed)
+        arguments = (far, slot.name, self._samples[slot.name], place, self.seed)
         slot.process = _CONTEXT.Process(target=work, args=arguments, daemon=True)
         slot.process.start()
-        end.close()
+        far.close()
 
     def _send(self, slot: Slot) -> None:
         assert slot.link is not None
@@ -163,7 +163,7 @@ class Pool:
         if kind := slot.watch.over(taken_by(slot.process.pid)):
             os.kill(slot.process.pid, signal.SIGUSR1)
             time.sleep(0.2)
-            os.kill(slot.process.pid, signal.SIGKILL)
+            end(slot.process.pid)
             self._lost(slot, kind)
 
     def _lost(self, slot: Slot, kind: str) -> None:
@@ -218,7 +218,8 @@ class Pool:
         if slot.link is not None:
             slot.link.close()
         if slot.process is not None:
-            slot.process.kill()
+            if slot.process.pid is not None:
+                end(slot.process.pid)
             slot.process.join()
         slot.process = slot.link = None
 

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import os
+import signal
 import time
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -53,7 +55,7 @@ class Watch:
 def taken_by(pid: int) -> Taken:
     """Of a process and all below it; nothing where it is gone."""
     cpu_s, sleeping = 0.0, True
-    for one in (pid, *_below(pid)):
+    for one in (pid, *below(pid)):
         if fields := _fields(Path(f"/proc/{one}/stat")):
             cpu_s += sum(map(int, fields[11:15])) / _TICKS
         for path in Path(f"/proc/{one}/task").glob("*/stat"):
@@ -62,15 +64,23 @@ def taken_by(pid: int) -> Taken:
     return Taken(cpu_s, sleeping)
 
 
-def _below(pid: int) -> list[int]:
+def below(pid: int) -> list[int]:
+    """Processes that a process has started, and those that they have."""
     out = []
     for path in Path(f"/proc/{pid}/task").glob("*/children"):
         try:
             children = [int(word) for word in path.read_text(encoding="ascii").split()]
         except OSError:
             continue
-        out += [one for child in children for one in (child, *_below(child))]
+        out += [one for child in children for one in (child, *below(child))]
     return out
+
+
+def end(pid: int) -> None:
+    """End a process and all below it."""
+    for one in (*below(pid), pid):
+        with suppress(ProcessLookupError):
+            os.kill(one, signal.SIGKILL)
 
 
 def _fields(path: Path) -> list[str]:
