@@ -110,19 +110,46 @@ def test_the_fuzzer_notices_and_goes_on(
 
 
 def test_waiting_for_a_processor_is_neither_a_hang_nor_sleep(monkeypatch: pytest.MonkeyPatch) -> None:
-    at = 0.0
+    at, taken = 0.0, Taken()
     monkeypatch.setattr(time, "monotonic", lambda: at)
-    starved, asleep = Watch(5.0, seen=at), Watch(5.0, seen=at)
-    for _ in range(4000):
-        at += 0.5
-        assert not starved.over(Taken(5.1, sleeping=False))
-        found = asleep.over(Taken(5.1, sleeping=True))
-        if at <= watch.WAITED_S:
-            assert not found
-    assert found == "waited"
-    at += 1e6  # whoever looks was stopped
-    assert not Watch(5.0, seen=0.0).over(Taken(5.1, sleeping=True))
-    assert Watch(5.0).over(Taken(5.1 + watch.HANG_CPU_S, sleeping=False)) == "hang"
+    monkeypatch.setattr(watch, "taken_by", lambda pid: taken)
+    one = Watch(1)
+
+    def looked(seconds: float, cpu_s: float, *, sleeping: bool) -> str:
+        nonlocal at, taken
+        at, taken = at + seconds, Taken(cpu_s, sleeping)
+        return one.over()
+
+    assert not looked(50.0, 5.0, sleeping=True)  # counted from here
+    for _ in range(4000):  # it could run and may not
+        assert not looked(0.5, 5.1, sleeping=False)
+    for k in range(4000):  # it runs now and then, and sleeps whenever it is looked at
+        assert not looked(0.5, 5.1 + 0.001 * k, sleeping=True)
+    assert not looked(1e6, 9.2, sleeping=True)  # whoever looks was stopped
+    assert one.slept_s < 3.0
+    assert not looked(0.1, 99.0, sleeping=False)  # too soon to look again
+    assert looked(0.5, 5.1 + watch.HANG_CPU_S, sleeping=True) == "hang"
+    one.begin()
+    found = [looked(1.0, 99.0, sleeping=True) for _ in range(int(watch.WAITED_S) + 2)]
+    assert found == [""] * (len(found) - 1) + ["waited"]
+
+
+def test_a_worker_that_has_answered_meanwhile_does_not_hang(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    class Whole(Faulty):
+        ways = ("whole",)
+
+    monkeypatch.setitem(TARGETS, "faulty", Whole)
+    for name in ("work", "out"):
+        (tmp_path / name).mkdir()
+    runs = Pool(["faulty"], SEED, 0, tmp_path / "work", tmp_path / "out", 1)
+
+    def late(one: Watch) -> str:
+        link = runs._slots[0].link
+        return "hang" if link is not None and link.poll(600.0) else ""
+
+    monkeypatch.setattr(Watch, "over", late)
+    runs.run(3600.0, 20)
+    assert runs.scores["faulty"].outcomes == {"whole": 20}
 
 
 @contextmanager

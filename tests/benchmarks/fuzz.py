@@ -74,6 +74,7 @@ def main() -> int:
     drop_stale_kernels([ROOT / "replay", ROOT / "diagnosis"], ROOT / "replay" / "__pycache__" / "kernels.json")
     if choice.repeat:
         return again(choice.repeat)
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(128 + signal.SIGTERM))  # so that its folder is removed
     load_readers()
     choice.out.mkdir(parents=True, exist_ok=True)
     print(f"seed {choice.seed}", flush=True)
@@ -88,9 +89,13 @@ def main() -> int:
         said = Progress(
             choice.every, choice.progress, {"seed": choice.seed, "first": choice.first, "jobs": choice.jobs}
         )
-        pool.run(choice.minutes * 60, choice.inputs, lambda: said.tell(pool.scores, pool.cpu_s()))
-        said.tell(pool.scores, pool.cpu_s(), "stopped" if pool.stopped else "complete")
-    print(table(pool.scores))
+        state = "failed"
+        try:
+            pool.run(choice.minutes * 60, choice.inputs, lambda: said.tell(pool.scores, pool.cpu_s()))
+            state = "stopped" if pool.stopped else "complete"
+        finally:
+            said.tell(pool.scores, pool.cpu_s(), state)
+            print(table(pool.scores))
     print(f"{cpu(pool.scores) / 3600:.2f} h of a processor in the readers, {pool.cpu_s() / 3600:.2f} h in all")
     found = {name: score.findings for name, score in pool.scores.items() if score.findings}
     for name, marks in found.items():

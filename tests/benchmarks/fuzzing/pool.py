@@ -18,14 +18,13 @@ from multiprocessing.process import BaseProcess
 from pathlib import Path
 from typing import Any
 
-from tests.benchmarks.fuzzing import watch
 from tests.benchmarks.fuzzing.case import Sample
 from tests.benchmarks.fuzzing.formats import TARGETS
 from tests.benchmarks.fuzzing.tally import Score
 from tests.benchmarks.fuzzing.watch import Watch, end, taken_by
 from tests.benchmarks.fuzzing.worker import Answer, input_of, lay_out, sound_samples, work
 
-BATCH, KEPT = 200, 3
+BATCH, KEPT, MOST_SPENT_S = 200, 3, 60.0
 _CONTEXT = multiprocessing.get_context("fork")
 _UNWATCHED = ("starting", "making", "compiling")
 
@@ -40,7 +39,7 @@ class Slot:
     link: Connection | None = None
     todo: list[int] = field(default_factory=list)
     since: float = 0.0
-    watch: Watch = field(default_factory=Watch)
+    watch: Watch | None = None
     stage: str = ""
 
 
@@ -131,24 +130,28 @@ class Pool:
         slot.process = _CONTEXT.Process(target=work, args=arguments, daemon=True)
         slot.process.start()
         far.close()
+        assert slot.process.pid is not None
+        slot.watch = Watch(slot.process.pid)
 
     def _send(self, slot: Slot) -> None:
         assert slot.link is not None
         slot.link.send(slot.todo)
-        slot.since, slot.stage, slot.watch = time.monotonic(), "starting", Watch()
+        slot.since, slot.stage = time.monotonic(), "starting"
 
     def _take(self, slot: Slot) -> None:
         assert slot.link is not None
+        assert slot.watch is not None
         try:
             while slot.todo and slot.link.poll():
                 got: Any = slot.link.recv()
                 if slot.stage != "starting":
-                    self._spent[slot.name] += time.monotonic() - slot.since
+                    self._spent[slot.name] += min(
+                        time.monotonic() - slot.since, MOST_SPENT_S
+                    )  # the machine may have stood still
                 slot.since = time.monotonic()
+                slot.watch.begin()
                 if isinstance(got, str):
                     slot.stage = got
-                    if got not in _UNWATCHED:
-                        slot.watch = Watch(_cpu(slot))
                     continue
                 slot.stage = "making"
                 slot.todo.remove(got["number"])
@@ -160,7 +163,9 @@ class Pool:
         if slot.process is None or not slot.todo or slot.stage in _UNWATCHED:
             return
         assert slot.process.pid is not None
-        if kind := slot.watch.over(taken_by(slot.process.pid)):
+        assert slot.link is not None
+        assert slot.watch is not None
+        if (kind := slot.watch.over()) and not slot.link.poll():  # else it has said something meanwhile
             os.kill(slot.process.pid, signal.SIGUSR1)
             time.sleep(0.2)
             end(slot.process.pid)
@@ -169,20 +174,21 @@ class Pool:
     def _lost(self, slot: Slot, kind: str) -> None:
         """Record the input that a worker died of, and start another worker with the rest."""
         assert slot.process is not None
+        assert slot.watch is not None
         slot.process.join(5)
         code, number = slot.process.exitcode, slot.todo.pop(0)
         trace = (self.folder / f"worker-{slot.number}.trace").read_text(errors="replace")
         if slot.stage in _UNWATCHED and kind == "crash":
             raise RuntimeError(f"{slot.name} {self.seed}:{number}: the worker ended (exit code {code}): {trace}")
         what = {
-            "hang": f"no end after {watch.HANG_CPU_S:g} s of a processor",
-            "waited": f"no end after {watch.WAITED_S:g} s asleep",
+            "hang": f"no end after {slot.watch}",
+            "waited": f"no end after {slot.watch}",
             "crash": f"the interpreter died (exit code {code})",
         }
         if slot.stage == "checking":
-            kind, what["peer"] = "peer", "another library hangs or dies"
+            kind, what["peer"] = "peer", "another library hangs, sleeps or dies"
         answer = Answer(
-            number=number, sample="", what="", outcome=kind, cpu_s=watch.HANG_CPU_S if kind == "hang" else 0.0,
+            number=number, sample="", what="", outcome=kind, cpu_s=slot.watch.busy_s,
             kind="" if kind == "peer" else kind, text=what[kind], trace=trace,
         )  # fmt: skip
         self._count(slot.name, answer)
@@ -221,7 +227,7 @@ class Pool:
             if slot.process.pid is not None:
                 end(slot.process.pid)
             slot.process.join()
-        slot.process = slot.link = None
+        slot.process = slot.link = slot.watch = None
 
 
 def _cpu(slot: Slot) -> float:

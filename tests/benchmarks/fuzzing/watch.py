@@ -6,12 +6,12 @@ import os
 import signal
 import time
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 
 HANG_CPU_S, WAITED_S = 10.0, 600.0
 _TICKS = os.sysconf("SC_CLK_TCK")
-_STEP_S = 1.0
+_LOOK_S, _STEP_S = 0.2, 1.0  # looking costs dozens of calls of the system, which many short inputs would feel
 
 
 @dataclass(frozen=True)
@@ -30,26 +30,54 @@ class Taken:
     sleeping: bool = False
 
 
-@dataclass
 class Watch:
-    """Time since a worker said anything: of the processors, and asleep."""
+    """Time since a worker said anything: of the processors, and asleep.
 
-    cpu_at: float = 0.0
-    slept_s: float = 0.0
-    seen: float = field(default_factory=time.monotonic)
+    Parameters
+    ----------
+    pid : int
+        Of the worker.
 
-    def over(self, taken: Taken) -> str:
-        """Look again: ``hang``, ``waited``, or nothing.
+    Attributes
+    ----------
+    busy_s, slept_s : float
+        What it has taken of the processors since the first look, and how long it has slept [s].
+    """
 
-        Time in which the worker could run and did not (the machine has other work, or somebody stopped it) counts for neither. The
-        time between two looks counts as one second at most: whoever looks may be stopped too.
+    def __init__(self, pid: int) -> None:
+        self._pid, self._seen = pid, time.monotonic()
+        self.begin()
+
+    def begin(self) -> None:
+        """Count from zero, from the next look on."""
+        self._cpu_at: float | None = None
+        self.busy_s = self.slept_s = 0.0
+
+    def over(self) -> str:
+        """Look again, five times a second at most: ``hang``, ``waited``, or nothing.
+
+        Time in which the worker could run and did not (the machine has other work, or somebody stopped it) counts for neither, and
+        one that has taken time of a processor since the last look did not sleep. The time between two looks counts as one second at
+        most: whoever looks may be stopped too.
         """
         now = time.monotonic()
-        self.slept_s += min(now - self.seen, _STEP_S) if taken.sleeping else 0.0
-        self.seen = now
-        if taken.cpu_s - self.cpu_at > HANG_CPU_S:
+        since = now - self._seen
+        if since < _LOOK_S:
+            return ""
+        self._seen, taken = now, taken_by(self._pid)
+        if self._cpu_at is None:
+            self._cpu_at = taken.cpu_s
+            return ""
+        busy_s = taken.cpu_s - self._cpu_at
+        if taken.sleeping and busy_s <= self.busy_s:
+            self.slept_s += min(since, _STEP_S)
+        self.busy_s = busy_s
+        if busy_s > HANG_CPU_S:
             return "hang"
         return "waited" if self.slept_s > WAITED_S else ""
+
+    def __str__(self) -> str:
+        return f"{self.busy_s:.1f} s of a processor and {self.slept_s:.0f} s asleep"
 
 
 def taken_by(pid: int) -> Taken:
