@@ -193,7 +193,7 @@ def test_counts_are_kept_on_the_way_and_when_a_run_is_stopped(
     said = Progress(1e-6, tmp_path / "counts.json", {"seed": SEED})
 
     def tell() -> None:
-        said.tell(runs.scores, runs.cpu_s())
+        said.tell(runs.scores, runs.cpu_s)
         kept = json.loads((tmp_path / "counts.json").read_text())
         assert (kept["state"], kept["inputs"]) == ("running", inputs(runs.scores))
         seen.append(kept["inputs"])
@@ -201,7 +201,7 @@ def test_counts_are_kept_on_the_way_and_when_a_run_is_stopped(
             runs.stop()
 
     runs.run(3600.0, 10**9, tell)
-    said.tell(runs.scores, runs.cpu_s(), "stopped")
+    said.tell(runs.scores, runs.cpu_s, "stopped")
     kept = json.loads((tmp_path / "counts.json").read_text())
     assert kept["state"] == "stopped"
     assert kept["inputs"] == sum(kept["formats"]["faulty"]["outcomes"].values()) >= seen[-1] > 300

@@ -91,10 +91,10 @@ def main() -> int:
         )
         state = "failed"
         try:
-            pool.run(choice.minutes * 60, choice.inputs, lambda: said.tell(pool.scores, pool.cpu_s()))
+            pool.run(choice.minutes * 60, choice.inputs, lambda: said.tell(pool.scores, pool.cpu_s))
             state = "stopped" if pool.stopped else "complete"
         finally:
-            said.tell(pool.scores, pool.cpu_s(), state)
+            said.tell(pool.scores, pool.cpu_s, state)
             print(table(pool.scores))
     print(f"{cpu(pool.scores) / 3600:.2f} h of a processor in the readers, {pool.cpu_s() / 3600:.2f} h in all")
     found = {name: score.findings for name, score in pool.scores.items() if score.findings}

@@ -7,6 +7,7 @@ import os
 import sys
 import time
 from collections import Counter
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -78,8 +79,8 @@ class Progress:
         self._start = self._last = time.monotonic()
         self._inputs = 0
 
-    def tell(self, scores: dict[str, Score], cpu_s: float, state: str = "running") -> None:
-        """Say it where it is time for it, or the run is no longer ``running``; `cpu_s` of a processor were taken in all [s]."""
+    def tell(self, scores: dict[str, Score], cpu_s: Callable[[], float], state: str = "running") -> None:
+        """Say it where it is time for it, or the run is no longer ``running``; `cpu_s` gives what all took of a processor [s]."""
         now = time.monotonic()
         if state == "running" and (not self._every_s or now - self._last < self._every_s):
             return
@@ -102,7 +103,7 @@ class Progress:
         }  # fmt: skip
         document = {
             **self._facts, "state": state, "inputs": count, "findings": found, "wall_s": round(since, 1), "load": round(load, 2),
-            "reading_cpu_s": round(cpu(scores), 1), "whole_cpu_s": round(cpu_s, 1), "formats": formats,
+            "reading_cpu_s": round(cpu(scores), 1), "whole_cpu_s": round(cpu_s(), 1), "formats": formats,
         }  # fmt: skip
         with atomic_path(self._path) as part:
             part.write_text(json.dumps(document, indent=1), encoding="utf-8")
