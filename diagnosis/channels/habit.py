@@ -57,7 +57,7 @@ class Habit(NamedTuple):
         """Time between two updates at some speeds [s]. Both of one shape (k,); speeds in m/s."""
         if not self.travel:
             return np.full(speed.shape, self.window)
-        with np.errstate(divide="ignore"):
+        with np.errstate(divide="ignore", over="ignore"):
             return np.clip(self.travel / np.abs(speed), self.window, self.timeout)
 
     def rounding_noise(self, lsb: float) -> float:

@@ -24,6 +24,7 @@ _GRID_PARTS, _GRID_SAMPLES, _GRID_SHARE = 20, 100, 0.4
 _PLACES, _ALL, _SOME = 8000, slice(None), slice(None, None, 4)  # some are enough for a limit
 _SOUND_SHARE = 0.25  # quantile of windows that stands for healthy ones
 _QUIET_WINDOW_S, _QUIET_SHARE = 0.5, 0.4  # quantile of windows that stands for healthy ones
+_FEWEST_PLACES = 50  # in which a delay can be compared
 _HEALTHY_SHARE, _SOUND = 0.3, 10.0  # of the places; times their misfit
 
 
@@ -154,7 +155,7 @@ def relative_lag(y: Array, x: Array, use: NDArray[np.bool_], least_lag: int, max
 
     What is ten times as large as the lower third counts no more than that, so that faults for half of the time leave the
     delay alone. It must lower the mean square by 2 % to be believed; a valve cannot answer before its command, so there
-    `least_lag` is 0.
+    `least_lag` is 0. A delay at which x is missing in nearly all of these places cannot be the one.
 
     `y`, `x` and `use` of shape (n,); lags in steps.
     """
@@ -167,7 +168,7 @@ def relative_lag(y: Array, x: Array, use: NDArray[np.bool_], least_lag: int, max
     places = np.flatnonzero(moving)
     places = places[(places > max_lag) & (places < y.size - max_lag - 1)]
     places = places[:: max(1, places.size // _PLACES)]
-    if places.size < 50:
+    if places.size < _FEWEST_PLACES:
         return 0.0
     there = y[places]
 
@@ -177,15 +178,22 @@ def relative_lag(y: Array, x: Array, use: NDArray[np.bool_], least_lag: int, max
     def lower(lag: float) -> float:
         found = misfit(lag, _SOME)
         rank = round(_HEALTHY_SHARE * np.count_nonzero(found == found))  # NaN are sorted last
-        return float(np.partition(found, rank)[rank])
+        least = float(np.partition(found, rank)[rank])
+        return least if least == least else np.inf
+
+    def mean_square(lag: float) -> float:
+        found = misfit(lag)
+        if np.count_nonzero(found == found) < _FEWEST_PLACES:  # x has gaps there
+            return np.inf
+        return float(np.nanmean(np.minimum(found, most) ** 2))
 
     steps = np.arange(max(least_lag, -max_lag), max_lag + 1, dtype=np.float64)
     most = _SOUND * min(lower(c) for c in steps) or np.inf
-    misfits = np.array([float(np.nanmean(np.minimum(misfit(c), most) ** 2)) for c in steps])
+    misfits = np.array([mean_square(c) for c in steps])
     k, none = int(np.argmin(misfits)), int(np.flatnonzero(steps == max(0, least_lag))[0])
     if misfits[k] >= 0.98 * misfits[none]:
         k = none
-    if not 0 < k < steps.size - 1:
+    if not 0 < k < steps.size - 1 or not np.isfinite(misfits[k - 1 : k + 2]).all():
         return float(steps[k])
     # the tenth from a parabola: a mean of two samples would have less noise, and be preferred for that
     left, here, right = misfits[k - 1 : k + 2]

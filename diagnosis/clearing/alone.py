@@ -73,5 +73,5 @@ class Straight:
         """Smallest offset of an angle [rad], of either sign, that the windows show, shape (places,)."""
         known, mean = np.isfinite(self.off).astype(np.float64), np.abs(self.frame.mean(self.off))[over.windows]
         inside, window = over.sums(known), self.frame.sums(known)[over.windows]
-        with np.errstate(divide="ignore", invalid="ignore"):
+        with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
             return least(np.where(inside > 0.0, (self.limit + mean) * window / inside, np.nan))

@@ -214,7 +214,7 @@ def rates_of(cells: Cells, rate: Array, opening: Array) -> Rates:
     most = np.maximum(dead + unsure, min(_ALIKE * _stands(cells), _OVERLAP))
     off = _nearest([_off(frame, cells.dt, rate, opening, use, tried) for tried in (dead - unsure, dead, most)])
     off = np.where(enough, off, np.nan)
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
         whole = np.log(np.maximum(ahead.sum(axis=0) / opened.sum(axis=0), 1e-3))
     whole = np.where(steered.sum(axis=0) * cells.dt >= _FEW_S, whole, np.nan)
     apart: list[float | None] = [None] * len(whole)
@@ -254,7 +254,7 @@ def _off(frame: Frame, dt: float, rate: Array, opening: Array, use: Flags, dead:
     """ln of the steering rate per opening beyond such dead bands against its usual one, (windows, axles)."""
     steered, ahead, opened = _beyond(rate, opening, use, dead)
     time = frame.sums(steered.astype(np.float64)) * dt
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
         log = np.where(time >= _LEAST_S, np.log(np.maximum(frame.sums(ahead) / frame.sums(opened), 1e-3)), np.nan)
     return np.asarray(log - np.array([float(np.nanmedian(x)) if np.isfinite(x).any() else np.nan for x in log.T]))
 

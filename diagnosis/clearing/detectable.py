@@ -49,7 +49,7 @@ def detectable(cells: Cells, powers: Mapping[tuple[str, str], Powers] | None = N
     rows: list[Detectable] = []
     traces: list[Trace] = []
     clear_at = cells.machine.limits.clear_at
-    with warnings.catch_warnings(), np.errstate(divide="ignore", invalid="ignore"):
+    with warnings.catch_warnings(), np.errstate(divide="ignore", over="ignore", invalid="ignore"):
         warnings.simplefilter("ignore", RuntimeWarning)  # windows without any value
         for gauges in gauges_of(cells):
             if (gauges.component, gauges.side.value) not in own:

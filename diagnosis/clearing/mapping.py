@@ -143,7 +143,7 @@ def _alike(y: Array, x: Array) -> float:
 
 def _ratio(y: Array, x: Array) -> float:
     """ln of y by x; NaN where it varies."""
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
         ratio = np.log(y / x)
     ratio = ratio[np.isfinite(ratio)]
     if ratio.size < 0.9 * x.size:

@@ -61,7 +61,7 @@ class Compared(NamedTuple):
     def off(self) -> Array:
         """How far a is off b in each window, as a share of b: by its gain, its mean, and what is left beside both. Shape (windows,)."""
         frame, a, b = self.frame, self.a, self.b
-        with np.errstate(divide="ignore", invalid="ignore"):
+        with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
             gain = np.abs(1.0 - frame.sums(a * b) / frame.sums(b * b))
         scatter = np.sqrt(np.maximum(frame.mean((a - b) ** 2) - self.mean**2, 0.0)) / self.size
         # what hysteresis and lag leave is no loss: it counts from half of the reference on

@@ -144,7 +144,7 @@ class Ratio:
     def share(self, over: Overlap) -> Array:
         """Part of each window's motion that lies in the fault; NaN for none. Shape (places, windows) [1]."""
         inside = over.sums(self.weight)
-        with np.errstate(divide="ignore", invalid="ignore"):
+        with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
             return np.asarray(np.where(inside > 0.0, inside / self.frame.sums(self.weight)[over.windows], np.nan))
 
     def loss(self, over: Overlap) -> Array:
@@ -178,7 +178,7 @@ class Ratio:
         counted = (self.weight > 0.0).astype(np.float64)
         window = self.frame.sums(self.weight)[over.windows]
         held = window - over.sums(self.weight) + np.abs(y[first])[:, np.newaxis] * over.sums(counted)
-        with np.errstate(divide="ignore", invalid="ignore"):
+        with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
             off = self.room(over, self.share(over)) + np.log(np.maximum(held / window, 1e-3))
         touched = over.sums(counted) > 0.0
         return np.asarray((touched & ((off > self.above) | (off < -self.below))).any(axis=1))
@@ -198,7 +198,7 @@ class Reference:
         """Smallest loss [1] of the channel that its windows show, shape (places,)."""
         c, limit = self.compared, self.limit
         power = self._power(over)
-        with np.errstate(divide="ignore", invalid="ignore"):
+        with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
             off = 1.0 - self._window(over, c.a * c.b) / power
             slope = over.sums(c.a * c.b) / power
             gain = np.where(c.driven[over.windows] & (slope > 0.0), (limit - off) / slope, np.nan)
@@ -216,7 +216,7 @@ class Reference:
         """
         c = self.compared
         power = self._power(over)
-        with np.errstate(divide="ignore", invalid="ignore"):
+        with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
             share = over.sums(np.where(np.isfinite(c.a), c.b * c.b, 0.0)) / power
             much = self.limit + 1.0 - self._window(over, c.a * c.b) / power
             # by gain: share·s = much·((1 − share)·(1 + s)² + share)
@@ -243,7 +243,7 @@ class Reference:
     def offset(self, over: Overlap) -> Array:
         """Smallest offset of either sign, in the channel's unit, likewise. Shape (places,)."""
         c = self.compared
-        with np.errstate(divide="ignore", invalid="ignore"):
+        with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
             share = over.sums(np.isfinite(c.a).astype(np.float64)) / self._window(over, np.isfinite(c.a).astype(float))
             size = (self.limit * c.size[over.windows] + np.abs(c.mean[over.windows])) / share
         return least(np.where(c.moves[over.windows] & (share > 0.0), size, np.nan))
@@ -252,7 +252,7 @@ class Reference:
         """Whether it shows that the channel rests at its value of the fault's first cell, shape (places,)."""
         c = self.compared
         known = np.isfinite(c.a).astype(np.float64)
-        with np.errstate(divide="ignore", invalid="ignore"):
+        with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
             moved = np.nan_to_num(c.a[first])[:, np.newaxis] * over.sums(known) - over.sums(c.a)
             mean = c.mean[over.windows] + moved / self._window(over, known)
         shown = c.moves[over.windows] & (over.last > over.first)

@@ -99,7 +99,7 @@ def responses_of(cells: Cells, speed: Array, opening: Array, reference: Array, m
     moved, opened = (frame.sums(np.where(settled, np.abs(x), 0.0)) for x in (speed, passed))
     enough = frame.sums(settled.astype(np.float64)) >= _LEAST_CELLS * min(frame.length, frame.cells)
     ratio = np.where(enough, moved / np.maximum(opened, 1e-3 * frame.length), np.nan)
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
         log = np.log(np.maximum(ratio, 1e-3) / others_at(ratio))
     ahead = frame.mean(np.sign(np.nan_to_num(motion))) >= 0.0
     off = np.full(log.shape, np.nan)

@@ -99,6 +99,6 @@ def _off_angles(cells: Cells) -> _Off | None:
     bias = float(np.median(yaw[rest])) if np.count_nonzero(rest) * cells.dt >= _STILL_S else 0.0
     moving = np.abs(speed) > _MOVING * cells.machine.max_speed
     turn = np.tan(angle[:, 0]) - np.tan(angle[:, 1])
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
         off = np.where(moving, (yaw - bias) / speed * length - turn, np.nan)
     return _Off(off, turn, np.abs(turn) < _STRAIGHT)

@@ -76,7 +76,7 @@ def sensor_powers(pair: SpeedPair, limits: Limits) -> Powers:
         needed = thinnest(switch_cost, ends=length is not None)
         count, information = _places(np.where(seen, x**2 / variance, 0.0), seen, n)
         noise = np.sqrt(_places(np.where(seen, variance, 0.0), seen, n)[1])
-        with np.errstate(divide="ignore", invalid="ignore"):
+        with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
             loss = noncentrality(needed) * np.sqrt(_LIKE / (count * information))
             loss = np.where(count > 0, np.maximum(loss, limits.min_epsilon), np.inf)
         loss[loss > 1.0] = np.inf

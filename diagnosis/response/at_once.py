@@ -103,7 +103,7 @@ def _whole(samples: Samples, at: int, dt: float, *, after: bool) -> bool:
 
 def too_hard(samples: Samples, at: int, ratio: float, dt: float) -> int | None:
     """Sample next to step `at` with which the speed changes by about `ratio` [1] and far more than at the drive's hardest; None without any."""
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
         made = samples.value / (samples.value - samples.change)
     hard = np.abs(samples.change) > _TOO_HARD * hardest_change(samples)
     places = np.flatnonzero(hard & (made > ratio / _ALIKE) & (made < ratio * _ALIKE))

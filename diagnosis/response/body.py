@@ -131,7 +131,7 @@ def _slopes(fixes: Positions, middle: Array, window: float, most_gap: float) -> 
     n = np.maximum(count, 1)
     st, st2 = total(t).real, total(t * t).real
     spread = st2 - st * st / n
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
         slope = (total(t * place) - st * total(place) / n) / spread
     wide = count * most_gap > 1.5 * window
     return np.where((count >= 3) & (spread > 0.0) & wide, np.abs(slope), np.nan)

@@ -48,7 +48,7 @@ def jumps_of(samples: Samples, blocks: Blocks, width: int, dt: float) -> tuple[J
     place = np.flatnonzero(there & (size > max(_STRONG * usual, _LEAST * top)))
     place = place[_alone(samples, place, dt)]
     before = samples.value[place] - samples.change[place]
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
         return Jumps(place, np.where(before != 0.0, samples.value[place] / before, np.inf)), calm
 
 

@@ -86,7 +86,7 @@ def scatter_of(blocks: SteeringBlocks, plant: SteeringPlant) -> float | None:
         return np.where(number > 0, (total[first + end] - total[first]) / np.maximum(number, 1), np.nan)
 
     did = mean(start + n - end) - mean(start)
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
         share = did / should
     share = np.sort(share[(np.abs(should) > _MOVED) & (np.abs(share - 1.0) < _NEAR)])
     if share.size < _FEW:

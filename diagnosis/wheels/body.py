@@ -64,7 +64,7 @@ def _rolling(
         share, less = block_means(ratio[cut], width), block_means(turn[cut], width)
         axles = block_means(angle[cut], width)
         curvature, lateral = rotation(axles, geometry)
-        with np.errstate(invalid="ignore", divide="ignore"):
+        with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
             by_wheel = (block_means(y[cut], width) + less) / share
             commanded = np.median((block_means(v_ref[cut], width) + less) / share, axis=1)
         parts.append((by_wheel, commanded, np.nan_to_num(curvature), np.nan_to_num(lateral)))

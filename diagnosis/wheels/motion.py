@@ -22,7 +22,7 @@ _MOST_ROWS = 20_000
 
 def body_speeds(y: Array, ratio: Array, turn: Array) -> Array:
     """Speed at which each wheel would roll by the median of the other wheels [m/s], shape (n, wheels)."""
-    with np.errstate(invalid="ignore", divide="ignore"):
+    with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
         speed = (y + turn) / ratio
     out = np.full(y.shape, np.nan)
     for i in range(y.shape[1]):

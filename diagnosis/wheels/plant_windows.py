@@ -63,7 +63,7 @@ def usual_driving(drives: Sequence[Drive], span: float) -> list[Drive]:
     """
     effort = []
     for d in drives:
-        with np.errstate(invalid="ignore", divide="ignore"):
+        with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
             ratio = np.where(d.moving & (np.abs(d.y) > 0.15 * span), np.abs(d.u / d.y), np.nan)
         effort.append(ratio[np.isfinite(ratio) & (ratio > 0)])
     every = np.concatenate(effort)

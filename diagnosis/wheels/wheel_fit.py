@@ -121,7 +121,7 @@ def _driving(
 
 def _disagreement(y: Array, rolls: Array, ratio: Array, turn: Array) -> Array:
     """Largest distance of the other wheels from the speed of the body that they give [m/s], shape (n, wheels)."""
-    with np.errstate(invalid="ignore", divide="ignore"):
+    with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
         by_wheel, by_others = (y + turn) / ratio, (rolls + turn) / ratio
     far = np.abs(by_wheel[:, None, :] - by_others[:, :, None])
     wheels = np.arange(y.shape[1])

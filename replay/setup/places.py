@@ -215,7 +215,7 @@ def _axles(
         return ""
     yaw = next((v.turn for v in views if v.name == "imu.yaw_rate" and whole.get(v.name) == 1), None)
     turn = yaw if yaw is not None else np.mean([p.turn for p in pairs], axis=0)
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
         path = turn * (ends[0][1] - ends[1][1]) / speed
     x = np.column_stack([ends[0][2], -ends[1][2]])
     known = np.isfinite(path) & np.isfinite(x).all(axis=1)

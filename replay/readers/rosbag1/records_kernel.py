@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from replay.readers.common.compiled import plain
 
 MESSAGE, HEADER, INDEX, CHUNK, INFO, CONNECTION = 2, 3, 4, 5, 6, 7
+MAX_FIELDS = 64
 _LONGEST_HEAD = 1 << 16
 
 
@@ -64,8 +65,9 @@ def _record(data, at, stop):  # type: ignore[no-untyped-def]
         return 0, at, np.int64(-1), np.int64(0), False
     op, conn, stamp = 0, np.int64(-1), np.int64(0)
     named = timed = sized = packed = placed = False
-    p = at + 4
-    while p + 4 <= body:
+    p, fields = at + 4, 0
+    while p + 4 <= body and fields < MAX_FIELDS:  # a header of tiny fields would be walked again from each of its bytes
+        fields += 1
         length = _u32(data, p)
         q = p + 4
         p = q + length
@@ -103,8 +105,8 @@ def _find(data, start, stop, outer):  # type: ignore[no-untyped-def]
     Before `outer` only records count that never stand inside a chunk: compressed ones hold some of theirs as they are.
     """
     for at in range(start, stop - 7):
-        # the header is short and its first field lies in it: all but a few places fail here
-        if data[at + 2] or data[at + 3] or data[at + 6] or data[at + 7]:
+        # the header is short and its first field lies in it: all but a few places fail here, zeros among them
+        if data[at + 2] or data[at + 3] or data[at + 6] or data[at + 7] or not (data[at] | data[at + 1]):
             continue
         op, body, _, _, sure = _record(data, at, stop)
         if op and sure and (body + 4 + _u32(data, body) <= stop or op == 5) and (at >= outer or 4 <= op <= 6):
@@ -117,13 +119,16 @@ def _scan(data, start, stop, op, head, body, size, conn, stamp):  # type: ignore
     at, n, end = start, 0, start
     lost, gaps, first, mended = 0, 0, -1, 0
     last_body, last_op, last = np.int64(-1), 0, False
+    bare, found = np.int64(-1), np.int64(-1)  # no record starts from the one up to the other
     while at < stop:
         code, data_at, who, when, sure = _record(data, at, stop)
         inner = data_at + 4
         length = _u32(data, data_at) if code else np.int64(0)
         if code and inner + length > stop and sure and code == 2:
             # a message whose length cannot be right: it ends where the next record starts
-            again = _find(data, inner, stop, np.int64(0))
+            if not bare <= inner <= found:  # records within records may lead here again and again
+                bare, found = inner, _find(data, inner, stop, np.int64(0))
+            again = found
             if again < stop:
                 length = again - inner
                 mended += 1

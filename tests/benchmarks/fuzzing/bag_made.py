@@ -56,6 +56,22 @@ def made_up(source: random.Random) -> Case:
     return Case(content, f"made up of {len(links)} connections, {len(places)} chunks", {"made": True})
 
 
+def _resembling(size: int, source: random.Random) -> bytes:
+    """Bytes in which a record might start anywhere: zeros, headers of tiny fields from every byte on, records within records."""
+    way = source.random()
+    if way < 0.4:
+        return bytes(size)
+    head = [(b"op", b"\x02"), (b"conn", bytes(4)), (b"time", bytes(8))]
+    if way < 0.7:
+        wide = bytes(source.choices((0, 0, 1, 8, 255), k=source.choice((3, 4, 4, 8))))
+        unit = struct.pack("<I", source.choice((3, 4, 4, 12))) + wide
+        return (unit * (size // len(unit) + 1))[:size]
+    one, count = len(Record(head).bytes()), source.choice((100, 5000, 50_000))
+    nested = b"".join(Record(head).bytes()[:-4] + struct.pack("<I", one * (count - 1 - k)) for k in range(count))
+    last = Record(head).bytes()[:-4] + struct.pack("<I", 2**31)
+    return (nested + last + bytes(source.choices((0, 255), k=1)) * size)[:size]
+
+
 def _chunk(links: list[Record], source: random.Random) -> tuple[Record, list[Record]]:
     inner = [r.copy() for r in links] if source.random() < 0.85 else []
     entries: dict[bytes, list[bytes]] = {}
@@ -74,7 +90,7 @@ def _chunk(links: list[Record], source: random.Random) -> tuple[Record, list[Rec
     if way < 0.06:
         size = source.choice((1 << 20, 60 << 20, 128 << 20, 300 << 20))
         name = source.choice((b"lz4", b"lz4", b"bz2"))
-        data = PACK[name](bytes(size))
+        data = PACK[name](_resembling(size, source))
     elif way < 0.12:
         half = len(raw) // 2
         name, data = source.choice((

@@ -9,8 +9,9 @@ import re
 import shutil
 import signal
 import sys
+import threading
 import time
-from collections import Counter
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
@@ -19,23 +20,13 @@ from typing import Any
 
 from tests.benchmarks.fuzzing.case import Sample
 from tests.benchmarks.fuzzing.formats import TARGETS
+from tests.benchmarks.fuzzing.tally import Score
+from tests.benchmarks.fuzzing.watch import Watch, end, taken_by
 from tests.benchmarks.fuzzing.worker import Answer, input_of, lay_out, sound_samples, work
 
-HANG_CPU_S, HANG_WALL_S = 10.0, 60.0
-BATCH, KEPT = 200, 3
+BATCH, KEPT, MOST_SPENT_S = 200, 3, 60.0
 _CONTEXT = multiprocessing.get_context("fork")
-_TICKS = os.sysconf("SC_CLK_TCK")
-
-
-@dataclass
-class Score:
-    """What was counted of one format."""
-
-    inputs: int = 0
-    cpu_s: float = 0.0
-    slowest_s: float = 0.0
-    outcomes: Counter[str] = field(default_factory=Counter)
-    findings: Counter[str] = field(default_factory=Counter)
+_UNWATCHED = ("starting", "making", "compiling")
 
 
 @dataclass
@@ -48,7 +39,7 @@ class Slot:
     link: Connection | None = None
     todo: list[int] = field(default_factory=list)
     since: float = 0.0
-    cpu_at: float = 0.0
+    watch: Watch | None = None
     stage: str = ""
 
 
@@ -63,18 +54,47 @@ class Pool:
         self._spent = dict.fromkeys(names, 0.0)
         self._slots = [Slot(k) for k in range(jobs)]
         self._samples: dict[str, list[Sample]] = {}
+        self._ended = threading.Event()
         for name in names:  # here, so that workers are forked with what was loaded and compiled for them
             place = folder / f"corpus-{name}"
             place.mkdir()
             self._samples[name] = sound_samples(TARGETS[name](), place)
 
-    def run(self, seconds: float, most: int) -> None:
-        """Run for a time, or until each format had its number of inputs."""
-        end = time.monotonic() + seconds
+    def stop(self) -> None:
+        """End a run soon; what was counted is kept, what a worker is reading is not. Fit for a handler of signals."""
+        self._ended.set()
+
+    @property
+    def stopped(self) -> bool:
+        """Whether somebody asked for an end."""
+        return self._ended.is_set()
+
+    def cpu_s(self) -> float:
+        """Time of a processor of all that was done: making, reading and checking [s]."""
+        return sum(os.times()[:4]) + sum(map(_cpu, self._slots))
+
+    def run(self, seconds: float, most: int, tell: Callable[[], None] = lambda: None) -> None:
+        """Run for a time, or until each format had its number of inputs, or until it is stopped.
+
+        Parameters
+        ----------
+        seconds : float
+            How long inputs are given out [s].
+        most : int
+            Inputs of each format.
+        tell : Callable
+            Called a few times a second.
+
+        Raises
+        ------
+        RuntimeError
+            Where a worker ends while it makes an input.
+        """
+        until = time.monotonic() + seconds
         try:
-            while time.monotonic() < end or any(slot.todo for slot in self._slots):
+            while not self.stopped and (time.monotonic() < until or any(slot.todo for slot in self._slots)):
                 for slot in self._slots:
-                    if not slot.todo and time.monotonic() < end:
+                    if not slot.todo and time.monotonic() < until:
                         self._give(slot, most)
                 links = [slot.link for slot in self._slots if slot.link is not None and slot.todo]
                 if not links:
@@ -83,6 +103,7 @@ class Pool:
                     self._take(next(s for s in self._slots if s.link is link))
                 for slot in self._slots:
                     self._watch(slot)
+                tell()
         finally:
             for slot in self._slots:
                 self._stop(slot)
@@ -103,26 +124,32 @@ class Pool:
         self._send(slot)
 
     def _start(self, slot: Slot) -> None:
-        slot.link, end = _CONTEXT.Pipe()
+        slot.link, far = _CONTEXT.Pipe()
         place = self.folder / f"worker-{slot.number}"
-        arguments = (end, slot.name, self._samples[slot.name], place, self.seed)
+        arguments = (far, slot.name, self._samples[slot.name], place, self.seed)
         slot.process = _CONTEXT.Process(target=work, args=arguments, daemon=True)
         slot.process.start()
-        end.close()
+        far.close()
+        assert slot.process.pid is not None
+        slot.watch = Watch(slot.process.pid)
 
     def _send(self, slot: Slot) -> None:
         assert slot.link is not None
         slot.link.send(slot.todo)
-        slot.since, slot.cpu_at, slot.stage = time.monotonic(), _cpu(slot), "starting"
+        slot.since, slot.stage = time.monotonic(), "starting"
 
     def _take(self, slot: Slot) -> None:
         assert slot.link is not None
+        assert slot.watch is not None
         try:
             while slot.todo and slot.link.poll():
                 got: Any = slot.link.recv()
                 if slot.stage != "starting":
-                    self._spent[slot.name] += time.monotonic() - slot.since
-                slot.since, slot.cpu_at = time.monotonic(), _cpu(slot)
+                    self._spent[slot.name] += min(
+                        time.monotonic() - slot.since, MOST_SPENT_S
+                    )  # the machine may have stood still
+                slot.since = time.monotonic()
+                slot.watch.begin()
                 if isinstance(got, str):
                     slot.stage = got
                     continue
@@ -133,32 +160,35 @@ class Pool:
             self._lost(slot, "crash")
 
     def _watch(self, slot: Slot) -> None:
-        if slot.process is None or not slot.todo or slot.stage in ("starting", "making"):
+        if slot.process is None or not slot.todo or slot.stage in _UNWATCHED:
             return
-        busy, waited = _cpu(slot) - slot.cpu_at, time.monotonic() - slot.since
-        if busy > HANG_CPU_S or waited > HANG_WALL_S:
-            assert slot.process.pid is not None
+        assert slot.process.pid is not None
+        assert slot.link is not None
+        assert slot.watch is not None
+        if (kind := slot.watch.over()) and not slot.link.poll():  # else it has said something meanwhile
             os.kill(slot.process.pid, signal.SIGUSR1)
             time.sleep(0.2)
-            os.kill(slot.process.pid, signal.SIGKILL)
-            self._lost(slot, "hang")
+            end(slot.process.pid)
+            self._lost(slot, kind)
 
     def _lost(self, slot: Slot, kind: str) -> None:
         """Record the input that a worker died of, and start another worker with the rest."""
         assert slot.process is not None
+        assert slot.watch is not None
         slot.process.join(5)
         code, number = slot.process.exitcode, slot.todo.pop(0)
         trace = (self.folder / f"worker-{slot.number}.trace").read_text(errors="replace")
-        if slot.stage in ("starting", "making") and kind == "crash":
+        if slot.stage in _UNWATCHED and kind == "crash":
             raise RuntimeError(f"{slot.name} {self.seed}:{number}: the worker ended (exit code {code}): {trace}")
         what = {
-            "hang": f"no end after {HANG_CPU_S:g} s of a processor",
+            "hang": f"no end after {slot.watch}",
+            "waited": f"no end after {slot.watch}",
             "crash": f"the interpreter died (exit code {code})",
         }
         if slot.stage == "checking":
-            kind, what["peer"] = "peer", "another library hangs or dies"
+            kind, what["peer"] = "peer", "another library hangs, sleeps or dies"
         answer = Answer(
-            number=number, sample="", what="", outcome=kind, cpu_s=HANG_CPU_S if kind == "hang" else 0.0,
+            number=number, sample="", what="", outcome=kind, cpu_s=slot.watch.busy_s,
             kind="" if kind == "peer" else kind, text=what[kind], trace=trace,
         )  # fmt: skip
         self._count(slot.name, answer)
@@ -194,19 +224,14 @@ class Pool:
         if slot.link is not None:
             slot.link.close()
         if slot.process is not None:
-            slot.process.kill()
+            if slot.process.pid is not None:
+                end(slot.process.pid)
             slot.process.join()
-        slot.process = slot.link = None
+        slot.process = slot.link = slot.watch = None
 
 
 def _cpu(slot: Slot) -> float:
-    """Seconds of a processor that a worker has taken."""
-    try:
-        assert slot.process is not None
-        fields = Path(f"/proc/{slot.process.pid}/stat").read_text().rpartition(")")[2].split()
-    except (OSError, AssertionError):
-        return 0.0
-    return (int(fields[11]) + int(fields[12])) / _TICKS
+    return taken_by(slot.process.pid).cpu_s if slot.process is not None and slot.process.pid is not None else 0.0
 
 
 def _mark(answer: Answer) -> str:

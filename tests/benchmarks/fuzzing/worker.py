@@ -8,6 +8,7 @@ import random
 import resource
 import shutil
 import signal
+import threading
 import time
 import traceback
 import warnings
@@ -17,6 +18,7 @@ from pathlib import Path
 from typing import Any, TypedDict
 
 from tests.benchmarks.fuzzing.case import Case, Finding, Sample, Target
+from tests.benchmarks.fuzzing.compiler import CompilerTime
 from tests.benchmarks.fuzzing.formats import TARGETS
 
 SPARE_BYTES, TIMES_FILE = 256 << 20, 4
@@ -27,7 +29,7 @@ _STATUS, _CLEAR = Path("/proc/self/status"), Path("/proc/self/clear_refs")
 class Answer(TypedDict):
     """What became of one input.
 
-    `cpu_s` is the time of our reading alone; `kind` and `text` are empty where nothing is wrong.
+    `cpu_s` is the time of our reading alone, without the compiler's; `kind` and `text` are empty where nothing is wrong.
     """
 
     number: int
@@ -73,15 +75,27 @@ def sound_samples(target: Target, folder: Path) -> list[Sample]:
     return samples
 
 
-def tried(target: Target, sample: Sample, case: Case, source: random.Random, path: Path, tell: Any = None) -> Answer:
+def tried(
+    target: Target,
+    sample: Sample,
+    case: Case,
+    source: random.Random,
+    path: Path,
+    tell: Any = None,
+    compiler: CompilerTime | None = None,
+) -> Answer:
     """Read an input and check what came out."""
     answer = Answer(number=0, sample=sample.name, what=case.what, outcome="", cpu_s=0.0, kind="", text="", trace="")
-    before, start = _reset_peak(), time.process_time()
+
+    def clock() -> float:
+        return time.process_time() - (compiler.cpu_s if compiler is not None else 0.0)
+
+    before, start = _reset_peak(), clock()
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("error")
             reading = target.read(path, source)
-        answer["cpu_s"], used = time.process_time() - start, _peak() - before
+        answer["cpu_s"], used = clock() - start, _peak() - before
         most = SPARE_BYTES + TIMES_FILE * sum(map(len, (case.content, *sample.files.values())))
         if used > most:
             raise Finding("memory", f"{used >> 20} MB for {len(case.content)} bytes")
@@ -103,7 +117,7 @@ def tried(target: Target, sample: Sample, case: Case, source: random.Random, pat
         if isinstance(error, KeyboardInterrupt):
             raise
         answer.update(kind="foreign", text=f"{type(error).__name__}: {error}"[:500], trace=_trace(error))
-    answer["cpu_s"] = answer["cpu_s"] or time.process_time() - start
+    answer["cpu_s"] = answer["cpu_s"] or clock() - start
     answer["outcome"] = answer["kind"] or answer["outcome"]
     return answer
 
@@ -114,21 +128,29 @@ def work(link: Connection, name: str, samples: list[Sample], folder: Path, seed:
     Parameters
     ----------
     link : Connection
-        Gets lists of numbers, gives ``checking`` before other libraries read, and an `Answer` for each number.
+        Gets lists of numbers; gives ``reading`` before each, ``compiling`` while the compiler works, ``checking`` before other
+        libraries read, and an `Answer` for each number.
     name, samples, folder : str, list[Sample], Path
         Of the format, its samples, and a folder for inputs, beside which the traces of a dying interpreter go.
     seed : int
         Of the run.
     """
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    for outside in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):  # whoever gave the work ends it
+        signal.signal(outside, signal.SIG_IGN)
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     resource.setrlimit(resource.RLIMIT_AS, (ADDRESS_BYTES, ADDRESS_BYTES))
-    target = TARGETS[name]()
+    target, talking = TARGETS[name](), threading.Lock()
+
+    def tell(word: str) -> None:
+        with talking:
+            link.send(word)
+
     with (folder.parent / f"{folder.name}.trace").open("w") as trace:
         faulthandler.enable(trace)
         faulthandler.register(signal.SIGUSR1, trace, all_threads=False)
         sound = Case(samples[0].raw, "sound")
         tried(target, samples[0], sound, source_of(seed, name, -1), lay_out(samples[0], sound, _emptied(folder)))
+        compiler = CompilerTime(tell)
         while True:
             while not link.poll(5):
                 if os.getppid() == 1:  # whoever gave the work is gone
@@ -140,8 +162,8 @@ def work(link: Connection, name: str, samples: list[Sample], folder: Path, seed:
             for number in numbers:
                 sample, case, source = input_of(target, samples, seed, number)
                 path = lay_out(sample, case, _emptied(folder))
-                link.send("reading")
-                answer = tried(target, sample, case, source, path, link.send)
+                tell("reading")
+                answer = tried(target, sample, case, source, path, tell, compiler)
                 answer["number"] = number
                 link.send(answer)
 

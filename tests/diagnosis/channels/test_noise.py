@@ -103,6 +103,22 @@ def test_delay_of_too_little_data_is_zero() -> None:
     assert relative_lag(drive(), drive(), np.zeros(N, dtype=bool), -10, 10) == 0.0
 
 
+@pytest.mark.parametrize("lag", [-4, 0, 6])
+def test_delay_at_which_nothing_was_recorded_is_not_the_one(lag: int) -> None:
+    x = drive()
+    y = shifted(x, lag)
+    x[1::2] = y[1::2] = np.nan  # at odd delays there is nothing to compare
+    assert relative_lag(y, x, np.ones(N, dtype=bool), -50, 50) == lag
+    x[:] = np.nan
+    assert relative_lag(y, x, np.ones(N, dtype=bool), -50, 50) == 0.0
+
+
+def test_delay_where_a_command_is_missing_before_every_measurement() -> None:
+    x, y = drive(), drive()
+    x[np.arange(N) % 40 != 0] = np.nan
+    assert relative_lag(y, x, np.ones(N, dtype=bool), 1, 30) == 1.0
+
+
 def test_valve_does_not_answer_before_its_command() -> None:
     use = np.ones(N - 20, dtype=bool)
     ahead = shifted(drive(), -20)[: N - 20]

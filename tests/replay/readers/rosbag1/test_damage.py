@@ -16,7 +16,7 @@ from replay.errors import LogError
 from replay.log.raw_log import RawLog
 from replay.log.source_options import SourceOptions
 from replay.readers.registry import read_log, summarise_log
-from replay.readers.rosbag1.records_kernel import scan_bag
+from replay.readers.rosbag1.records_kernel import MAX_FIELDS, scan_bag
 
 OPTIONS = SourceOptions()
 T0 = 1_700_000_000
@@ -320,6 +320,35 @@ def mutated(raw: bytes, i: int) -> bytes:
         return raw[:place] + bytes([raw[place] ^ 1 << int(rng.integers(0, 8))]) + raw[place + 1 :]
     noise = rng.bytes(width)
     return raw[:place] + (b"" if i % 5 == 4 else noise) + raw[place + (0 if i % 5 == 3 else width) :]
+
+
+def test_a_header_of_very_many_fields_is_none() -> None:
+    """From each byte of such headers another one starts, and each would be walked to its end."""
+    few = record(b"abcd", op=b"\x02", conn=bytes(4), time=bytes(8), **{f"f{k}": b"" for k in range(MAX_FIELDS - 3)})
+    many = record(b"abcd", op=b"\x02", conn=bytes(4), time=bytes(8), **{f"f{k}": b"" for k in range(MAX_FIELDS - 2)})
+    found = scan_bag(np.frombuffer(message(1) + many + few + message(2), np.uint8))
+    assert list(found.size) == [8, 4, 8]
+    assert (found.gaps, found.first, found.lost) == (1, len(message(1)), len(many))
+    tiny = np.frombuffer(b"\4\0\0\0\xff\xff\0\0" * (1 << 20), np.uint8)  # took half a minute
+    assert scan_bag(tiny).lost == tiny.size
+
+
+def test_records_within_records_lead_to_the_same_damage() -> None:
+    """Each leads to a message of a wrong length behind which nothing follows; looked for once, not for each."""
+    count, one = 20_000, len(message(0)) - 8
+    nested = b"".join(message(k)[: one - 4] + struct.pack("<I", one * (count - 1 - k)) for k in range(count))
+    wrong = message(7)[:-12] + struct.pack("<I", 2**31)
+    found = scan_bag(np.frombuffer(nested + wrong + b"\xff" * 2_000_000, np.uint8))  # took twenty seconds
+    assert len(found.op) == count
+    assert found.lost == len(wrong) + 2_000_000
+    behind = scan_bag(np.frombuffer(nested + wrong + b"\xff" * 99 + message(8), np.uint8))
+    assert list(behind.size[1:]) == [99, 8]  # the outermost one stands, the wrong one is mended
+
+
+def test_zeros_hold_no_record_and_end_where_one_starts() -> None:
+    found = scan_bag(np.frombuffer(message(1) + bytes(1000) + message(2) + bytes(9), np.uint8))
+    assert list(found.size) == [8, 8]
+    assert (found.lost, found.gaps, found.first) == (1009, 2, len(message(1)))
 
 
 @pytest.mark.parametrize("compression", PACK)
