@@ -94,8 +94,8 @@ def _own_temporary(note: Path, ending: ExitStack) -> Path:
     for _ in range(_TRIES):
         temporary = Path(tempfile.gettempdir()) / f"{_TEMPORARY}{secrets.token_hex(8)}"
         note.write_bytes(os.fsencode(temporary))  # first, so that the next run finds it in any case
-        temporary.mkdir(0o700)
         ending.callback(_remove, temporary)
+        temporary.mkdir(0o700)
         held = FileLock(temporary / _HELD)
         ending.callback(held.release)
         if _acquired(held):
@@ -108,8 +108,9 @@ def _own_temporary(note: Path, ending: ExitStack) -> Path:
 def swept_folder() -> Iterator[Path]:
     """Make a temporary folder that the next audit removes where this process is ended by force."""
     with ExitStack() as ending:
-        folder = Path(tempfile.mkdtemp(prefix=_TEMPORARY))
-        ending.callback(_remove, folder)
+        folder = Path(tempfile.gettempdir()) / f"{_TEMPORARY}{secrets.token_hex(8)}"
+        ending.callback(_remove, folder)  # first: a signal may end this process as soon as the folder is made
+        folder.mkdir(0o700)
         held = FileLock(folder / _HELD)
         ending.callback(held.release)
         held.acquire()

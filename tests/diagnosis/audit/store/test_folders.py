@@ -57,6 +57,25 @@ def test_folders_whose_process_was_ended_while_it_made_or_removed_them(
     assert sorted(p.name for p in (tmp_path / "temporary").iterdir()) == ["mfhca-audit-fresh", "mfhca-audit-now"]
 
 
+def test_a_signal_as_soon_as_a_folder_is_made_leaves_none(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path / "temporary"))
+    (tmp_path / "temporary").mkdir()
+    make, made = os.mkdir, list[str]()
+
+    def ended(path: str, *words: object, **more: object) -> None:
+        make(path, *words, **more)  # type: ignore[arg-type]
+        if "mfhca-audit-" in str(path):
+            made.append(str(path))
+            raise SystemExit(143)  # as SIGTERM does
+
+    monkeypatch.setattr("os.mkdir", ended)
+    for act in (swept_folder, lambda: run_folders(tmp_path / "out")):
+        with pytest.raises(SystemExit), act():
+            pass
+    assert len(made) == 2
+    assert not list((tmp_path / "temporary").iterdir())
+
+
 @pytest.mark.parametrize("number", [errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP])
 def test_a_file_system_without_locks_is_said_at_once(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, number: int
