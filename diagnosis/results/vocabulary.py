@@ -118,7 +118,7 @@ _TIER_RANK = {member: i for i, member in enumerate(Tier)}
 _TIERS = {
     Tier.DIRECT: _TierRow(3, "second measurements", "second measurement", "measured against {second}"),
     Tier.MODEL: _TierRow(
-        2, "a model of the {wheels}", "{kind} model", "by the {kind} model, without a second measurement"
+        2, "a model of the {wheels}", "{kind} model", "by the {kind} model, not by a second measurement"
     ),
     Tier.DRIVE: _TierRow(
         2, "a model of the drive", "drive model", "by the drive's own effort, without a second measurement"

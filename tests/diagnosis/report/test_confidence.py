@@ -62,7 +62,7 @@ def test_phrase_of_a_fault() -> None:
     assert sure_of(fault(0.21, hypotheses=rows), nothing).startswith(
         "Practically certain faulty (over 99.9 %), perhaps stuck (21 %)"
     )
-    assert sure_of(fault(0.75, tier="model"), nothing).endswith("by the wheel model, without a second measurement")
+    assert sure_of(fault(0.75, tier="model"), nothing).endswith("by the wheel model, not by a second measurement")
 
 
 def test_both_sides_count_where_they_are_not_told_apart() -> None:

@@ -55,7 +55,7 @@ def test_how_a_fault_was_decided() -> None:
     assert HYDRAULIC.decided(Tier.DIRECT, Kind.STEER, Side.SENSOR) == "measured against a second angle sensor"
     assert (
         HYDRAULIC.decided(Tier.MODEL, Kind.STEER, Side.ACTUATOR)
-        == "by the steering model, without a second measurement"
+        == "by the steering model, not by a second measurement"
     )
     assert HYDRAULIC.decided(Tier.DIRECT, Kind.WHEEL, Side.SENSOR_OR_ACTUATOR) == ""
 
