@@ -16,7 +16,7 @@ from diagnosis.clearing.backwards import without_claims
 from diagnosis.clearing.beside_angles import less_sure_beside_wrong_angles
 from diagnosis.clearing.beside_valves import less_sure_beside_dead_valves
 from diagnosis.clearing.contradicted import without_contradicted
-from diagnosis.clearing.standing_out import what_stands_out, with_findings, without_followers
+from diagnosis.clearing.standing_out import what_stands_out, with_findings, without_explained, without_followers
 from diagnosis.decision import metrics, quality
 from diagnosis.decision.episodes import with_episodes
 from diagnosis.decision.second_onsets import with_second_onsets
@@ -205,10 +205,10 @@ def _without_contradicted(judged: Judged) -> Judged:
 def _with_what_stands_out(judged: Judged) -> Judged:
     """The same with parts named that the checks of the all-clear leave no doubt about, unless the whole machine explains them."""
     found = judged.found
-    if found.events or judged.hints or judged.places:
+    if judged.hints or judged.places:
         return judged
     more = what_stands_out(judged.checks, judged.cells, found.words)
-    if not more:
+    if not (more := without_explained(more, found.events, judged.machine.axles)):
         return judged
     told = replace(found, assessments=with_findings(found.assessments, more))
     open_ = tuple(c for c in judged.checks if c.component in more and not c.passed)

@@ -9,7 +9,7 @@ angle that is far off its second measurement, or jumps, is its sensor's fault, w
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -22,6 +22,7 @@ from diagnosis.clearing.untold_faults import fault_of_angle, fault_of_axle, faul
 from diagnosis.results.assessment import CODE, Assessment, Finding
 from diagnosis.results.clearing import Check, Checked
 from diagnosis.results.limited import limited
+from diagnosis.results.machine_event import MachineEvent
 from diagnosis.results.machine_words import MachineWords
 from diagnosis.results.vocabulary import Kind, Tier
 from replay.faults import FaultMode, Side, State
@@ -65,6 +66,15 @@ def what_stands_out(checks: Sequence[Checked], cells: Cells, words: MachineWords
     return {
         component: replace(f, evidence=tuple(words.fill(text) for text in f.evidence)) for component, f in found.items()
     }
+
+
+def without_explained(
+    found: Mapping[str, Finding], events: Sequence[MachineEvent], axles: Collection[str]
+) -> dict[str, Finding]:
+    """What stands out, by component, less what events of the whole machine explain; a wheel model that does not fit explains no axle."""
+    if not events:
+        return dict(found)
+    return {part: f for part, f in found.items() if part in axles and all(event.model for event in events)}
 
 
 def with_findings(assessments: Mapping[Part, Assessment], found: Mapping[str, Finding]) -> dict[Part, Assessment]:

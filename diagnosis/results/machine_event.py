@@ -21,12 +21,15 @@ class MachineEvent:
         Why a mission with faults to watch is not cleared; continues "not cleared: …".
     act : str
         What to do before a mission may be judged again.
+    model : bool
+        Whether the wheel model alone is in doubt: what axles show without it stands.
     """
 
     title: str
     text: str
     doubt: str
     act: str
+    model: bool = False
 
     def worded(self, words: MachineWords) -> MachineEvent:
         """With the machine's own words."""
@@ -64,4 +67,4 @@ def foreign(text: str) -> MachineEvent:
     """Most wheels deviate now and then from a wheel model that does not fit the machine."""
     doubt = "most {wheels} deviate now and then from what the {wheel} model expects"
     act = "record {valve} positions (wheel.<W>.u_applied), or give the machine's [plant], and diagnose again"
-    return MachineEvent("The {wheel} model does not fit this machine", text, doubt, act)
+    return MachineEvent("The {wheel} model does not fit this machine", text, doubt, act, model=True)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from diagnosis.estimation.viterbi import first_lasting
 from diagnosis.results.assessment import Finding
+from diagnosis.results.limited import limited
 from diagnosis.wheels.alive import lives
 from diagnosis.wheels.blocks import per_sample
 from diagnosis.wheels.isolation import Run, judge
@@ -24,11 +25,9 @@ Array = NDArray[np.float64]
 
 _HOLD_S = 0.1
 _REACH_S = 0.4  # within which the raw signal shows an edge that the Kalman models did not place
-_PROBABLE, _OF_STEP, _SEEN_STEP = (
-    0.8,
-    0.5,
-    8.0,
-)  # a loss this probable needs no step; share of one that is one; times the noise
+_PROBABLE, _OF_STEP, _SEEN_STEP = 0.8, 0.5, 8.0  # a loss less probable needs a step; share that is one; times the noise
+_MOST_STEPLESS = 0.85  # of a loss without one: a sensor that fades, or another cause of what the wheel does
+_NO_STEP = "A sensor's loss that comes or goes at once makes a step, which is missing here: it fades, or something else than the sensor changed."
 _LEAST_HEALTHY = 0.95  # probability below which a side is not called healthy
 _TOGETHER = 0.5  # of a run: where no wheel turns, none of them is known to be dead
 _USUAL = 0.5  # below this it deviates by more than what healthy machines do
@@ -148,8 +147,13 @@ def findings_of(path: WheelPath, limits: Limits) -> WheelFindings:
         if verdict.hidden:
             out.opened[Side.ACTUATOR][start:stop] = True
         found = verdict.finding
-        if found is not None and not _repeated(found, out.findings) and not _stepless(path, found):
-            out.findings.append(_detected(path, w.segment, found))
+        if found is None or _repeated(found, out.findings):
+            continue
+        if _stepless(path, found):
+            if found.probability < _PROBABLE:
+                continue
+            found = limited(found, _MOST_STEPLESS, _NO_STEP)
+        out.findings.append(_detected(path, w.segment, found))
     blind = [f for f in out.findings if f.side is Side.SENSOR and f.mode.total]
     out.findings[:] = [f for f in out.findings if f.side is not Side.ACTUATOR or _seen(f, blind) > 0.5]
     return out
@@ -173,11 +177,11 @@ def _repeated(finding: Finding, before: Sequence[Finding]) -> bool:
 
 
 def _stepless(path: WheelPath, finding: Finding) -> bool:
-    """Whether a sensor's loss that is no more than probable lacks the step of its reading with which a loss begins and ends.
+    """Whether a sensor's loss lacks the step of its reading with which one begins and ends, where it does so at once.
 
     At a speed at which a step is no more than the noise, none is missed.
     """
-    if (finding.side, finding.mode) != (Side.SENSOR, FaultMode.INEFFICIENT) or finding.probability >= _PROBABLE:
+    if (finding.side, finding.mode) != (Side.SENSOR, FaultMode.INEFFICIENT):
         return False
     lost, reach, y = finding.epsilon.value if finding.epsilon else 0.0, 2 * path.width, path.y
     missed = 0

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from diagnosis.clearing.checks import checks_of
-from diagnosis.clearing.standing_out import what_stands_out, with_findings, without_followers
+from diagnosis.clearing.standing_out import what_stands_out, with_findings, without_explained, without_followers
 from diagnosis.results.assessment import CODE, Assessment, Finding
 from diagnosis.results.clearing import Check, Checked
+from diagnosis.results.machine_event import foreign, swinging
 from diagnosis.results.machine_words import HYDRAULIC
 from diagnosis.results.vocabulary import Kind, Tier
 from replay.faults import FaultMode, FaultSpec, Side, State
@@ -95,6 +96,14 @@ def test_an_axle_that_stands_still_is_named_and_explains_its_wheels() -> None:
     after = with_findings({("front", "actuator"): Assessment(rest)}, found)["front", "actuator"]
     assert set(after.states[fault.start : fault.stop]) == {CODE[State.NO_SIGNAL]}
     assert after.states[fault.stop] == CODE[State.NOT_EXCITED]
+
+
+def test_a_wheel_model_that_does_not_fit_explains_no_axle() -> None:
+    fault = next(iter(_found(FaultSpec("front", Side.ACTUATOR, FaultMode.NO_SIGNAL, *WHOLE)).values()))
+    found, axles = {"front": fault, "RR": fault}, ("front", "rear")
+    assert without_explained(found, (), axles) == found
+    assert without_explained(found, (foreign("…"),), axles) == {"front": fault}
+    assert without_explained(found, (foreign("…"), swinging("…")), axles) == {}
 
 
 def test_states_of_both_sides_say_the_fault_but_where_nothing_was_known() -> None:

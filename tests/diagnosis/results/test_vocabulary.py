@@ -54,8 +54,7 @@ def test_plain_words_for_the_kind_of_evidence(kind: Kind, tier: Tier, words: str
 def test_how_a_fault_was_decided() -> None:
     assert HYDRAULIC.decided(Tier.DIRECT, Kind.STEER, Side.SENSOR) == "measured against a second angle sensor"
     assert (
-        HYDRAULIC.decided(Tier.MODEL, Kind.STEER, Side.ACTUATOR)
-        == "by the steering model, not by a second measurement"
+        HYDRAULIC.decided(Tier.MODEL, Kind.STEER, Side.ACTUATOR) == "by the steering model, not by a second measurement"
     )
     assert HYDRAULIC.decided(Tier.DIRECT, Kind.WHEEL, Side.SENSOR_OR_ACTUATOR) == ""
 

@@ -121,3 +121,14 @@ def test_a_loss_that_is_hardly_probable_needs_its_step(step: bool, p: float, sta
         y[1000:2000] *= 0.5
     out = found(weighed(100, 200, Side.SENSOR, FaultMode.INEFFICIENT, p=p), y=y)
     assert bool(out.findings) is stated
+
+
+@pytest.mark.parametrize(("step", "most"), [(False, 0.85), (True, 0.97)])
+def test_a_loss_without_a_step_is_no_claim(step: bool, most: float) -> None:
+    """What bends instead of jumping may be another cause."""
+    y = 0.3 + 0.001 * np.random.default_rng(5).normal(size=BLOCKS * WIDTH)
+    if step:
+        y[1000:2000] *= 0.5
+    (finding,) = found(weighed(100, 200, Side.SENSOR, FaultMode.INEFFICIENT, p=0.97), y=y).findings
+    assert finding.probability == pytest.approx(most)
+    assert any("makes a step" in sentence for sentence in finding.evidence) is not step

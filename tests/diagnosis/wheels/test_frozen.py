@@ -55,6 +55,15 @@ def test_a_frozen_speed_is_told_as_the_sensors_whatever_a_model_says(spells: int
     assert sum(h.p for h in told[0].hypotheses) == pytest.approx(1.0)
 
 
+@pytest.mark.parametrize(("other", "sure"), [(20, True), (100, False)])
+def test_hardly_longer_than_its_habit_is_no_claim(other: int, sure: bool) -> None:
+    """A run of 3 s beside another of .2 s, or of 1 s."""
+    y = speeds()
+    y[100:400, 0], y[3100 : 3100 + other, 0] = 0.7, 0.9
+    (told,) = found(y)
+    assert (told.probability > 0.9) is sure
+
+
 def test_coarse_readings_at_a_steady_speed_are_a_habit() -> None:
     y = np.repeat(np.round((1.0 + 0.6 * np.sin(2 * np.pi * T[::100] / 15.0))[:, np.newaxis], 2), 100, axis=0)
     assert found(np.repeat(y, 4, axis=1)[:N]) == []
