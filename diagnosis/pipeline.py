@@ -210,7 +210,9 @@ def _with_what_stands_out(judged: Judged) -> Judged:
     more = what_stands_out(judged.checks, judged.cells, found.words)
     if not (more := without_explained(more, found.events, judged.machine.axles)):
         return judged
-    told = replace(found, assessments=with_findings(found.assessments, more))
+    machine = judged.machine
+    seen = less_sure_beside_wrong_angles(with_findings(found.assessments, more), machine.wheels, machine.axles)
+    told = replace(found, assessments=seen)
     open_ = tuple(c for c in judged.checks if c.component in more and not c.passed)
     return replace(judged, found=told, named_by=open_)
 

@@ -15,13 +15,13 @@ Part = tuple[str, str]
 
 _MOST = 0.65  # how often a partial fault beside one that explains it was right
 _INSIDE = 0.5  # of its time
-_WHY = "Meanwhile a steering sensor fails, from whose angle follows what this part should do, which makes the fault less probable."
+_WHY = "Meanwhile a steering sensor fails, or may, from whose angle follows what this part should do, which makes the fault less probable."
 
 
 def less_sure_beside_wrong_angles(
     assessments: Mapping[Part, Assessment], wheels: Sequence[str], axles: Sequence[str]
 ) -> dict[Part, Assessment]:
-    """Assessments in which partial faults of wheels that only a model shows are less sure while a steering angle is wrong.
+    """Assessments in which partial faults of wheels that only a model shows are less sure while a steering angle is, or may be, wrong.
 
     Parameters
     ----------
@@ -30,7 +30,7 @@ def less_sure_beside_wrong_angles(
     wheels, axles : Sequence[str]
         Names of the machine's parts.
     """
-    wrong = [f for a in axles for f in _findings(assessments, (a, Side.SENSOR.value)) if f.side is Side.SENSOR]
+    wrong = [f for a in axles for f in _findings(assessments, (a, Side.SENSOR.value))]
     if not wrong:
         return dict(assessments)
     out = dict(assessments)

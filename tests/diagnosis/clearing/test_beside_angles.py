@@ -24,20 +24,22 @@ def fault(
 def beside(wheel: Finding, angle: Finding) -> Finding:
     """The wheel's fault, once the angle's is known."""
     states = np.zeros(3000, dtype=np.int8)
+    axle = "front", angle.side.sides[0].value
     before = {
         ("RR", wheel.side.value): Assessment(states, findings=(wheel,)),
-        ("front", angle.side.value): Assessment(states, findings=(angle,)),
+        axle: Assessment(states, findings=(angle,)),
         ("RL", "sensor"): Assessment(states),
     }
     after = less_sure_beside_wrong_angles(before, ("RR", "RL"), ("front", "rear"))
-    assert after["front", angle.side.value] is before["front", angle.side.value]
+    assert after[axle] is before[axle]
     (found,) = after["RR", wheel.side.value].findings
     return found
 
 
 @pytest.mark.parametrize("mode", [FaultMode.INEFFICIENT, FaultMode.OUTSIDE_TABLE])
-def test_a_loss_beside_a_wrong_angle_is_less_sure(mode: FaultMode) -> None:
-    found = beside(fault(1000, 1500, mode=mode), fault(0, 3000, mode=FaultMode.NO_SIGNAL))
+@pytest.mark.parametrize("side", [Side.SENSOR, Side.SENSOR_OR_ACTUATOR])
+def test_a_loss_beside_an_angle_that_is_or_may_be_wrong_is_less_sure(mode: FaultMode, side: Side) -> None:
+    found = beside(fault(1000, 1500, mode=mode), fault(0, 3000, side=side, mode=FaultMode.NO_SIGNAL))
     assert found.probability == pytest.approx(0.65)
     assert sum(h.p for h in found.hypotheses) == pytest.approx(1.0)
     assert found.evidence[-1].startswith("Meanwhile a steering sensor fails")
