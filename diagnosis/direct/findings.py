@@ -17,7 +17,7 @@ from diagnosis.direct.isolation import Isolated, estimate_run, isolate
 from diagnosis.direct.onset import refine
 from diagnosis.direct.sentences import BOUNDS, OF_SAT, alike_sentence, sentences
 from diagnosis.direct.timing import timing_explains
-from diagnosis.estimation.fault_models import HEALTHY, INEFFICIENT, STUCK, VARYING_ROWS
+from diagnosis.estimation.fault_models import HEALTHY, INEFFICIENT, STUCK, TOTAL_ROWS, VARYING_ROWS
 from diagnosis.estimation.one_cause import with_one_cause
 from diagnosis.estimation.segments import Run, with_leads
 from diagnosis.estimation.simple_causes import Measured
@@ -47,6 +47,7 @@ _MIDDLE, _MOSTLY = 0.04, 0.98  # of the span: about its middle a valve opens not
 _ZERO = 0.01  # of the span: as far apart may two healthy instruments have their zero
 _ALIKE_P = 0.3  # probability of each of two rows that a constant cannot tell
 _ONE_GAIN, _SAME_P = 0.05, 0.95  # of a gain; that a share which is lost elsewhere too is one
+_OPEN_S, _DOUBT, _FAR_OFF = 0.5, 0.05, 0.2  # s; probability of a healthy channel; of the span
 _SLOW = 0.1  # of its mean, by which a reference changes that hardly moves
 _SAME_SHARE = "The same share is lost in another fault of this part that shows it better; the bounds are of both."
 _GROWTH_S = 0.1  # a shorter time of growth is not worth a sentence
@@ -93,7 +94,8 @@ def find_faults(path: ModePath, found: IdentifiedPair, limits: Limits) -> Faults
     runs = [run for run, finding in told.items() if run.row in VARYING_ROWS or finding is not None]
     returns = _TAIL_S + _SETTLED_LAGS * (found.relation.lag + max(0.0, found.relation.delay * dt))
     chained = with_leads(runs, *(max(2, round(s / dt)) for s in (_LEAD_S, returns, _CHAIN_S)))
-    findings, timing, below = [], [], len(told) - len(runs)
+    open_ = [run for run, f in told.items() if f is None and run.row in TOTAL_ROWS and _left_open(run, found, limits)]
+    findings, timing, below = [], open_, len(told) - len(runs)
     for i, (main, start, stop) in enumerate(chained):
         before, after = chained[i - 1][2] if i else 0, chained[i + 1][1] if i + 1 < len(chained) else size
         limit = (before if start == main.start else main.start, after if stop == main.stop else main.stop)
@@ -113,6 +115,13 @@ def find_faults(path: ModePath, found: IdentifiedPair, limits: Limits) -> Faults
     beside = [_as_beside(f, findings, found) for f in findings]
     measured = _measured(found, limits)
     return FaultsFound(with_one_cause(with_spikes(beside, measured), measured), timing, below)
+
+
+def _left_open(run: Run, found: IdentifiedPair, limits: Limits) -> bool:
+    """Whether a run that is no finding is nothing healthy either: it lasts, is far off its reference, and is by no means a healthy channel."""
+    if (run.stop - run.start) * found.pair.dt < _OPEN_S or (seen := isolate(run, found, _least(found, limits))) is None:
+        return False
+    return float(seen.p[HEALTHY]) < _DOUBT and seen.seen.deviation > _FAR_OFF * found.pair.span
 
 
 def _measured(found: IdentifiedPair, limits: Limits) -> Measured:

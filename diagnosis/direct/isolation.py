@@ -44,6 +44,7 @@ _OF_PLAY = 0.3  # of its width per rms opening: standard deviation of the gain t
 _CALM_P = 0.95  # that a steady row which leaves hardly anything is the fault's
 _CLEARLY = 2.0  # times as probable as the path's row, from which on another one is stated
 _MAJORITY = 0.5  # of the probability: a fault is called by it
+_NOTHING = 0.05  # of the span, root mean square: a channel that shows more is not silent, however rough its usual noise
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,6 +61,8 @@ class RunSamples:
         Steps with both values.
     zero : bool
         Whether the channel stays at zero.
+    loud : bool
+        Whether it shows so much that it is not silent.
     still : bool
         Whether its reference hardly moves.
     deviation : float
@@ -73,6 +76,7 @@ class RunSamples:
     status: NDArray[np.int8]
     use: NDArray[np.bool_]
     zero: bool
+    loud: bool
     still: bool
     deviation: float
     noise: float
@@ -112,10 +116,12 @@ def run_samples(run: Run, found: IdentifiedPair, min_sat: float = 0.0) -> RunSam
     noise = float(np.sqrt(power.mean())) if use.any() else model.noise
     play = found.relation.play
     slack = 3 * model.constant_noise / np.sqrt(min(use.sum(), 100)) + 0.6 * play if use.any() else 0.0
-    zero = not use.any() or abs(float(np.mean(y[use]))) <= slack or float(np.sqrt(np.mean(y[use] ** 2))) <= min_sat
+    size = float(np.sqrt(np.mean(y[use] ** 2))) if use.any() else 0.0
+    loud = size > _NOTHING * found.pair.span
+    zero = not use.any() or size <= min_sat or (abs(float(np.mean(y[use]))) <= slack and not loud)
     still = bool(use.any()) and (float(np.std(x[use])) < 2 * noise or float(np.ptp(x[use])) < 2 * play)
     deviation = float(np.sqrt(np.mean((y[use] - x[use]) ** 2))) if use.any() else float("inf")
-    return RunSamples(y, x, status, use, zero, still, deviation, noise)
+    return RunSamples(y, x, status, use, zero, loud, still, deviation, noise)
 
 
 def estimate_run(run: Run, found: IdentifiedPair) -> Estimate | None:
@@ -166,6 +172,8 @@ def isolate(run: Run, found: IdentifiedPair, min_sat: float) -> Isolated | None:
         return None
     p = row_probabilities(evidence, model.side)
     seen = run_samples(run, found, min_sat)
+    if seen.loud:
+        p = _not_silent(p, model.side)
     row = stated_row(run.row, p, zero=seen.zero, still=seen.still)
     if row != run.row:  # the path came by this one from its neighbours or for want of time to change
         other = estimate_run(replace(run, row=row), found)
@@ -262,6 +270,15 @@ def stated_row(row: int, p: Array, *, zero: bool, still: bool) -> int:
     alike = (zero and {row, best} <= constant) or (still and {row, best} <= set(STEADY_ROWS))
     other = p[best] > _CLEARLY * p[row] or p[best] > _MAJORITY
     return best if other and not alike else row
+
+
+def _not_silent(p: Array, side: Side) -> Array:
+    """Probabilities of the rows, shape (rows,), of a channel that shows too much to have no signal: the other faults share that row's."""
+    others = [r for r in codes_of(side) if r not in (HEALTHY, NO_SIGNAL)]
+    out = p.copy()
+    out[others] += out[NO_SIGNAL] / len(others)
+    out[NO_SIGNAL] = 0.0
+    return out
 
 
 def _with_lapses(p: Array, row: int, side: Side, seconds: float | None) -> Array:
