@@ -152,7 +152,7 @@ def assess_response(
     }
     least = max(1, round(_LEAST_S / BLOCK_S))
     asked = {w: _asked(j, limits) for w, j in judged.items()}
-    kept = {w: where_asked(spells, asked[w], least) for w, spells in kept.items()}
+    kept = {w: where_asked(spells, asked[w], least, judged[w].posterior) for w, spells in kept.items()}
     kept = {w: until_back(spells, judged[w].wheel.blocks.dead, asked[w]) for w, spells in kept.items()}
     kept = {w: [s for s in spells if not stands_with_all(s, w, judged, asked)] for w, spells in kept.items()}
     turning = turning_of(judged, geometry, bodies.yaw if not sideways else None)
