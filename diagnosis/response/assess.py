@@ -8,9 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from diagnosis.response.answering import BODY_COMMANDS, MOVES, wheels_of
 from diagnosis.response.beside import Bodies, same_side, turns_by_wheels, views
 from diagnosis.response.body import BodySpeed
-from diagnosis.response.channel import Samples, holds_of, samples_of, without_holds
+from diagnosis.response.channel import holds_of, samples_of
 from diagnosis.response.common_cause import (
     consequence,
     less_sure,
@@ -19,15 +20,12 @@ from diagnosis.response.common_cause import (
     stands_with_all,
     without_consequences,
 )
-from diagnosis.response.drive import as_a_peer, by_peers, unanswered
+from diagnosis.response.drive import by_peers, unanswered
 from diagnosis.response.effort import idle_drives, idle_spans, own_pull, powered, shares_of
-from diagnosis.response.findings import Wheel
 from diagnosis.response.ground import by_drag, by_slip
 from diagnosis.response.gyro import wrong_gyro
-from diagnosis.response.identification import Response, identify_response, without_command
 from diagnosis.response.inputs import FollowerData, cell_of, cells
 from diagnosis.response.joint import cut, joint_of
-from diagnosis.response.jumps import jumps_of
 from diagnosis.response.kernel import posterior
 from diagnosis.response.late import late_neighbour, late_wheels, left_open, smallest_delay
 from diagnosis.response.machine import Judged, lasting_losses, otherwise, standstills, unexplained, unlike
@@ -35,10 +33,8 @@ from diagnosis.response.models import (
     BLOCK_S,
     MEAN_FAULTY_S,
     MEAN_HEALTHY_S,
-    STATES,
     Beside,
     Blocks,
-    blocks_of,
     scores,
 )
 from diagnosis.response.power import powers_of
@@ -63,11 +59,8 @@ Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 _AT_A_JUMP = 0.1, 0.3  # probability that a fault begins, or ends, where the channel jumps
-_MOVES = 0.4  # of the driving speed: enough to see whether a channel lives
 _OWN, _OTHERS = 4, 2  # holds of a channel that may be faults: of the one in question, and of each other
-_LEAST_S, _TURNS_S = 1.0, 5.0
-_LEAST_OTHERS = 2  # wheels that answer, beside one that does not
-_BODY_COMMANDS = 2  # speed and yaw rate
+_LEAST_S = 1.0
 _PAIR = 2  # wheels, of which each moves one side of the machine
 
 
@@ -111,17 +104,17 @@ def assess_response(
     drives = list(data.values())
     left_out = standing(data, limits.driving_speed, dt)
     idle = spans_of(np.logical_or.reduce(list(left_out.values())))
-    found = _wheels(data, left_out, geometry, (cell, width), limits, dt)
+    found = wheels_of(data, left_out, geometry, (cell, width), limits, dt)
     if not found:
         return Judgement({}, standstills(idle, dt) or unexplained(drives, limits, dt))
     rest = {w: samples_of(d.y, d.fresh) for w, d in data.items() if w not in found}
     found = by_each_other(found, width * dt, rest)
-    holds = {w: holds_of(j.wheel.samples, _MOVES * limits.driving_speed, dt) for w, j in found.items()}
+    holds = {w: holds_of(j.wheel.samples, MOVES * limits.driving_speed, dt) for w, j in found.items()}
     lone = (
         len(data) == _PAIR and len(found) == _PAIR and turns_by_wheels(*(j.wheel.blocks.mean for j in found.values()))
     )
     found = {w: j._replace(wheel=j.wheel._replace(habit=_habit(w, holds), lone=lone)) for w, j in found.items()}
-    sideways = any(d.commands.shape[1] > _BODY_COMMANDS for d in drives) or goes_sideways(
+    sideways = any(d.commands.shape[1] > BODY_COMMANDS for d in drives) or goes_sideways(
         {w: j.wheel.blocks.mean for w, j in found.items()}, geometry, width * dt
     )
     bodies = Bodies(speeds, None if yaw is None else cells(yaw, width), width * dt, sideways)
@@ -137,6 +130,7 @@ def assess_response(
     names = {w: j.data.name for w, j in found.items()}
     beside, by_motion, left_notes = views(names, {w: j.wheel.blocks for w, j in found.items()}, geometry, bodies)
     judged = {w: _judge(j, beside.get(w), dt, width) for w, j in found.items()}
+    slips = {w: [s for s in j.spells if by_slip(s, w, judged, bodies.yaw)] for w, j in judged.items()}
     kept = {
         w: [
             less_sure(s, w, judged, width * dt)
@@ -145,14 +139,15 @@ def assess_response(
             and not told_and_doing_alike(s, w, judged)
             and not consequence(s, w, judged)
             and not wrong_yaw_rate(s, j)
-            and not by_slip(s, w, judged, bodies.yaw)
+            and s not in slips[w]
             and not by_drag(s, w, judged)
         ]
         for w, j in judged.items()
     }
     least = max(1, round(_LEAST_S / BLOCK_S))
     asked = {w: _asked(j, limits) for w, j in judged.items()}
-    kept = {w: where_asked(spells, asked[w], least) for w, spells in kept.items()}
+    bare = {w: j.posterior if j.speed is None else None for w, j in judged.items()}
+    kept = {w: where_asked(spells, asked[w], least, bare[w]) for w, spells in kept.items()}
     kept = {w: until_back(spells, judged[w].wheel.blocks.dead, asked[w]) for w, spells in kept.items()}
     kept = {w: [s for s in spells if not stands_with_all(s, w, judged, asked)] for w, spells in kept.items()}
     turning = turning_of(judged, geometry, bodies.yaw if not sideways else None)
@@ -177,12 +172,15 @@ def assess_response(
     parts = {
         w: sides_of(j, kept[w], (weak[w], late[w]), (left_out[w], together), limits, dt) for w, j in judged.items()
     }
-    parts = {w: (_left_open(sensor, unclear[w]), drive) for w, (sensor, drive) in parts.items()}
+    parts = {
+        w: (_doubted(sensor, [slice(f.start, f.stop) for f in unclear[w]]), drive)
+        for w, (sensor, drive) in parts.items()
+    }
     astray, lasts = otherwise(judged, width * dt)
     remarks = (*astray, *left_notes)
     doubts = {w: j.joint.unlike for w, j in judged.items() if j.joint is not None and j.joint.unlike}
     for w, text in (doubts | unlike(judged)).items():
-        parts[w] = _doubted(parts[w][0], text), parts[w][1]
+        parts[w] = _doubted(parts[w][0], [slice(None)], text), parts[w][1]
     lasting = lasting_losses(judged)
     for w, (sensor, drive) in parts.items():
         j, about = judged[w], asked[w]
@@ -190,10 +188,7 @@ def assess_response(
         delay, told = smallest_delay(j, width * dt)
         powers = powers._replace(rows=(*powers.rows, delay))
         parts[w] = replace(sensor, powers=powers, notes=(*sensor.notes, told, *remarks)), drive
-    unsettled = {
-        w: [*kept[w], *(s for s in j.spells if not wrong_yaw_rate(s, j) and by_slip(s, w, judged, bodies.yaw))]
-        for w, j in judged.items()
-    }
+    unsettled = {w: [*kept[w], *(s for s in slips[w] if not wrong_yaw_rate(s, j))] for w, j in judged.items()}
     gyro = wrong_gyro(judged, unsettled, turning, width * dt)
     ignored = () if any(j.response.answered for j in judged.values()) else unexplained(drives, limits, dt)
     return Judgement(parts, (*standstills(idle, dt), *(astray if lasts else ()), *ignored), gyro)
@@ -205,78 +200,13 @@ def _turned_by(wheel: str, found: Mapping[str, Judged]) -> bool:
     return any(turns_by_wheels(means[wheel], means[o]) for o in means if o != wheel)
 
 
-def _doubted(sensor: Assessment, why: str) -> Assessment:
-    """A sensor of which nothing healthy can be said."""
-    states = np.where(sensor.states == CODE[State.HEALTHY], CODE[State.NOT_ASSESSED], sensor.states).astype(np.int8)
-    return replace(sensor, states=states, reasons={**sensor.reasons, State.NOT_ASSESSED: why})
-
-
-def _left_open(sensor: Assessment, unclear: Sequence[Finding]) -> Assessment:
-    """A sensor that is not healthy at times of which the ground may be the cause."""
+def _doubted(sensor: Assessment, where: Sequence[slice], why: str = "") -> Assessment:
+    """A sensor of which nothing healthy can be said in some steps, and why, where that is another reason than before."""
     states = sensor.states.copy()
-    for f in unclear:
-        part = states[f.start : f.stop]
-        part[part == CODE[State.HEALTHY]] = CODE[State.NOT_ASSESSED]
-    return replace(sensor, states=states)
-
-
-def _wheels(
-    data: Mapping[str, FollowerData],
-    hidden: Mapping[str, Flags],
-    geometry: Geometry | None,
-    steps: tuple[int, int],
-    limits: Limits,
-    dt: float,
-) -> dict[str, Judged]:
-    """Wheels whose response could be found, with their blocks; nothing is judged yet."""
-    cell, width = steps
-    out: dict[str, Judged] = {}
-    channels: dict[str, tuple[Samples, Response | None]] = {}
-    for w, d in data.items():
-        y = np.where(hidden[w], np.nan, d.y)
-        samples = samples_of(y, d.fresh)
-        y[samples.step[samples.wild]] = np.nan
-        channels[w] = samples, _response(y, samples, d, cell, limits, dt)
-    answers = {w: found for w, (_, found) in channels.items() if found is not None}
-    several = len(answers) >= _LEAST_OTHERS
-    for w, d in data.items():
-        y, (samples, found) = d.y, channels[w]
-        if found is None and not several:  # of two wheels the other one shows what a command makes
-            found = as_a_peer(w, d.commands, answers, geometry, cell * dt)
-        # wheels of one body, that is: joints which are each commanded by themselves have nothing to do with each other
-        ignored = not answers and len(data) > 1 and d.commands.shape[1] >= _BODY_COMMANDS and _turns(y, limits, dt)
-        if found is None and not several and not ignored and np.isfinite(d.commands).any():
-            continue
-        # a wheel that makes nothing of its command, alone or as all do, is judged by the others, and by its channel
-        response = without_command(-(-y.size // cell)) if found is None else found
-        if response.answered and samples.wild.any():
-            around = response.reach(d.commands, cell, dt, y.size)
-            samples = samples_of(np.where(hidden[w], np.nan, y), d.fresh, around)
-        blocks = blocks_of(samples, response, cell, width, y.size)
-        moves = np.abs(np.nan_to_num(blocks.mean))
-        if response.answered:
-            moves = np.maximum(np.maximum(np.abs(blocks.low), np.abs(blocks.high)), moves)
-        driving = moves > _MOVES * limits.driving_speed
-        jumps, calm = jumps_of(samples, blocks, width, dt)
-        wheel = Wheel(d.name, samples, blocks, jumps, dt, "")
-        others = tuple(o.y for k, o in data.items() if k != w)
-        start = np.zeros((0, STATES))
-        out[w] = Judged(d, response, wheel, driving, start, [], None, calm, alone=not others, others=others)
-    return out
-
-
-def _turns(y: Array, limits: Limits, dt: float) -> bool:
-    """Whether a wheel turns for long enough to show how its channel reads."""
-    return bool(np.count_nonzero(np.abs(np.nan_to_num(y)) > limits.driving_speed) * dt >= _TURNS_S)
-
-
-def _response(y: Array, samples: Samples, data: FollowerData, cell: int, limits: Limits, dt: float) -> Response | None:
-    """Response of a drive; a speed that is held for long says nothing of it, unless hardly any other is left."""
-    for source in (without_holds(y, samples, dt), y):
-        found = identify_response(cells(source, cell), data.commands, cell * dt, limits.driving_speed)
-        if found is not None:
-            return found
-    return None
+    for part in where:
+        states[part][states[part] == CODE[State.HEALTHY]] = CODE[State.NOT_ASSESSED]
+    reasons = {**sensor.reasons, State.NOT_ASSESSED: why} if why else sensor.reasons
+    return replace(sensor, states=states, reasons=reasons)
 
 
 def _judge(one: Judged, beside: Beside | None, dt: float, width: int) -> Judged:
@@ -329,7 +259,7 @@ def _asked(one: Judged, limits: Limits) -> Flags:
 
     Where it has a command only a view of this very wheel counts beside it: one that stands as it is told does nothing wrong.
     """
-    blocks, least = one.wheel.blocks, _MOVES * limits.driving_speed
+    blocks, least = one.wheel.blocks, MOVES * limits.driving_speed
     asked = (blocks.low > least) | (blocks.high < -least)
     if one.speed is None or (one.response.answered and not one.wheel.own):
         return asked

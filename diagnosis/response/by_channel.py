@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.response.channel import Samples
-from diagnosis.response.findings import SENSOR_SHARE, Wheel, sensor_finding
+from diagnosis.response.wheel import SENSOR_SHARE, Wheel, sensor_finding
 from diagnosis.results.assessment import Finding
 from diagnosis.results.result import Epsilon
 from replay.faults import FaultMode

@@ -2,83 +2,32 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.response.at_once import back_at_once, how_hard, sensor_by_jumps, times_harder, too_hard
-from diagnosis.response.channel import Samples
-from diagnosis.response.jumps import Jumps, onset_of
-from diagnosis.response.models import Blocks
+from diagnosis.response.jumps import onset_of
 from diagnosis.response.spells import Spell
+from diagnosis.response.wheel import EITHER, SENSOR_SHARE, Wheel, sensor_finding
 from diagnosis.results.assessment import Finding
-from diagnosis.results.result import Epsilon, Hypothesis, Sat
-from diagnosis.results.vocabulary import Tier
-from replay.faults import FaultMode, Side, State
+from diagnosis.results.result import Epsilon, Sat
+from replay.faults import FaultMode
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
-SENSOR_SHARE = 0.96  # that what a channel alone shows is the sensor's
 _ONE_JUMP, _TWO_JUMPS = 0.92, 0.97
-_EITHER = 0.6  # that it is the sensor's, up to which its side is left open
 _BY_BODY = 0.08  # that it is the sensor's although the body turns as the reading says
 _LEAST_PULLS, _AS_USUAL = 8, (0.6, 1.5)  # blocks with an effort, and its size by the usual one
 _CHANGES = 0.1  # of the readings, as a dead sensor's do not
 _MOVING = 0.2  # of the usual speed
 _CREEPS = 0.03  # of the top speed
-_SHARP_S = 0.012  # between readings: a wheel that jams, or comes free, takes longer
 _WHOLE = 0.75  # of the speed: what rises, or falls, by less from one reading to the next is no whole jump
 _IN_SHARE, _VARIES = 0.06, 0.2  # misfit of a share of another speed, by its own size, and how much that speed varies
 _LOUD = 2.0  # times the usual change from reading to reading, the other wheels' at that time included
 _BEYOND_HABIT = 2.5  # times as long as healthy channels stay at a value
 # a scaled speed that only its command contradicts: loads and slip last less, or are less sure
 _BARE_P, _BARE_S = 0.92, 5.0
-
-
-class Wheel(NamedTuple):
-    """A wheel with everything that its findings are made from.
-
-    Attributes
-    ----------
-    name : str
-        Of its channel.
-    samples, blocks, jumps
-        Its readings, by blocks, and where they jump.
-    dt : float
-        Step of the timeline [s].
-    compared : str
-        Channels that show the same speed, in words; empty where there are none.
-    habit : float
-        How long healthy channels of this machine stay at one value [s].
-    own : bool
-        Whether those channels show how this wheel itself turns; others only how it should.
-    pull : Array or None, shape (b,)
-        Effort of its drive by its share of the load [1]; NaN where nothing is pulled, None where it is not logged.
-    spiky : bool
-        Whether single readings are far off more often than those of the other wheels.
-    lone : bool
-        Whether nothing but this wheel moves its side of the machine.
-    """
-
-    name: str
-    samples: Samples
-    blocks: Blocks
-    jumps: Jumps
-    dt: float
-    compared: str
-    habit: float = 0.0
-    own: bool = False
-    pull: Array | None = None
-    spiky: bool = True
-    lone: bool = False
-
-    @property
-    def sharp(self) -> bool:
-        """Whether readings follow each other so fast that a jump between two of them is none that a drive could make."""
-        step = self.samples.step
-        return step.size > 1 and float(np.median(np.diff(step))) * self.dt <= _SHARP_S
 
 
 def finding_of(spell: Spell, wheel: Wheel, speed: Array | None) -> Finding | None:
@@ -147,7 +96,7 @@ def _silent(spell: Spell, wheel: Wheel, first: int, last: int, speed: Array | No
             )
         )
     freed = back_at_once(wheel.samples, last, wheel.dt) if wheel.lone and not spell.turns else None
-    if freed is not None and sensor <= _EITHER and times_harder(wheel.samples, freed[1:]) > 1.0:
+    if freed is not None and sensor <= EITHER and times_harder(wheel.samples, freed[1:]) > 1.0:
         sensor = sensor_by_jumps(wheel.samples, freed[1:], wheel.dt)
         begin, end = (int(wheel.samples.step[k]) for k in freed)
         hard = how_hard(wheel.samples, freed[1:])
@@ -167,7 +116,7 @@ def _silent(spell: Spell, wheel: Wheel, first: int, last: int, speed: Array | No
     if sensor > _BY_BODY and _lives(wheel, begin, end):
         sensor = min(sensor, 0.5)
         texts.append("Its readings, small as they are, still change: a dead sensor's do not.")
-    if 1.0 - _EITHER <= sensor <= _EITHER:
+    if 1.0 - EITHER <= sensor <= EITHER:
         texts.append(
             "Without a sharp jump or another view of this {wheel}, one that stands still and a dead sensor cannot be distinguished; readings "
             "100 times a second, the position of its joint, or {or_view}the drive's effort would tell them apart."
@@ -184,7 +133,7 @@ def _asked_little(wheel: Wheel, part: slice) -> bool:
     low, high = b.low[part], b.high[part]
     known = np.isfinite(low) & np.isfinite(high)
     least = np.maximum(b.noise[part], _CREEPS * float(np.nanquantile(np.abs(b.mean), 0.95)))
-    return bool(known.any() and np.mean((np.abs(low + high) < 2.0 * least)[known]) > _EITHER)
+    return bool(known.any() and np.mean((np.abs(low + high) < 2.0 * least)[known]) > EITHER)
 
 
 def _lives(wheel: Wheel, begin: int, end: int) -> bool:
@@ -197,7 +146,7 @@ def _by_body(spell: Spell, sensor: float, texts: list[str]) -> float:
     """Probability that a spell is the sensor's [1], beside how the body turns; says so in `texts`."""
     if not spell.turns:
         return sensor
-    if sensor > _EITHER:  # two that contradict each other
+    if sensor > EITHER:  # two that contradict each other
         return 0.5
     texts.append(
         "The measured yaw rate follows this reading, not what the {wheel} should do: the {wheel} really turns so, and its {valve} does not do "
@@ -267,7 +216,7 @@ def _scaled(spell: Spell, wheel: Wheel, span: tuple[int, int], speed: Array | No
     sensor = _by_jumps(wheel, len(places))
     if not spell.turns:  # where the body turns so the wheel does, however fast it came
         sensor = max(sensor, sensor_by_jumps(wheel.samples, places, wheel.dt))
-    bare = speed is None and _by_jumps(wheel, len(places)) <= _EITHER
+    bare = speed is None and _by_jumps(wheel, len(places)) <= EITHER
     if bare and (spell.p < _BARE_P or (span[1] - span[0]) * wheel.dt < _BARE_S):
         return None
     begin = span[0] if fell is None else int(wheel.samples.step[fell])
@@ -283,7 +232,7 @@ def _scaled(spell: Spell, wheel: Wheel, span: tuple[int, int], speed: Array | No
         )
     if bare:
         texts.insert(0, f"{wheel.name} is {gain:.2f} × what its command makes it do.")
-    if bare and sensor <= _EITHER:
+    if bare and sensor <= EITHER:
         texts.append(
             "It came while the speed was changing, or not faster than this drive is, and nothing else shows the speed of this {wheel}: "
             "a weak drive and a wrong sensor cannot be distinguished; {or_view}the drive's effort would tell them apart."
@@ -299,7 +248,7 @@ def _scaled(spell: Spell, wheel: Wheel, span: tuple[int, int], speed: Array | No
         sensor = max(sensor, _ONE_JUMP)
         texts.append("The measured yaw rate does not follow this reading.")
     sensor = _by_body(spell, sensor, texts)
-    if 1.0 - _EITHER <= sensor <= _EITHER and not bare:
+    if 1.0 - EITHER <= sensor <= EITHER and not bare:
         texts.append(
             "It began and ended while the speed was changing, or too slowly for a jump: a {wheel} that is weak or skids and a wrong sensor "
             "cannot be distinguished."
@@ -309,38 +258,4 @@ def _scaled(spell: Spell, wheel: Wheel, span: tuple[int, int], speed: Array | No
     p = spell.p * (0.5 + 0.5 * spell.mine) if speed is not None or bare else 1.0 - (1.0 - spell.p) * 0.5
     return sensor_finding(
         begin, max(end, begin + 1), spell.mode, p, Epsilon(loss, loss - wide, loss + wide), None, tuple(texts), sensor
-    )
-
-
-def sensor_finding(
-    start: int,
-    stop: int,
-    mode: FaultMode,
-    p: float,
-    epsilon: Epsilon | None,
-    sat: Sat | None,
-    evidence: tuple[str, ...],
-    sensor: float = 1.0,
-) -> Finding:
-    """A finding with probability p of any fault, of which `sensor` is the sensor's share."""
-    side = Side.SENSOR if sensor > _EITHER else Side.ACTUATOR if sensor < 1.0 - _EITHER else Side.SENSOR_OR_ACTUATOR
-    share = {Side.SENSOR: sensor, Side.ACTUATOR: 1.0 - sensor}.get(side, 1.0)
-    other = Side.ACTUATOR if side is Side.SENSOR else Side.SENSOR
-    stated = p * share
-    rest = (Hypothesis(other.value, mode.value, p - stated),) if p > stated else ()
-    return Finding(
-        start=start,
-        stop=stop,
-        side=side,
-        mode=mode,
-        probability=stated,
-        hypotheses=(
-            Hypothesis(side.value, mode.value, stated),
-            *rest,
-            Hypothesis("none", State.HEALTHY.value, 1.0 - p),
-        ),
-        epsilon=epsilon,
-        sat=sat,
-        evidence=evidence,
-        tier=Tier.RESPONSE,
     )

@@ -221,7 +221,8 @@ def dragged(part: slice, wheel: str, judged: Mapping[str, Judged], least: float 
     judged : Mapping[str, Judged]
         All wheels.
     least : float
-        Share of the blocks off the command from which on something has to be explained [1].
+        Share of the blocks off the command from which on something has to be explained [1]; of those in which the wheel has to turn, for a
+        share of nothing is nothing.
     """
     one = judged[wheel]
     if not one.response.answered:
@@ -238,7 +239,8 @@ def dragged(part: slice, wheel: str, judged: Mapping[str, Judged], least: float 
             ends.append(np.nan_to_num(near + min(_HARDER * most, 1.0) * (j.wheel.blocks.mean - near))[part])
     y, low, high = b.mean[part], np.min(ends, axis=0), np.max(ends, axis=0)
     astray = np.abs(y - np.clip(y, b.low[part], b.high[part])) > _FIRST * b.noise[part]
-    if not astray.any() or np.mean(astray) < least:
+    shows = astray | (b.low[part] > _FIRST * b.noise[part]) | (b.high[part] < -_FIRST * b.noise[part])  # not at rest
+    if not astray.any() or np.mean(astray[shows]) < least:
         return True
     left = np.abs(y - np.clip(y, low, high)) <= _FIRST * b.noise[part]
     return float(np.mean(left[astray])) >= _EXPLAINED and not _halved(y, b.low[part], b.high[part])

@@ -8,11 +8,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnosis.response.findings import Wheel
 from diagnosis.response.identification import Response
 from diagnosis.response.inputs import FollowerData
 from diagnosis.response.joint import Joint
 from diagnosis.response.spells import Spell
+from diagnosis.response.wheel import Wheel
 from replay.machine.config import Limits
 
 Array = NDArray[np.float64]

@@ -10,10 +10,11 @@ from numpy.typing import NDArray
 from diagnosis.response.channel import Samples
 from diagnosis.response.inputs import cells
 from diagnosis.response.machine import Judged
-from diagnosis.response.models import Beside, held_long
+from diagnosis.response.models import Beside, Blocks, held_long
 from diagnosis.response.spells import Spell
 from replay.faults import FaultMode
 
+Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 _HELD_BACK, _ALIKE = (
@@ -47,11 +48,32 @@ def by_each_other(found: Mapping[str, Judged], block_s: float, rest: Mapping[str
         if others:
             most = _ROUGHER * float(np.median([rough[o] for o in others]))
             share = min(1.0, most / rough[w]) if rough[w] > 0.0 and most > 0.0 else 1.0
-            blocks = blocks._replace(usual=share * blocks.usual, habitual=max(held[o] for o in others) > _ALSO_HELD)
+            speed = np.abs(np.nan_to_num(blocks.mean))
+            likewise = _ROUGHER * np.median([_usual_at(found[o].wheel.blocks, speed) for o in others], axis=0)
+            mine = _usual_at(blocks, speed)
+            shares = np.divide(likewise, mine, out=np.ones(mine.size), where=(mine > 0.0) & (likewise > 0.0))
+            blocks = blocks._replace(
+                usual=np.clip(shares, 0.0, share) * blocks.usual, habitual=max(held[o] for o in others) > _ALSO_HELD
+            )
         known = [x for o, x in wild.items() if o != w]
         usual = bool(known) and wild[w] <= _SPIKIER * float(np.median(known))
         out[w] = j._replace(wheel=j.wheel._replace(blocks=blocks, spiky=not usual))
     return out
+
+
+def _usual_at(blocks: Blocks, speed: Array) -> Array:
+    """What usually changes from sample to sample in a wheel at some speeds [m/s], shape of `speed`: more of it where it turns fast."""
+    own = np.abs(np.nan_to_num(blocks.mean))
+    turning = own[own > 0.0]
+    if not turning.size:
+        return np.full(speed.size, float(np.median(blocks.usual)))
+    edges = np.quantile(turning, (1.0 / 3.0, 2.0 / 3.0))
+    place, at = np.searchsorted(edges, own), np.searchsorted(edges, speed)
+    whole = float(np.median(blocks.usual))
+    levels = [
+        float(np.median(blocks.usual[place == k])) if (place == k).any() else whole for k in range(edges.size + 1)
+    ]
+    return np.asarray(np.array(levels)[at])
 
 
 def _wild_share(samples: Samples) -> float:

@@ -10,8 +10,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnosis.response.findings import SENSOR_SHARE
 from diagnosis.response.machine import Judged
+from diagnosis.response.wheel import SENSOR_SHARE
 from diagnosis.results.assessment import Finding
 from diagnosis.results.result import Hypothesis
 from replay.faults import FaultMode, Side, State

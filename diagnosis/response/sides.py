@@ -9,12 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.response.by_channel import broken_off, lost_of, once_a_turn, spikes_of
-from diagnosis.response.findings import Wheel, finding_of
+from diagnosis.response.findings import finding_of
 from diagnosis.response.inputs import cell_of
 from diagnosis.response.machine import Judged
 from diagnosis.response.models import HEALTHY, LEAST_P, NOISY, OTHER, SILENT
 from diagnosis.response.shaking import shaken
 from diagnosis.response.spells import Spell
+from diagnosis.response.wheel import Wheel
 from diagnosis.results.assessment import CODE, Assessment, Finding
 from diagnosis.results.evidence_columns import Pictured, steps_of
 from diagnosis.results.result import Hypothesis

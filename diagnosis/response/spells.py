@@ -64,8 +64,10 @@ def _mean_probability(posterior: Array, mode: FaultMode) -> float:
     return float(np.mean(posterior[:, same].sum(axis=1)))
 
 
-def where_asked(spells: Sequence[Spell], asked: Flags, least: int) -> list[Spell]:
+def where_asked(spells: Sequence[Spell], asked: Flags, least: int, posterior: Array | None) -> list[Spell]:
     """Spells without those of a silent or scaled speed in which no motion is expected, and the ends of such spells cut to it.
+
+    A wheel at rest shows neither scale nor health, so that what it does before and after says nothing of how probable the spell is.
 
     Parameters
     ----------
@@ -75,6 +77,8 @@ def where_asked(spells: Sequence[Spell], asked: Flags, least: int) -> list[Spell
         Blocks in which command or other wheels make the wheel move.
     least : int
         Blocks of expected motion that a spell needs.
+    posterior : Array or None, shape (b, states)
+        Probability of each state, to be taken anew where it moves; None: it stays, as where another view speaks at rest, too.
     """
     out = []
     for s in spells:
@@ -83,7 +87,11 @@ def where_asked(spells: Sequence[Spell], asked: Flags, least: int) -> list[Spell
             continue
         places = s.start + np.flatnonzero(asked[s.start : s.stop])
         if places.size >= least:
-            out.append(s._replace(start=int(places[0]), stop=int(places[-1]) + 1))
+            first, stop = int(places[0]), int(places[-1]) + 1
+            p = s.p
+            if posterior is not None and s.mode.scaled:
+                p = max(p, _mean_probability(posterior[first:stop], s.mode))
+            out.append(s._replace(start=first, stop=stop, p=p))
     return out
 
 

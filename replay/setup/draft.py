@@ -14,6 +14,7 @@ from replay.log.raw_log import Channel, RawLog
 from replay.log.source_options import SignalSource
 from replay.machine.config import Control, Machine, haulotte
 from replay.machine.geometry import Geometry
+from replay.setup.asked_columns import asked_columns, where_commands_are
 from replay.setup.by_the_body import radius_by_body
 from replay.setup.contradictions import in_turn_with_commands, units_by_positions
 from replay.setup.draft_notes import Draft
@@ -126,7 +127,7 @@ def draft_machine(logs: Sequence[RawLog], preset: Preset | None = None) -> Draft
     motions = _motions(found, structure.wheels)
     origins = _in_one_direction(draft, structure, found, motions)
     origins = {name: signal.origin for name, signal in every.items.items()} | origins
-    _ask_for_what_is_missing(draft, every)
+    _ask_for_what_is_missing(draft, every, channels)
     motions = in_turn_with_commands(draft, structure, found, motions, origins)
     straight = [w for w, p in (structure.places or {}).items() if p.axle == "fixed"]
     radius = wheel_radius(
@@ -229,7 +230,7 @@ def _motions(found: Signals, wheels: Sequence[str]) -> Mapping[str, WheelMotion]
     return out
 
 
-def _ask_for_what_is_missing(draft: Draft, found: Signals) -> None:
+def _ask_for_what_is_missing(draft: Draft, found: Signals, channels: Mapping[str, Channel]) -> None:
     """Ask for what nothing can be judged without."""
     leaves = {name.rpartition(".")[2] for name in found.items if name.startswith("wheel.")}
     if not leaves & {"v", "v_true"}:
@@ -242,9 +243,8 @@ def _ask_for_what_is_missing(draft: Draft, found: Signals) -> None:
         only = (
             "wheels can only be compared with each other" if len(draft.machine.wheels) > 1 else "nothing can be judged"
         )
-        draft.ask(
-            "signals", f"where are the commands? None is in the log, so {only}; record /cmd_vel, or name its topic."
-        )
+        used = [signal.origin.label for signal in found.items.values()]
+        draft.ask("signals", where_commands_are(only, asked_columns(channels, draft.machine, used)))
 
 
 def _in_one_direction(

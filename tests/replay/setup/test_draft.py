@@ -363,3 +363,16 @@ def test_directions_and_lengths_are_of_signals_at_one_time(tmp_path: Path) -> No
     assert not any("exchanged" in q for q in draft.questions)
     assert draft.machine.geometry is not None
     assert draft.machine.geometry.wheels["FL"].y == pytest.approx(0.4, rel=0.05)
+
+
+def test_columns_that_ask_for_something_unsaid_are_pointed_at_rather_than_denied(tmp_path: Path) -> None:
+    t = np.arange(0.0, 30.0, 0.05)
+    asked = 0.3 * np.sign(np.sin(t))
+    columns = {"time": t, "LEFT SETPOINT": asked, "RIGHT SETPOINT": asked, "LEFT VEL": asked, "RIGHT VEL": 0.9 * asked}
+    pd.DataFrame(columns).to_csv(tmp_path / "run.csv", index=False)
+    draft = draft_machine(read_everything([tmp_path / "run.csv"], every=False))
+    (question,) = [q for q in draft.questions if "where are the commands?" in q]
+    assert "LEFT SETPOINT" in question
+    assert "RIGHT SETPOINT" in question
+    assert '.v_ref" = { column =' in question
+    assert "None is in the log" not in question

@@ -1,0 +1,102 @@
+"""Wheels whose answer to their commands is found, or that others can stand for, with their readings in blocks; nothing is judged yet."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from diagnosis.response.channel import Samples, samples_of, without_holds
+from diagnosis.response.drive import as_a_peer
+from diagnosis.response.identification import Response, identify_response, without_command
+from diagnosis.response.inputs import FollowerData, cells
+from diagnosis.response.jumps import jumps_of
+from diagnosis.response.machine import Judged
+from diagnosis.response.models import STATES, blocks_of
+from diagnosis.response.wheel import Wheel
+from replay.machine.config import Limits
+from replay.machine.geometry import Geometry
+
+Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+MOVES = 0.4  # of the driving speed: enough to see whether a channel lives
+_TURNS_S = 5.0
+_LEAST_OTHERS = 2  # wheels that answer, beside one that does not
+BODY_COMMANDS = 2  # speed and yaw rate
+
+
+def wheels_of(
+    data: Mapping[str, FollowerData],
+    hidden: Mapping[str, Flags],
+    geometry: Geometry | None,
+    steps: tuple[int, int],
+    limits: Limits,
+    dt: float,
+) -> dict[str, Judged]:
+    """Wheels whose response could be found, with their blocks; nothing is judged yet.
+
+    Parameters
+    ----------
+    data : Mapping[str, FollowerData]
+        All drives, by wheel.
+    hidden : Mapping[str, Flags], each of shape (n,)
+        Steps of each that are not looked at.
+    geometry : Geometry or None
+        Says which wheels are on one side.
+    steps : tuple[int, int]
+        In a cell and in a block.
+    limits : Limits
+        ``driving_speed``.
+    dt : float
+        Step [s].
+    """
+    cell, width = steps
+    out: dict[str, Judged] = {}
+    channels: dict[str, tuple[Samples, Response | None]] = {}
+    for w, d in data.items():
+        y = np.where(hidden[w], np.nan, d.y)
+        samples = samples_of(y, d.fresh)
+        y[samples.step[samples.wild]] = np.nan
+        channels[w] = samples, _response(y, samples, d, cell, limits, dt)
+    answers = {w: found for w, (_, found) in channels.items() if found is not None}
+    several = len(answers) >= _LEAST_OTHERS
+    for w, d in data.items():
+        y, (samples, found) = d.y, channels[w]
+        if found is None and not several:  # of two wheels the other one shows what a command makes
+            found = as_a_peer(w, d.commands, answers, geometry, cell * dt)
+        # wheels of one body, that is: joints which are each commanded by themselves have nothing to do with each other
+        ignored = not answers and len(data) > 1 and d.commands.shape[1] >= BODY_COMMANDS and _turns(y, limits, dt)
+        if found is None and not several and not ignored and np.isfinite(d.commands).any():
+            continue
+        # a wheel that makes nothing of its command, alone or as all do, is judged by the others, and by its channel
+        response = without_command(-(-y.size // cell)) if found is None else found
+        if response.answered and samples.wild.any():
+            around = response.reach(d.commands, cell, dt, y.size)
+            samples = samples_of(np.where(hidden[w], np.nan, y), d.fresh, around)
+        blocks = blocks_of(samples, response, cell, width, y.size)
+        moves = np.abs(np.nan_to_num(blocks.mean))
+        if response.answered:
+            moves = np.maximum(np.maximum(np.abs(blocks.low), np.abs(blocks.high)), moves)
+        driving = moves > MOVES * limits.driving_speed
+        jumps, calm = jumps_of(samples, blocks, width, dt)
+        wheel = Wheel(d.name, samples, blocks, jumps, dt, "")
+        others = tuple(o.y for k, o in data.items() if k != w)
+        start = np.zeros((0, STATES))
+        out[w] = Judged(d, response, wheel, driving, start, [], None, calm, alone=not others, others=others)
+    return out
+
+
+def _turns(y: Array, limits: Limits, dt: float) -> bool:
+    """Whether a wheel turns for long enough to show how its channel reads."""
+    return bool(np.count_nonzero(np.abs(np.nan_to_num(y)) > limits.driving_speed) * dt >= _TURNS_S)
+
+
+def _response(y: Array, samples: Samples, data: FollowerData, cell: int, limits: Limits, dt: float) -> Response | None:
+    """Response of a drive; a speed that is held for long says nothing of it, unless hardly any other is left."""
+    for source in (without_holds(y, samples, dt), y):
+        found = identify_response(cells(source, cell), data.commands, cell * dt, limits.driving_speed)
+        if found is not None:
+            return found
+    return None
