@@ -40,16 +40,19 @@ def of_faults(
             if not np.allclose(drawn, said, atol=1e-3, equal_nan=True):
                 yield f"its plot shows {leaf} from {np.nanmin(drawn):.2f} to {np.nanmax(drawn):.2f}, its table {said:.2f}"
         chance = columns.get(base + "probability")
-        # an onset is where a channel began to hold, which shows only later: from its detection on, where that is told
-        seen = max(0.5 * (fault["start_s"] + fault["stop_s"]), fault["detected_s"] or 0.0)
-        late = inside & _rows(columns, seen, fault["stop_s"])
-        if chance is not None and fault["severity"] != "info" and np.isfinite(chance[late]).any():
-            both = [columns.get(f"evidence.{fault['component']}.{s}.probability", chance)[late] for s in _sides(fault)]
-            mean = float(
-                np.nansum([np.nanmean(x) for x in both if np.isfinite(x).any()])
-            )  # what may be either's is divided
-            if mean < 0.5:
-                yield f"its plot shows it not healthy with {mean:.2f} on average"
+        # an onset is where a channel began to hold, which shows only later: in its second half, or from its detection on, where that is told
+        middle = 0.5 * (fault["start_s"] + fault["stop_s"])
+        means = []
+        for seen in (middle, max(middle, fault["detected_s"] or 0.0)):
+            late = inside & _rows(columns, seen, fault["stop_s"])
+            if chance is not None and fault["severity"] != "info" and np.isfinite(chance[late]).any():
+                both = [
+                    columns.get(f"evidence.{fault['component']}.{s}.probability", chance)[late] for s in _sides(fault)
+                ]
+                # what may be either's is divided
+                means.append(float(np.nansum([np.nanmean(x) for x in both if np.isfinite(x).any()])))
+        if means and max(means) < 0.5:
+            yield f"its plot shows it not healthy with {max(means):.2f} on average"
 
 
 def of_states(report: Mapping[str, Any], columns: Mapping[str, NDArray[Any]]) -> Iterator[str]:
