@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.clearing.cells import Array, Cells, Frame
-from diagnosis.clearing.measure import alone, compared, lasts, off_commands, times, worst
+from diagnosis.clearing.measure import alone, compared, lasts, lowest_passed, off_commands, times, worst
 from diagnosis.clearing.responses import largest_change
 from diagnosis.results.clearing import Check, Checked
 from diagnosis.results.vocabulary import Kind
@@ -20,6 +20,9 @@ Flags = NDArray[np.bool_]
 
 FLOOR_RAD, OPENING = 0.06, 0.03  # deviations are shares of at least this angle and opening
 _STILL_S, _STILL, _ANSWERED = 1.0, 0.015, 0.06  # s, rad/s, and of full opening
+_LAG_S = 0.15  # of a valve and its cylinder: a command that has only just come has moved nothing yet
+#: An axle that creeps: rad/s, of the rate that its opening gives, and of its own rate's size, which noise alone would have.
+_CREEPS, _OBEYS, _STEADY = 0.003, 0.25, 0.5
 _OVERLAP, _ALIKE = 0.18, 1.4  # of full opening: healthy valves open by then; times what another axle needs
 _HYSTERESIS = 0.03  # of full opening: by as much a valve opens later than it closes
 _END, _REACHED = 0.97, 0.5  # of the largest angle: an end stop, where that is as much of the machine's
@@ -139,15 +142,34 @@ def _longest_still(cells: Cells, j: int) -> tuple[float, float]:
 def commanded_still(cells: Cells, j: int) -> Array:
     """Mean command of each window of `still_frame` [1], 0 where the axle moves or is at its end stop, NaN where nothing is known.
 
-    Shape (windows,).
+    A valve that has closed nearly to its dead band lets an axle creep: that moves, where it goes the way and at least a quarter
+    as fast as such an opening lets it. Shape (windows,).
     """
     angle, command, opening = (cells.axles(leaf)[:, j] for leaf in ("phi", "u", "u_applied"))
     command, frame = np.where(np.isfinite(command), command, opening), still_frame(cells)
-    mean, at = frame.mean(command), frame.mean(angle)
+    passed = np.where(np.isfinite(command), lowest_passed(command, cells.dt, _LAG_S), np.nan)
+    mean, at = frame.mean(passed), frame.mean(angle)
     reached = float(np.max(np.nan_to_num(np.abs(angle)), initial=0.0))
     stopped = (np.abs(at) >= _END * reached) & (at * mean > 0.0) & (reached >= _REACHED * cells.machine.max_steer)
-    rests = (frame.rms(rate_of(angle[:, np.newaxis], cells.dt)[:, 0]) < _STILL) & ~stopped
+    rate = rate_of(angle[:, np.newaxis], cells.dt)[:, 0]
+    size, ahead = frame.rms(rate), frame.mean(rate) * np.sign(mean)
+    creeps = (ahead >= _CREEPS) & (ahead >= _STEADY * size) & (ahead >= _OBEYS * _given(cells, np.abs(mean)))
+    rests = (size < _STILL) & ~stopped & ~creeps
     return np.asarray(np.where(np.isfinite(mean), np.where(rests, np.abs(mean), 0.0), np.nan))
+
+
+def _given(cells: Cells, opening: Array) -> Array:
+    """Rate that such openings [1] give by the rates of the axle that turns most per opening [rad/s], infinite where none is known."""
+    openings, rate = cells.axles("u_applied"), rate_of(cells.axles("phi"), cells.dt)
+    openings = np.where(np.isfinite(openings), openings, cells.axles("u"))
+    dead = dead_bands(rate, openings)
+    _, ahead, opened = _beyond(rate, openings, np.isfinite(rate) & np.isfinite(openings), dead)
+    power = opened.sum(axis=0)
+    if not power.any():
+        return np.full(opening.shape, np.inf)
+    slope = np.divide(ahead.sum(axis=0), power, out=np.zeros(len(power)), where=power > 0.0)
+    fastest = int(np.argmax(slope))
+    return np.asarray(slope[fastest] * np.maximum(opening - dead[fastest], 0.0))
 
 
 class Rates(NamedTuple):

@@ -119,6 +119,11 @@ class Cells:
         return np.concatenate([_means(x[part], self.width) for part in blocks(len(x), self.width)])
 
     @property
+    def carried_shares(self) -> list[float]:
+        """Share of its speed that the ground gives each wheel [1], 0 where nothing says so."""
+        return [self.carried.get(wheel, 0.0) for wheel in self.machine.wheels]
+
+    @property
     def reference(self) -> Array:
         """Commanded speed of every wheel, shape (cells, wheels)."""
         return self.once("reference", lambda: self.of(self.replay.v_ref))

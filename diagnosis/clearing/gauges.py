@@ -131,7 +131,7 @@ def _wheels(cells: Cells) -> Iterator[Gauges]:
     used = np.where(np.isfinite(opening), opening, command)
     followed = as_followed(cells, opening, command, wheels.OPENING)
     responses = resp.responses_of(cells, speed, used, cells.reference)
-    limits = resp.response_limits(responses, resp.measured_twice(cells), clear_at)
+    limits = resp.response_limits(responses, resp.measured_twice(cells), clear_at, cells.carried_shares)
     tells = resp.openings_tell(cells, responses)
     delays, rough = late(speed, cells.reference, cells.dt), wheels.roughness_of(cells, speed)
     for i, name in enumerate(cells.machine.wheels):

@@ -177,12 +177,29 @@ def usual_limits(twice: tuple[bool, bool], clear_at: float) -> Limits:
     return Limits(*(share * x for x in (below, above, lasting_below / _CHANGED, lasting_below, lasting_above)))
 
 
-def response_limits(responses: Responses, twice: Sequence[tuple[bool, bool]], clear_at: float) -> list[Limits]:
+def response_limits(
+    responses: Responses, twice: Sequence[tuple[bool, bool]], clear_at: float, carried: Sequence[float] | None = None
+) -> list[Limits]:
     """Limits of every wheel [ln]: those of windows and of changes are lower where the other wheels deviate by much less.
 
     Of one whose sides are both measured twice only that of a change: what is left to be seen of it is its load. Arguments as of
-    `usual_limits`.
+    `usual_limits`; `carried` is the share of its speed that the ground gives each wheel [1], none by default. What is usual of a
+    wheel that is measured once may be below the others' by no more than the loss that counts leaves to be seen beside the ground.
     """
+    return [
+        limit if any(both) else limit._replace(lasting_below=min(limit.lasting_below, _seen(clear_at, held)))
+        for limit, both, held in zip(
+            _beside_others(responses, twice, clear_at), twice, carried or [0.0] * len(twice), strict=True
+        )
+    ]
+
+
+def _seen(clear_at: float, carried: float) -> float:
+    """By how much a wheel's speed falls by a loss of its valve while the ground gives it a share of it [ln]."""
+    return -float(np.log1p(-clear_at * (1.0 - carried)))
+
+
+def _beside_others(responses: Responses, twice: Sequence[tuple[bool, bool]], clear_at: float) -> list[Limits]:
     most = [[float(x) for x in largest(sign * responses.windows)] for sign in (-1.0, 1.0)]
     usual = [usual_limits(both, clear_at) for both in twice]
     least = -_LEAST_TWICE * float(np.log1p(-clear_at))

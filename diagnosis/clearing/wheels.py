@@ -59,7 +59,7 @@ def wheel_checks(cells: Cells, clear_at: float) -> Iterator[Checked]:
     if not all(second for _, second in twice):
         slow = responses_of(cells, speed, used, reference, CREEPING * USUAL_TOP).windows
         slow[np.isfinite(windows)] = np.nan
-    limits = response_limits(responses, twice, clear_at)
+    limits = response_limits(responses, twice, clear_at, cells.carried_shares)
     tracking, rough = _tracking(cells, speed, reference), _rough_beside_others(roughness_of(cells, speed))
     rough = np.fmax(rough, wild_readings(cells, speed, FLOOR * cells.machine.max_speed))
     worst_tracking = [float(x) for x in largest(tracking)]

@@ -28,9 +28,9 @@ from diagnosis.steering.path import AxleFilter, allowed_models, most_probable
 from diagnosis.steering.path_refinement import refine_path
 from diagnosis.steering.plant import SteeringPlant
 from diagnosis.steering.prior import plant_before
-from diagnosis.steering.reliability import commanded, paired, weighed
+from diagnosis.steering.reliability import commanded, lost_by_model, paired, weighed
 from diagnosis.steering.states import REASONS, states_of
-from diagnosis.steering.together import not_together
+from diagnosis.steering.together import not_starved, not_together
 from replay.arrays.processors import each
 from replay.control.loop import Replay
 from replay.faults import Side, State
@@ -124,6 +124,11 @@ def assess_steering(
     once = {a.name: told[a.name] for a in axles if a.name in told and not a.redundant}
     length = max((one.axle.blocks.length for one in once.values()), default=1)
     alone = not_together({name: one.sides for name, one in once.items()}, length, timeline.dt)
+    single = {a.name for a in axles if not a.angle_redundant}
+    alone |= not_starved(
+        {name: alone.get(name, one.sides) for name, one in told.items() if name in single},
+        {name: one.axle for name, one in told.items()},
+    )
     assessments: dict[Part, Assessment] = {}
     angles: list[Array] = []
     doubts: list[Flags] = []
@@ -176,6 +181,8 @@ def _found(
         found = weighed(found, blocks.length, inputs.timeline.dt)
     else:
         found = paired(found)
+        if not inputs.angle_redundant:
+            found = lost_by_model(found, blocks.length, inputs.timeline.dt)
     found = without_agreed(not_denied(found, inputs, blocks, machine.max_steer), inputs)
     found = {side: acquitted(side, found[side], inputs, blocks, believed=not otherwise) for side in _SIDES}
     found = {side: of_one_cause(side, found[side], inputs, machine.limits.min_opening) for side in _SIDES}

@@ -130,6 +130,25 @@ def weighed(found: Mapping[Side, SideFindings], length: int, dt: float) -> dict[
     return out
 
 
+def lost_by_model(found: Mapping[Side, SideFindings], length: int, dt: float) -> dict[Side, SideFindings]:
+    """Findings of an axle whose opening is measured and whose angle is not; a loss of the sensor alone deserves what `weighed` gives.
+
+    A brief want of oil looks like a loss of the sensor to a model that knows the opening: a valve that obeys cannot have it.
+    Arguments as of `weighed`.
+    """
+    sensor = found[Side.SENSOR]
+    lost = tuple(f for f in sensor.findings if f.mode is FaultMode.INEFFICIENT)
+    told = weighed(found, length, dt)[Side.SENSOR]
+    likely = {(f.start, f.stop): f for f in told.findings}
+    kept = tuple(
+        f if f not in lost else likely[f.start, f.stop]
+        for f in sensor.findings
+        if f not in lost or (f.start, f.stop) in likely
+    )
+    open_ = [(f.start // length, -(-f.stop // length)) for f in lost if (f.start, f.stop) not in likely]
+    return {**found, Side.SENSOR: sensor._replace(findings=kept, unexplained=(*sensor.unexplained, *open_))}
+
+
 def paired(found: Mapping[Side, SideFindings]) -> dict[Side, SideFindings]:
     """Findings of both sides of an axle that has second measurements: partial ones beside one of the other side are uncertain.
 

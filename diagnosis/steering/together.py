@@ -8,12 +8,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+import numpy as np
+
 from diagnosis.results.assessment import Finding
 from diagnosis.steering.findings import SideFindings
+from diagnosis.steering.path import AxleFilter
 from replay.faults import FaultMode, Side
 
 _ENDS_S = 1.5  # within which both begin, or cease
 _COMMON = 0.7  # of the time of the longer one
+#: What axles lack together: rad that both must be told to turn, of that, and of what the accused one lacks.
+_TRAVEL, _LACKS, _LIKEWISE = 0.05, 0.1, 0.5
+_FEW = 5  # readings
 
 
 def not_together(
@@ -40,6 +46,52 @@ def not_together(
             spans = [(f.start // length, -(-f.stop // length)) for f in shared]
             out[axle][side] = SideFindings(kept, (*one.unexplained, *spans))
     return out
+
+
+def not_starved(
+    found: Mapping[str, Mapping[Side, SideFindings]], axles: Mapping[str, AxleFilter]
+) -> dict[str, dict[Side, SideFindings]]:
+    """Findings by axle and side without losses of a sensor while another axle turns less than its valve gives, too: a want of oil.
+
+    Parameters
+    ----------
+    found : Mapping[str, Mapping[Side, SideFindings]]
+        Of all axles whose angle is measured once.
+    axles : Mapping[str, AxleFilter]
+        All axles; the rates that their plants give.
+    """
+    out: dict[str, dict[Side, SideFindings]] = {}
+    for name, sides in found.items():
+        sensor, length = sides[Side.SENSOR], axles[name].blocks.length
+        spans = {
+            f: (f.start // length, -(-f.stop // length)) for f in sensor.findings if f.mode is FaultMode.INEFFICIENT
+        }
+        starved = [f for f, span in spans.items() if _starved(name, span, axles)]
+        kept = tuple(f for f in sensor.findings if f not in starved)
+        open_ = (*sensor.unexplained, *(spans[f] for f in starved))
+        out[name] = {**sides, Side.SENSOR: sensor._replace(findings=kept, unexplained=open_)}
+    return out
+
+
+def _starved(name: str, span: tuple[int, int], axles: Mapping[str, AxleFilter]) -> bool:
+    """Whether another axle lacks enough of its motion while this one does, in such blocks of this one."""
+    own = _lack(axles[name], *span)
+    times = [k * axles[name].blocks.dt for k in span]
+    others = [_lack(a, *(round(t / a.blocks.dt) for t in times)) for k, a in axles.items() if k != name]
+    return any(lack >= max(_LACKS, _LIKEWISE * own) for lack in others)
+
+
+def _lack(axle: AxleFilter, start: int, stop: int) -> float:
+    """Share of the motion that its plant gives an axle in blocks [start, stop), that it does not make [1]; NaN of hardly any."""
+    known = np.where(axle.blocks.count > 0, axle.blocks.mean, np.nan)[start:stop]
+    given = axle.driven.command[start:stop] * axle.blocks.dt
+    at = np.flatnonzero(np.isfinite(known))
+    if at.size < _FEW:
+        return float("nan")
+    asked = np.add.reduceat(np.nan_to_num(given), at[:-1])
+    total = float(np.abs(asked).sum())
+    made = float((np.diff(known[at]) * np.sign(asked)).sum())
+    return 1.0 - made / total if total >= _TRAVEL else float("nan")
 
 
 def _together(a: Finding, b: Finding, dt: float) -> bool:

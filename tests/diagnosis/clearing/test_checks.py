@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from diagnosis.clearing import yaw
-from diagnosis.clearing.axles import dead_bands
+from diagnosis.clearing.axles import commanded_still, dead_bands
 from diagnosis.clearing.checks import checks_of
 from diagnosis.clearing.measure import off_commands
 from diagnosis.clearing.wheels import most_carried, most_creeping
@@ -277,3 +277,30 @@ def test_speed_per_opening_is_asked_of_a_wheel_that_creeps(left: float, passed: 
     checks = checks_by_part(replace(mission, columns=columns), base=True)
     assert checks["FR", "sensor_or_actuator", Check.RESPONSE].passed is passed
     assert checks["RR", "sensor_or_actuator", Check.RESPONSE].passed
+
+
+@pytest.mark.parametrize(("made", "still"), [(1.0, False), (0.5, False), (0.0, True), (-1.0, True)])
+def test_an_axle_that_creeps_as_its_valve_lets_it_does_not_stand_still(made: float, still: bool) -> None:
+    """Near its target a valve opens little beyond its dead band: `made` of the rate that this gives."""
+    mission = simulated()
+    columns = dict(mission.columns)
+    t = np.arange(columns["steer.front.u"].size) / 100.0
+    opening = np.where(t % 8.0 < 4.0, 0.5, -0.5)
+    creeping = (t >= 20.0) & (t < 24.0)
+    opening[creeping] = 0.09
+    rate = 0.4 * np.sign(opening) * np.maximum(np.abs(opening) - 0.06, 0.0)
+    rate[creeping] *= made
+    for axle in ("front", "rear"):
+        columns[f"steer.{axle}.u"], columns[f"steer.{axle}.phi"] = opening, np.cumsum(rate) / 100.0
+    values = commanded_still(in_cells(replace(mission, columns=columns), base=True), 0)
+    assert (np.nanmax(values) > 0.06) == still
+
+
+def test_a_command_that_has_only_just_come_has_moved_nothing_yet() -> None:
+    mission = simulated()
+    columns = dict(mission.columns)
+    t = np.arange(columns["steer.front.u"].size) / 100.0
+    opening = np.where((t % 4.0) < 1.0, 0.3, 0.0)
+    rate = np.roll(np.where(opening > 0.0, 0.1, 0.0), 20)
+    columns["steer.front.u"], columns["steer.front.phi"] = opening, np.cumsum(rate) / 100.0
+    assert np.nanmax(commanded_still(in_cells(replace(mission, columns=columns), base=True), 0)) < 0.06

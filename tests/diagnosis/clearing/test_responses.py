@@ -80,3 +80,13 @@ def test_openings_tell_no_speeds_where_they_explain_little_and_most_wheels_stray
 def test_what_both_axles_do_at_once_is_of_neither() -> None:
     off = np.array([[0.9, 0.8], [0.9, 0.0], [0.9, np.nan], [0.1, -0.9]])
     assert _alone(off, 0) == pytest.approx([0.1, 0.9, 0.9, 0.1])
+
+
+def test_what_the_ground_hides_of_a_loss_is_not_left_to_the_limit_over_the_mission() -> None:
+    """A quarter less of a valve whose wheel the ground half carries is an eighth less speed: the limit may not be above that."""
+    of, usual = responses(0.1, 0.1, 0.1, 0.1), usual_limits(ONCE, CLEAR_AT)
+    first, second, *_ = response_limits(of, [ONCE] * 4, CLEAR_AT, [0.5, 0.2, 0.0, 0.0])
+    assert first.lasting_below == pytest.approx(-np.log(1 - 0.125))
+    assert second.lasting_below == usual.lasting_below
+    half = response_limits(of, [(True, False)] * 4, CLEAR_AT, [0.5] * 4)[0]
+    assert half.lasting_below == usual_limits((True, False), CLEAR_AT).lasting_below

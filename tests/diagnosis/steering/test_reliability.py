@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -10,7 +12,7 @@ from diagnosis.results.assessment import Finding
 from diagnosis.results.result import Hypothesis
 from diagnosis.results.vocabulary import Tier
 from diagnosis.steering.findings import SideFindings
-from diagnosis.steering.reliability import features_of, paired, weighed
+from diagnosis.steering.reliability import features_of, lost_by_model, paired, weighed
 from replay.faults import FaultMode, Side
 
 DT, LENGTH = 0.01, 5
@@ -87,3 +89,18 @@ def test_faults_at_other_times_do_not_doubt_each_other() -> None:
         Side.ACTUATOR: SideFindings((finding(20.0, 28.0, FaultMode.INEFFICIENT),), ()),
     }
     assert paired(both) == both
+
+
+def test_a_brief_loss_of_an_angle_that_is_measured_once_stays_open_however_well_its_valve_is_known() -> None:
+    brief, long = (
+        replace(finding(*span, FaultMode.INEFFICIENT), side=Side.SENSOR) for span in ((10.0, 13.0), (30.0, 40.0))
+    )
+    dead = replace(finding(20.0, 22.0), side=Side.SENSOR)
+    both = {Side.SENSOR: SideFindings((brief, dead, long), ()), Side.ACTUATOR: SideFindings((), ())}
+    sensor = lost_by_model(both, LENGTH, DT)[Side.SENSOR]
+    assert [(f.start, f.mode) for f in sensor.findings] == [
+        (dead.start, FaultMode.STUCK),
+        (long.start, FaultMode.INEFFICIENT),
+    ]
+    assert sensor.unexplained == ((brief.start // LENGTH, brief.stop // LENGTH),)
+    assert sensor.findings[0] == dead

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
 import pytest
 
 from diagnosis.results.assessment import Finding
 from diagnosis.results.vocabulary import Tier
 from diagnosis.steering.findings import SideFindings
-from diagnosis.steering.together import not_together
+from diagnosis.steering.together import not_starved, not_together
 from replay.faults import FaultMode, Side
 
 DT, LENGTH = 0.01, 2
@@ -45,3 +50,25 @@ def test_what_both_axles_do_at_once_is_a_fault_of_neither(mode: FaultMode, start
         side = out[axle][Side.ACTUATOR]
         assert bool(side.findings) is kept
         assert side.unexplained == (() if kept else ((begin // LENGTH, end // LENGTH),))
+
+
+def axle(made: float, span: slice) -> Any:
+    """An axle that its plant turns at 0.2 rad/s to either side, and that makes so much of it in a span of blocks."""
+    given = np.where(np.arange(2000) % 400 < 200, 0.2, -0.2)
+    rate = given.copy()
+    rate[span] *= made
+    blocks = SimpleNamespace(
+        length=LENGTH, dt=LENGTH * DT, mean=np.cumsum(rate) * LENGTH * DT, count=np.ones(2000, dtype=np.int64)
+    )
+    return SimpleNamespace(blocks=blocks, driven=SimpleNamespace(command=given))
+
+
+@pytest.mark.parametrize(("front", "kept"), [(0.65, False), (0.8, False), (0.95, True), (1.0, True)])
+def test_a_loss_of_a_sensor_while_the_other_axle_lacks_motion_too_is_a_want_of_oil(front: float, *, kept: bool) -> None:
+    found = sides(FaultMode.INEFFICIENT, 1000, 1600)[Side.ACTUATOR]
+    lost = SideFindings(tuple(replace(f, side=Side.SENSOR) for f in found.findings), ())
+    span = slice(1000 // LENGTH, 1600 // LENGTH)
+    out = not_starved({"rear": {Side.SENSOR: lost}}, {"front": axle(front, span), "rear": axle(0.65, span)})
+    sensor = out["rear"][Side.SENSOR]
+    assert bool(sensor.findings) is kept
+    assert sensor.unexplained == (() if kept else ((500, 800),))
