@@ -30,7 +30,7 @@ from diagnosis.steering.plant import SteeringPlant
 from diagnosis.steering.prior import plant_before
 from diagnosis.steering.reliability import commanded, lost_by_model, paired, weighed
 from diagnosis.steering.states import REASONS, states_of
-from diagnosis.steering.together import not_starved, not_together
+from diagnosis.steering.together import less_sure_all_along, not_starved, not_together
 from replay.arrays.processors import each
 from replay.control.loop import Replay
 from replay.faults import Side, State
@@ -123,7 +123,9 @@ def assess_steering(
     told = {inputs.name: one for inputs, one in judged_axles if one is not None}
     once = {a.name: told[a.name] for a in axles if a.name in told and not a.redundant}
     length = max((one.axle.blocks.length for one in once.values()), default=1)
-    alone = not_together({name: one.sides for name, one in once.items()}, length, timeline.dt)
+    alone = less_sure_all_along(
+        not_together({name: one.sides for name, one in once.items()}, length, timeline.dt), timeline.size
+    )
     single = {a.name for a in axles if not a.angle_redundant}
     alone |= not_starved(
         {name: alone.get(name, one.sides) for name, one in told.items() if name in single},

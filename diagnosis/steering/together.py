@@ -11,6 +11,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from diagnosis.results.assessment import Finding
+from diagnosis.results.limited import limited
 from diagnosis.steering.findings import SideFindings
 from diagnosis.steering.path import AxleFilter
 from replay.faults import FaultMode, Side
@@ -20,6 +21,8 @@ _COMMON = 0.7  # of the time of the longer one
 #: What axles lack together: rad that both must be told to turn, of that, and of what the accused one lacks.
 _TRAVEL, _LACKS, _LIKEWISE = 0.05, 0.1, 0.5
 _FEW = 5  # readings
+_MOST, _NO_SURER = 0.5, 0.6  # of the mission; of a partial fault while so much of it is one on two axles
+_NO_MODEL = "The steering model finds such faults on two axles for most of this mission: that it does not fit the machine is as probable."
 
 
 def not_together(
@@ -46,6 +49,35 @@ def not_together(
             spans = [(f.start // length, -(-f.stop // length)) for f in shared]
             out[axle][side] = SideFindings(kept, (*one.unexplained, *spans))
     return out
+
+
+def less_sure_all_along(
+    found: Mapping[str, Mapping[Side, SideFindings]], size: int
+) -> dict[str, dict[Side, SideFindings]]:
+    """Findings by axle and side whose partial faults are no claims where two axles have some for most of the mission.
+
+    Parameters
+    ----------
+    found : Mapping[str, Mapping[Side, SideFindings]]
+        Of all axles whose quantities are measured once.
+    size : int
+        Samples of the mission.
+    """
+    partly = {
+        name: [f for one in sides.values() for f in one.findings if not f.mode.total] for name, sides in found.items()
+    }
+    many = sum(sum(f.stop - f.start for f in fs) > _MOST * size for fs in partly.values())
+    if many < 2:
+        return {name: dict(sides) for name, sides in found.items()}
+    return {
+        name: {
+            side: one._replace(
+                findings=tuple(f if f.mode.total else limited(f, _NO_SURER, _NO_MODEL) for f in one.findings)
+            )
+            for side, one in sides.items()
+        }
+        for name, sides in found.items()
+    }
 
 
 def not_starved(

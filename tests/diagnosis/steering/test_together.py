@@ -12,7 +12,7 @@ import pytest
 from diagnosis.results.assessment import Finding
 from diagnosis.results.vocabulary import Tier
 from diagnosis.steering.findings import SideFindings
-from diagnosis.steering.together import not_starved, not_together
+from diagnosis.steering.together import less_sure_all_along, not_starved, not_together
 from replay.faults import FaultMode, Side
 
 DT, LENGTH = 0.01, 2
@@ -50,6 +50,23 @@ def test_what_both_axles_do_at_once_is_a_fault_of_neither(mode: FaultMode, start
         side = out[axle][Side.ACTUATOR]
         assert bool(side.findings) is kept
         assert side.unexplained == (() if kept else ((begin // LENGTH, end // LENGTH),))
+
+
+@pytest.mark.parametrize(
+    ("mode", "stop", "sure"),
+    [
+        (FaultMode.NOISY, 1900, False),
+        (FaultMode.INEFFICIENT, 1900, False),
+        (FaultMode.STUCK, 1900, True),
+        (FaultMode.NOISY, 1300, True),
+    ],
+    ids=["disturbed", "loses", "stuck", "for a while"],
+)
+def test_partial_faults_of_two_axles_all_along_are_no_claims(mode: FaultMode, stop: int, *, sure: bool) -> None:
+    """Of a mission of 3000 samples the other axle's is noisy for two thirds."""
+    out = less_sure_all_along({"front": sides(FaultMode.NOISY, 0, 2000), "rear": sides(mode, 300, stop)}, 3000)
+    (found,) = out["rear"][Side.ACTUATOR].findings
+    assert found.probability == (0.95 if sure else 0.6)
 
 
 def axle(made: float, span: slice) -> Any:
