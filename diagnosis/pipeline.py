@@ -14,6 +14,7 @@ from diagnosis.channels.copied_rows import without_copied_rows
 from diagnosis.channels.recording_gaps import recording_gaps, without_gaps
 from diagnosis.clearing.backwards import without_claims
 from diagnosis.clearing.beside_angles import less_sure_beside_wrong_angles
+from diagnosis.clearing.beside_sensors import less_sure_beside_dead_sensors
 from diagnosis.clearing.beside_valves import less_sure_beside_dead_valves
 from diagnosis.clearing.contradicted import without_contradicted
 from diagnosis.clearing.standing_out import what_stands_out, with_findings, without_explained, without_followers
@@ -197,6 +198,7 @@ def _without_contradicted(judged: Judged) -> Judged:
     told = without_followers(told, judged.checks, judged.cells)
     told = less_sure_beside_wrong_angles(told, judged.machine.wheels, judged.machine.axles)
     told = less_sure_beside_dead_valves(told, judged.machine.wheels, judged.found.words)
+    told = less_sure_beside_dead_sensors(told, judged.machine.wheels, judged.found.words)
     if all(told[part] is a for part, a in judged.found.assessments.items()):
         return judged
     return replace(judged, found=replace(judged.found, assessments=told))
