@@ -83,7 +83,7 @@ class App(TyperGroup):
             shown: Any = self.get_command(ctx, name)
             panel = getattr(shown, "rich_help_panel", None)
             title = panel if isinstance(panel, str) else "Commands"
-            panels.setdefault(title, []).append((name, shown.get_short_help_str(100)))
+            panels.setdefault(title, []).append((name, shown.get_short_help_str(200)))
         for title, rows in panels.items():
             with formatter.section(title):
                 formatter.write_dl(rows)

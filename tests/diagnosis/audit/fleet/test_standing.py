@@ -178,7 +178,7 @@ def test_a_fault_that_comes_back_is_as_severe_as_it_is_now(
     [
         ([Sample("a")], "every part assessed in the last mission"),
         ([Sample("a"), Sample("b", day=None)], "every part assessed in the last mission"),
-        ([Sample("a", blind=[("FR", "sensor")])], "1 part not assessed in the last mission"),
+        ([Sample("a", blind=[("FR", "sensor")])], "1 part not judged long enough in the last mission"),
         ([NO_SIGNAL], "nothing judged"),
         ([Sample("a", day=None, verdict="not_assessed", blind=samples.PARTS)], "last mission not known of 1 machine"),
         ([Sample("a"), Sample("b", "HX-2", state="crashed")], "last mission not known of 1 machine"),
