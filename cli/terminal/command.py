@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Annotated, Any
 
 import typer
-from typer.core import TyperGroup
+from typer.core import TyperCommand, TyperGroup
 
 from cli.terminal.console import Terminal
 
@@ -51,6 +51,17 @@ Verbose = Annotated[
         callback=_be_verbose,
     ),
 ]
+
+
+class Command(TyperCommand):
+    """A command whose usage line leaves out hidden arguments: those that are only there to be refused with reasons."""
+
+    def collect_usage_pieces(self, ctx: Any) -> list[str]:
+        """Words of the usage line."""
+        hidden = {
+            piece for p in self.get_params(ctx) if getattr(p, "hidden", False) for piece in p.get_usage_pieces(ctx)
+        }
+        return [piece for piece in super().collect_usage_pieces(ctx) if piece not in hidden]
 
 
 class App(TyperGroup):
