@@ -35,7 +35,7 @@ from cli.commands import (
     simulate,
 )
 from cli.commands import replay as replay_command  # the package of that name is another thing
-from cli.terminal.command import USAGE, App, Quiet, Verbose
+from cli.terminal.command import USAGE, App, Command, Quiet, Verbose
 from cli.terminal.console import Terminal, discard
 from cli.terminal.interrupts import asked, check, forget, listen
 from cli.terminal.leaving import leave
@@ -92,7 +92,7 @@ for _panel, _function, _name, _epilog in (
     (_MAKE, inject.inject, "inject", inject.EXAMPLES),
     (_MAKE, schema.schema, "schema", schema.EXAMPLES),
 ):
-    app.command(_name, rich_help_panel=_panel, epilog=_epilog)(_function)
+    app.command(_name, cls=Command, rich_help_panel=_panel, epilog=_epilog)(_function)
 app.add_typer(config.app, name="config", rich_help_panel=_MAKE)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Annotated, Any
 
 import typer
-from typer.core import TyperGroup
+from typer.core import TyperCommand, TyperGroup
 
 from cli.terminal.console import Terminal
 
@@ -53,6 +53,17 @@ Verbose = Annotated[
 ]
 
 
+class Command(TyperCommand):
+    """A command whose usage line leaves out hidden arguments: those that are only there to be refused with reasons."""
+
+    def collect_usage_pieces(self, ctx: Any) -> list[str]:
+        """Words of the usage line."""
+        hidden = {
+            piece for p in self.get_params(ctx) if getattr(p, "hidden", False) for piece in p.get_usage_pieces(ctx)
+        }
+        return [piece for piece in super().collect_usage_pieces(ctx) if piece not in hidden]
+
+
 class App(TyperGroup):
     """A group whose help lists commands by topic, and is shown where no command is given."""
 
@@ -83,7 +94,7 @@ class App(TyperGroup):
             shown: Any = self.get_command(ctx, name)
             panel = getattr(shown, "rich_help_panel", None)
             title = panel if isinstance(panel, str) else "Commands"
-            panels.setdefault(title, []).append((name, shown.get_short_help_str(100)))
+            panels.setdefault(title, []).append((name, shown.get_short_help_str(200)))
         for title, rows in panels.items():
             with formatter.section(title):
                 formatter.write_dl(rows)

@@ -292,7 +292,7 @@ def _without_faults(
         return Decision(Verdict.NOT_ASSESSED, "No fault found, not fully assessed", text)
     if against.damage:
         apart = only_left_out(against.damage)
-        text = against.damage[0] if apart else "Parts of the log are lost: " + against.damage[0]
+        text = ("" if apart else "Parts of the log are lost: ") + against.damage[0].removesuffix(".") + "."
         title = "No fault found, but a file was left out" if apart else "No fault found in a damaged log"
         return Decision(Verdict.NOT_ASSESSED, title, text)
     if against.scope:

@@ -14,16 +14,16 @@ from replay.machine.signal_table import quantity_of
 
 #: Other spellings, as logs and people write them in English, German and French; compared without case and spaces.
 _SPELLINGS = {
-    "rpm": "r.p.m. r/min rev/min 1/min min-1 min^-1 min⁻¹ u/min umdr/min umdr./min upm tr/min t/min trs/min",
+    "rpm": "r.p.m. r/min rev/min 1/min /min min-1 min^-1 min⁻¹ u/min umdr/min umdr./min umdrehungen/min upm tr/min tour/min tours/min t/min trs/min",
     "rev/s": "rps u/s tr/s",
-    "deg": "° degs degree degrees grad degré degrés",
+    "deg": "° degs degree degrees grad grd winkelgrad degré degrés",
     "deg/s": "°/s deg/sec degree/s degrees/s grad/s degré/s degrés/s dps",
     "rad": "radian radians radiant radiants",
     "rad/s": "rad/sec rads/s radian/s radians/s rad.s-1 rad*s^-1",
     "m/s": "m/sec mps m.s-1 m*s^-1 meter/s meters/s mètre/s",
     "km/h": "kph kmh kmph km/std",
     "m": "meter meters metre metres mètre mètres",
-    "%": "percent prozent pct pourcent",
+    "%": "percent prozent proz proz. pct pourcent",
     "1": "- ratio",
     "m/s^2": "m/s² m/s2 m/s/s",
     "N·m": "n.m n*m n-m newtonmeter",
@@ -37,6 +37,8 @@ _NO_CASE = {name.casefold(): name for name in UNITS if name not in ("MPa", "mA")
 def known_unit(text: str) -> str | None:
     """Name in the table of units of a unit as logs and people write it (``U/min``, ``tr/min``: rpm); None where not known."""
     bare = text.strip()
+    if (bare[:1], bare[-1:]) in (("[", "]"), ("(", ")")):  # as in a row of units: [%]
+        bare = bare[1:-1].strip()
     if bare in UNITS:
         return bare
     word = "".join(bare.split()).casefold()

@@ -33,6 +33,7 @@ _TURN = 3.1  # rad; a machine file can give no larger limit of steering
 _ROTATIONS, _TURNING = ("rad/s", "rpm", "deg/s"), ("rad/s", "rpm", "deg/s", "rev/s")
 _LINEAR = re.compile(r"(^|\.)linear\.[xyz]$")  # of a Twist, which is in m/s by definition
 _JOINT = re.compile(r"(^|\.)velocit\w*\[")  # of a JointState, which is no speed over ground
+_PER_MINUTE = re.compile(r"drehzahl|rpm|umdr|u_?min|tr_?min", re.IGNORECASE)  # of a name: turns per minute
 _SPEED_UNITS = ("m/s", "km/h", "mm/s", "cm/s")
 
 
@@ -130,7 +131,10 @@ def _fitting_speed(signal: str, peak: float, origin: SignalSource, machine: Mach
     speeds = [replace(origin, unit=unit, at="wheel") for unit in _SPEED_UNITS]
     rotation = known_unit(origin.unit) in _TURNING
     joint = _JOINT.search(origin.field or "") is not None
-    for ways in (turns,) if joint else (turns, speeds) if rotation else (speeds + turns,):
+    ways_to_try = (turns,) if joint else (turns, speeds) if rotation else (speeds + turns,)
+    if _PER_MINUTE.search(origin.label):
+        ways_to_try = ([tried for tried in turns if tried.unit == "rpm"], *ways_to_try)
+    for ways in ways_to_try:
         best, most = "", 0.1 * machine.max_speed
         for tried in ways:
             try:

@@ -139,6 +139,17 @@ def test_help_of_each_command_has_examples(name: str) -> None:
     assert f"mfhca {name}" in seen.output.partition("Examples:")[2]
 
 
+def test_the_list_of_commands_breaks_off_no_sentence() -> None:
+    seen = CliRunner().invoke(app, ["--help"], terminal_width=80)
+    assert seen.exit_code == 0
+    assert "..." not in seen.output.partition("Diagnose:")[2]
+
+
+def test_usage_leaves_out_arguments_that_are_only_refused() -> None:
+    usage = CliRunner().invoke(app, ["compare", "--help"]).output.splitlines()[0]
+    assert usage.endswith("compare [OPTIONS] {A} {B}")
+
+
 def test_without_a_command_help_and_usage_code(capsys: pytest.CaptureFixture[str]) -> None:
     assert run([]) == 2
     seen = capsys.readouterr()

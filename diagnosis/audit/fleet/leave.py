@@ -167,11 +167,11 @@ def _lost(mission: MissionRow) -> str:
 
 
 def _blind(m: MachineRow) -> str:
-    """Parts that the machine's last mission did not assess, which stand beside the leave that it gives; empty where there is none."""
+    """Parts that the machine's last mission did not judge, or not for long enough, which stand beside the leave that it gives; empty where there is none."""
     parts = unassessed(m)
     rest = f" and {count(len(parts) - _PARTS, 'more part')}" if len(parts) > _PARTS else ""
     named = ", ".join(parts[:_PARTS]) if rest else join_words(parts)
-    return f"; not assessed: {named}{rest}" if parts else ""
+    return f"; not judged long enough: {named}{rest}" if parts else ""
 
 
 def _said(mission: MissionRow) -> str:

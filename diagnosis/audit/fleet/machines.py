@@ -221,7 +221,8 @@ class Machine:
             last = range(len(self.dated) - len(trailing), len(self.dated))
             seen = any(column[k] for column in self._assessed.values() for k in last)
             how = "showed no fault, but not all parts were judged" if seen else "could not be assessed"
-            out.append(f"its last {_count(len(trailing), 'mission')} {how}")
+            missions = "mission" if len(trailing) == 1 else f"{len(trailing)} missions"
+            out.append(f"its last {missions} {how}")
         if self.undated:
             out.append(f"{_count(len(self.undated), 'mission')} of unknown order")
         failed = self.failed_once

@@ -140,7 +140,7 @@ def _why_not(kept: NDArray[np.intp], outliers: tuple[int, ...], changes: tuple[C
         return "no mission has an estimate"
     if len(kept) < LEAST_MISSIONS:
         since = {"drop": " since the drop", "rise": " since the rise", "bend": " since the bend"}
-        return f"{len(kept)} missions{since[changes[-1].kind] if changes else ''}, {LEAST_MISSIONS} are needed"
+        return f"{len(kept)} mission{'' if len(kept) == 1 else 's'}{since[changes[-1].kind] if changes else ''}, {LEAST_MISSIONS} are needed"
     if outliers and outliers[-1] == n - 1:
         return "the last mission deviates from the trend; the next one has to confirm it"
     if 4 * sum(o >= first for o in outliers) > n - first:

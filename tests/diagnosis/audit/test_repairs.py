@@ -115,6 +115,8 @@ def test_only_missions_count_that_would_have_shown_it(tmp_path: Path, share: flo
         path.write_text(json.dumps({**report, "detectability": {"rows": rows}}), encoding="utf-8")
     stored(tmp_path, missions)
     assert standing(tmp_path)[0] == verdict
+    page = build_fleet_page(document(tmp_path))
+    assert ("open, clean in none of the 10 missions that close it" in page) == (verdict == "stop")
 
 
 def test_an_open_fault_is_on_the_page_and_on_the_terminal(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

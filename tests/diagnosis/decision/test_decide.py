@@ -177,7 +177,9 @@ def test_a_valve_that_may_not_answer_is_not_cleared() -> None:
 def test_only_ready_and_watch_are_ever_cleared() -> None:
     assert verdict(machine()).cleared
     assert not verdict(machine(), 0.0).cleared
-    assert not verdict(machine(), damage=("chunk 7 is cut off",)).cleared
+    damaged = verdict(machine(), damage=("chunk 7 is cut off",))
+    assert not damaged.cleared
+    assert "Parts of the log are lost: chunk 7 is cut off." in damaged.text
     assert not verdict(machine(FR_actuator=assessed(finding(Side.ACTUATOR, FaultMode.STUCK)))).cleared
 
 

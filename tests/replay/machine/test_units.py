@@ -54,7 +54,10 @@ def factor(signal: str, unit: str, **changed: Any) -> float:
         ("cmd.v", "KM/H", 1 / 3.6),
         ("imu.yaw_rate", "Grad/s", math.pi / 180),
         ("steer.front.phi", "degrés", math.pi / 180),
+        ("steer.front.phi", "Grd", math.pi / 180),
         ("wheel.FR.u", "Prozent", 0.01),
+        ("wheel.FR.u", "Proz.", 0.01),
+        ("wheel.FR.u", "[%]", 0.01),
         ("wheel.FR.effort", "mA", 1e-3),
     ],
 )

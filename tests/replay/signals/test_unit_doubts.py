@@ -49,6 +49,14 @@ def test_a_unit_that_cannot_be_asks_for_the_line(signal: str, unit: str, size: f
         check_units(found)
 
 
+@pytest.mark.parametrize(("name", "unit"), [("nDrehzahl_Ist_VR", "rpm"), ("fRad_VR", "rad/s")])
+def test_a_name_that_says_turns_per_minute_comes_before_the_unit_that_fits_best(name: str, unit: str) -> None:
+    small = replace(KNOWN.geometry, wheel_diameter=0.2)  # type: ignore[type-var]
+    machine = replace(KNOWN, geometry=small, gear_ratio=1.0, max_speed=10.0)
+    found = mapped({name: 143.0 * WAVE}, {"wheel.FR.v": SignalSource(column=name, unit="m/s")}, machine)
+    assert f'unit = "{unit}"' in found.questions[0]
+
+
 def test_the_line_is_read_back_and_answers_the_question() -> None:
     found = mapped({"x": 31.0 * WAVE}, {"steer.front.phi": SignalSource(column="x", unit="rad")})
     line = found.questions[0].partition("write: ")[2]

@@ -72,7 +72,7 @@ def _coverage(machines: Sequence[MachineRow]) -> str:
     dark = sum(
         not m["parts"] or m["unjudged"] > 0 or any(p["assessed_last"] is None for p in m["parts"]) for m in machines
     )
-    words = [f"{count(blind, 'part')} not assessed in the last mission"] if blind else []
+    words = [f"{count(blind, 'part')} not judged long enough in the last mission"] if blind else []
     words += [f"{'' if blind else 'last mission '}not known of {count(dark, 'machine')}"] if dark else []
     return ", ".join(words) or "every part assessed in the last mission"
 

@@ -256,8 +256,9 @@ def _fault(f: FleetFaultRow, document: ShownDocument, directions: Mapping[tuple[
         notes.append(f"repaired on {rows.day(f['repaired_ns'])}")
     elif f["repaired_ns"] is not None:
         notes.append(f"found again since the repair on {rows.day(f['repaired_ns'])}")
-    if f["open"] and f["clean"]:
-        notes.append(f"open{open_words(True, f['clean'], f['needed'])}")
+    if f["open"] and f["since"]:
+        none = f", clean in none of the {f['needed']} missions that close it"
+        notes.append(f"open{open_words(True, f['clean'], f['needed']) or none}")
     elif f["since"]:
         last_ones = f"last {count(f['since'], 'mission')}" if f["since"] > 1 else "last mission"
         notes.append(f"not in the {last_ones} that assessed it")

@@ -105,7 +105,7 @@ def test_parts_that_were_not_assessed_stand_beside_the_leave(tmp_path: Path) -> 
         words = f"{part['component']} {'steering' if part['kind'] == 'steer' else ''}".strip()
     found = lists_of(document)[k]
     assert found.leave is Leave.MAY
-    assert f"; not assessed: {words}" in found.reason
+    assert f"; not judged long enough: {words}" in found.reason
     for part in document["machines"][k]["parts"]:
         part["assessed_last"] = False
     assert found.reason != lists_of(document)[k].reason

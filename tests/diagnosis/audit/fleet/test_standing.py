@@ -64,6 +64,13 @@ def test_a_newest_mission_that_was_not_judged_is_no_leave(
     assert standing in page
 
 
+@pytest.mark.parametrize(("late", "words"), [(1, "its last mission"), (2, "its last 2 missions")])
+def test_a_note_counts_the_missions_that_were_not_judged(tmp_path: Path, late: int, words: str) -> None:
+    blind = [Sample(f"d{k + 1}", day=k + 1.0, verdict="not_assessed") for k in range(late)]
+    (m,) = document(tmp_path, Sample("d0"), *blind)["machines"]
+    assert m["note"].startswith(f"{words} showed no fault, but not all parts were judged")
+
+
 def test_an_earlier_mission_that_was_not_judged_takes_nothing_away(tmp_path: Path) -> None:
     d = document(tmp_path, Sample("d0", verdict="not_assessed"), *READY[1:])
     assert d["verdict"]["title"] == "The machine may go out"
@@ -178,7 +185,7 @@ def test_a_fault_that_comes_back_is_as_severe_as_it_is_now(
     [
         ([Sample("a")], "every part assessed in the last mission"),
         ([Sample("a"), Sample("b", day=None)], "every part assessed in the last mission"),
-        ([Sample("a", blind=[("FR", "sensor")])], "1 part not assessed in the last mission"),
+        ([Sample("a", blind=[("FR", "sensor")])], "1 part not judged long enough in the last mission"),
         ([NO_SIGNAL], "nothing judged"),
         ([Sample("a", day=None, verdict="not_assessed", blind=samples.PARTS)], "last mission not known of 1 machine"),
         ([Sample("a"), Sample("b", "HX-2", state="crashed")], "last mission not known of 1 machine"),

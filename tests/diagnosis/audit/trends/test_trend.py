@@ -160,6 +160,7 @@ def test_wear_that_begins_late_is_not_averaged_with_what_was_before() -> None:
     ("value", "state", "words"),
     [
         ([], "not_known", "no mission"),
+        ([0.05], "not_known", "1 mission, 5 are needed"),
         ([0.05] * 4, "not_known", "4 missions, 5 are needed"),
         ([*wear(12, 0.001), 0.5], "not_known", "last mission deviates from the trend"),
         ([*wear(12, 0.012, 0.02), 0.01, 0.012, 0.009], "not_known", "3 missions since the drop"),
