@@ -70,7 +70,7 @@ def mirrored(
     out, doubts = dict(answers), {}
     for w in dict.fromkeys(w for w, _ in pairs):
         others = [o for a, o in pairs if a == w and o not in odd] or [o for a, o in pairs if a == w]
-        off = {}
+        off: dict[tuple[str, str], int] = {}
         for o in others:
             both = [x for p, x in swapped.items() if {*p} == {w, o}]
             usual = np.minimum(answers[w].noise, answers[o].noise)  # a fault of long makes its own misfit look usual
