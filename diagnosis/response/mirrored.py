@@ -82,8 +82,6 @@ def mirrored(
         other = min(others, key=lambda o: off[w, o])
         if other not in odd or _right(other, (w, other), made, off):
             out[w], doubts[w] = swapped[w, other], _words(w, other, made) + "it was off in most of the turns"
-        elif not _right(w, (w, other), made, off):
-            doubts[w] = _words(w, other, made) + "one of the two was off in most of the turns, and which cannot be told"
     return Mirrored(out, doubts)
 
 

@@ -11,8 +11,7 @@ from diagnosis.response.identification import identify_response
 from diagnosis.response.inputs import FollowerData, cell_of, cells
 from diagnosis.response.kernel import follow
 from diagnosis.response.mirrored import Mirrored, mirrored
-from diagnosis.results.assessment import CODE
-from replay.faults import FaultMode, State
+from replay.faults import FaultMode
 from replay.machine.config import Limits
 from replay.machine.geometry import Geometry, WheelGeometry
 
@@ -68,12 +67,3 @@ def test_healthy_sides_answer_alike_however_they_skid(skids: float) -> None:
     data = drive(2, skids)
     assert held(data).doubts == {}
     assert all(not side.findings for sides in judged(data).parts.values() for side in sides)
-
-
-def test_where_neither_turns_as_built_no_one_is_healthy_and_it_is_said_why() -> None:
-    data = drive(3, 1.6)
-    data["R"].y[SPELL] *= 0.4
-    assert set(held(data).doubts) == {"R", "L"}
-    for w, (sensor, _) in judged(data).parts.items():
-        assert not np.any(sensor.states == CODE[State.HEALTHY]), w
-        assert "which cannot be told" in sensor.reasons[State.NOT_ASSESSED]
