@@ -13,6 +13,7 @@ from diagnosis.response.identification import Response, identify_response, witho
 from diagnosis.response.inputs import FollowerData, cells
 from diagnosis.response.jumps import jumps_of
 from diagnosis.response.machine import Judged
+from diagnosis.response.mirrored import mirrored
 from diagnosis.response.models import STATES, blocks_of
 from diagnosis.response.wheel import Wheel
 from replay.machine.config import Limits
@@ -61,9 +62,10 @@ def wheels_of(
         y[samples.step[samples.wild]] = np.nan
         channels[w] = samples, _response(y, samples, d, cell, limits, dt)
     answers = {w: found for w, (_, found) in channels.items() if found is not None}
+    answers, doubts = mirrored(data, answers, geometry, cell, dt)
     several = len(answers) >= _LEAST_OTHERS
     for w, d in data.items():
-        y, (samples, found) = d.y, channels[w]
+        y, samples, found = d.y, channels[w][0], answers.get(w)
         if found is None and not several:  # of two wheels the other one shows what a command makes
             found = as_a_peer(w, d.commands, answers, geometry, cell * dt)
         # wheels of one body, that is: joints which are each commanded by themselves have nothing to do with each other
@@ -84,7 +86,9 @@ def wheels_of(
         wheel = Wheel(d.name, samples, blocks, jumps, dt, "")
         others = tuple(o.y for k, o in data.items() if k != w)
         start = np.zeros((0, STATES))
-        out[w] = Judged(d, response, wheel, driving, start, [], None, calm, alone=not others, others=others)
+        out[w] = Judged(
+            d, response, wheel, driving, start, [], None, calm, alone=not others, others=others, odd=doubts.get(w, "")
+        )
     return out
 
 

@@ -178,7 +178,8 @@ def assess_response(
     }
     astray, lasts = otherwise(judged, width * dt)
     remarks = (*astray, *left_notes)
-    doubts = {w: j.joint.unlike for w, j in judged.items() if j.joint is not None and j.joint.unlike}
+    doubts = {w: j.odd for w, j in judged.items() if j.odd and not any(side.findings for side in parts[w])}
+    doubts |= {w: j.joint.unlike for w, j in judged.items() if j.joint is not None and j.joint.unlike}
     for w, text in (doubts | unlike(judged)).items():
         parts[w] = _doubted(parts[w][0], [slice(None)], text), parts[w][1]
     lasting = lasting_losses(judged)

@@ -57,6 +57,8 @@ class Judged(NamedTuple):
         Measured yaw rate of the body [rad/s].
     others : tuple[Array, ...], each of shape (n,)
         Readings of all other wheels [m/s].
+    odd : str
+        Why its own answer to its commands cannot be right; empty where it may be.
     """
 
     data: FollowerData
@@ -73,6 +75,7 @@ class Judged(NamedTuple):
     rolls: bool = False
     yaw: Array | None = None
     others: tuple[Array, ...] = ()
+    odd: str = ""
 
 
 def standstills(idle: Sequence[tuple[int, int]], dt: float) -> tuple[str, ...]:
