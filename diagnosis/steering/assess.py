@@ -126,7 +126,7 @@ def assess_steering(
     alone = less_sure_all_along(
         not_together({name: one.sides for name, one in once.items()}, length, timeline.dt), timeline.size
     )
-    single = {a.name for a in axles if not a.angle_redundant}
+    single = {a.name for a in axles if a.redundant and not a.angle_redundant}  # their openings alone are measured
     alone |= not_starved(
         {name: alone.get(name, one.sides) for name, one in told.items() if name in single},
         {name: one.axle for name, one in told.items()},

@@ -22,6 +22,7 @@ _SHARES = (0.32, 0.25, 0.15, 0.28)
 _MOST_STUCK = 0.7
 _SURE, _MOST_SMALL = 0.9, 0.5  # of a small loss of a sensor: right were 6 of 6 beyond the one, 8 of 18 below
 _PARTLY, _MOST_PARTLY = 0.75, 0.4  # a valve that answers, but less or roughly, right in 5 of 26 below the first
+_LOSS_SURE = 0.9  # of a loss of a sensor: below, right were 15 of 28, and its wheel 24 of 28
 _UNTOLD = (
     "The {wheel} does not follow its command, but whether its {valve} is stuck, or its sensor is off by an offset or a share, "
     "command and speed do not tell: log the {valve}'s position."
@@ -29,6 +30,7 @@ _UNTOLD = (
 _LESS_SURE = (
     "By command and speed alone, what seemed a stuck {valve} was something else of the same {wheel} in one of three."
 )
+_EITHER = "By command and speed alone, in a third of such cases the {valve} of the same {wheel} was weak instead: its position would tell."
 _ANSWERING = (FaultMode.INEFFICIENT, FaultMode.NOISY)
 _OTHERS = "By command and speed alone, another {wheel} or the ground was the cause in four of five such cases."
 _SMALL = "Machines of other build differ by as much where nothing is wrong with this sensor."
@@ -70,7 +72,22 @@ def _claimed(f: Finding, clear_at: float, *, measured: bool) -> Finding:
         if f.mode in _ANSWERING and f.probability < _PARTLY:
             return limited(f, _MOST_PARTLY, _OTHERS)
     small = f.mode is FaultMode.INEFFICIENT and f.epsilon is not None and f.epsilon.value < clear_at
-    return limited(f, _MOST_SMALL, _SMALL) if small and f.side is not Side.ACTUATOR and f.probability < _SURE else f
+    if small and f.side is not Side.ACTUATOR and f.probability < _SURE:
+        return limited(f, _MOST_SMALL, _SMALL)
+    lost = f.side is Side.SENSOR and f.mode is FaultMode.INEFFICIENT
+    return _of_either(f) if lost and not measured and f.probability < _LOSS_SURE else f
+
+
+def _of_either(f: Finding) -> Finding:
+    """A sensor's loss as one of its wheel: of the sensor, or of the valve."""
+    rows = {(side.value, f.mode.value) for side in f.side.sides} | {(Side.ACTUATOR.value, f.mode.value)}
+    both = sum(h.p for h in f.hypotheses if (h.side, h.mode) in rows)
+    halves = [Hypothesis(side, mode, both / 2) for side, mode in sorted(rows, reverse=True)]
+    others = [h for h in f.hypotheses if (h.side, h.mode) not in rows]
+    hypotheses = tuple(sorted([*halves, *others], key=lambda h: -h.p))
+    return replace(
+        f, side=Side.SENSOR_OR_ACTUATOR, probability=both, hypotheses=hypotheses, evidence=(*f.evidence, _EITHER)
+    )
 
 
 def _untold(f: Finding) -> Finding:

@@ -69,3 +69,15 @@ def test_a_valve_that_answers_less_is_as_probably_another_wheel(mode: FaultMode)
     assert claimed(finding(Side.ACTUATOR, mode, 0.7, 0.5)).probability == pytest.approx(0.4)
     assert claimed(finding(Side.ACTUATOR, mode, 0.8, 0.5)).probability == 0.8
     assert claimed(finding(Side.ACTUATOR, mode, 0.7, 0.5), measured=True).probability == 0.7
+
+
+@pytest.mark.parametrize(
+    ("p", "measured", "side"),
+    [(0.85, False, Side.SENSOR_OR_ACTUATOR), (0.95, False, Side.SENSOR), (0.85, True, Side.SENSOR)],
+)
+def test_a_loss_that_is_not_sure_is_of_the_sensor_or_the_valve(p: float, measured: bool, side: Side) -> None:
+    """In a mission without valve positions the valve of the same wheel is as good a cause."""
+    got = claimed(finding(Side.SENSOR, FaultMode.INEFFICIENT, p, 0.5), measured=measured)
+    assert (got.side, got.mode, got.probability) == (side, FaultMode.INEFFICIENT, pytest.approx(p))
+    if side is Side.SENSOR_OR_ACTUATOR:
+        assert [(h.side, h.p) for h in got.hypotheses[:2]] == [("sensor", p / 2), ("actuator", p / 2)]
