@@ -105,7 +105,7 @@ def _read(file: IO[bytes], path: Path, size: int, clock: str) -> InspectReport:
     }
     return InspectReport(
         str(path), "mcap", *index.bounds, topics, (),
-        metadata=_texts(file, index) | {"integrity": "checksums" if checked else "unverifiable"}, depth="quick", size=size,
+        metadata=_texts(file, index, size) | {"integrity": "checksums" if checked else "unverifiable"}, depth="quick", size=size,
         clock=clock, container=container, attachments=tuple(index.attachments),
         integrity="checksums; that of the index is right, those of the data were not read"
         if checked
@@ -178,10 +178,11 @@ def _first_checksum(file: IO[bytes], index: _Index) -> bool:
     return bool(struct.unpack_from("<I", head, 33)[0])
 
 
-def _texts(file: IO[bytes], index: _Index) -> dict[str, str]:
-    """Profile and library, and the metadata records of moderate size."""
+def _texts(file: IO[bytes], index: _Index, file_size: int) -> dict[str, str]:
+    """Profile and library, and the metadata records of moderate size; `file_size` in bytes, beyond which none can begin."""
     out = {}
     for start, length in [(len(MAGIC), 1 << 16), *index.texts[:_MAX_TEXTS]]:
+        _sure(start < file_size)
         file.seek(start)
         raw = file.read(min(length, _MAX_TEXT))
         op, size = struct.unpack_from("<BQ", raw)

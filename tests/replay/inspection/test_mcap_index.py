@@ -32,6 +32,17 @@ def write(path: Path, **options: object) -> Path:
     return path
 
 
+@pytest.mark.parametrize("start", [1 << 40, 1 << 63, (1 << 64) - 1])
+def test_metadata_that_lie_beyond_the_file_are_not_looked_for(tmp_path: Path, start: int) -> None:
+    path = write(tmp_path / "a.mcap", enable_crcs=False)
+    raw = path.read_bytes()
+    at = (
+        raw.rindex(b"machine") - 20
+    )  # the index of metadata ends with start, length, and the name behind its own length
+    path.write_bytes(raw[:at] + start.to_bytes(8, "little") + raw[at + 8 :])
+    assert mcap_index(path, "header") is None
+
+
 @pytest.mark.parametrize("compression", list(CompressionType))
 def test_the_index_agrees_with_the_reader(tmp_path: Path, compression: CompressionType) -> None:
     path = write(tmp_path / "a.mcap", compression=compression)
