@@ -166,7 +166,7 @@ def _fading(y: Array, x: Array, found: Sequence[Cause], stuck: float, measured: 
     """A gain that fades and leaves nothing, whatever else may leave as little; None where that is not so."""
     fades = next((c for c in found if c.changes and c.epsilon is not None), None)
     steadily = next((c.left for c in found if c.epsilon is not None and not c.changes), None)
-    if fades is None or steadily is None:  # no gain fits what is recorded
+    if fades is None or steadily is None:  # a gain that is the same at both ends changes nothing
         return None
     if fades.mode is not FaultMode.INEFFICIENT or fades.left > _NOTHING or not _far(steadily, fades, _RIVAL_LEFT):
         return None

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from diagnosis.estimation.one_cause import with_one_cause
-from diagnosis.estimation.simple_causes import Measured
+from diagnosis.estimation.one_cause import _fading, with_one_cause
+from diagnosis.estimation.simple_causes import Cause, Measured
 from diagnosis.results.assessment import Finding
-from diagnosis.results.result import Hypothesis
+from diagnosis.results.result import Epsilon, Hypothesis
 from diagnosis.results.vocabulary import Tier
 from replay.faults import FaultMode, Side
 
@@ -181,3 +181,9 @@ def test_a_fade_begins_within_its_piece() -> None:
     assert 1080 <= found.start <= 1130
     assert found.epsilon is not None
     assert found.epsilon.high == pytest.approx(0.53, abs=0.03)
+
+
+def test_a_gain_that_does_not_change_does_not_fade() -> None:
+    """Where the gain that may change is the same at both ends, to the last digit, no cause changes."""
+    seen, steady = measured(lambda x: 0.6 * x), Cause(FaultMode.INEFFICIENT, 0.0, 0.0, "", Epsilon(0.4, 0.3, 0.5))
+    assert _fading(seen.y, seen.x, [steady, steady], 1.0, seen) is None
