@@ -13,9 +13,11 @@ from diagnosis.assess import ComponentResult, assess_components
 from diagnosis.channels.copied_rows import without_copied_rows
 from diagnosis.channels.recording_gaps import recording_gaps, without_gaps
 from diagnosis.clearing.backwards import without_claims
-from diagnosis.clearing.beside_angles import less_sure_beside_wrong_angles
-from diagnosis.clearing.beside_sensors import less_sure_beside_dead_sensors
-from diagnosis.clearing.beside_valves import less_sure_beside_dead_valves
+from diagnosis.clearing.beside import (
+    less_sure_beside_dead_sensors,
+    less_sure_beside_dead_valves,
+    less_sure_beside_wrong_angles,
+)
 from diagnosis.clearing.contradicted import without_contradicted
 from diagnosis.clearing.standing_out import what_stands_out, with_findings, without_explained, without_followers
 from diagnosis.decision import metrics, quality

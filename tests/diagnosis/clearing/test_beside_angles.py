@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from diagnosis.clearing.beside_angles import less_sure_beside_wrong_angles
+from diagnosis.clearing.beside import less_sure_beside_wrong_angles
 from diagnosis.results.assessment import Assessment, Finding
 from diagnosis.results.result import Hypothesis
 from diagnosis.results.vocabulary import Tier

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from diagnosis.clearing.beside_sensors import less_sure_beside_dead_sensors
+from diagnosis.clearing.beside import less_sure_beside_dead_sensors
 from diagnosis.results.assessment import Assessment, Finding
 from diagnosis.results.machine_words import HYDRAULIC
 from diagnosis.results.vocabulary import Tier

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from diagnosis.clearing.beside_valves import less_sure_beside_dead_valves
+from diagnosis.clearing.beside import less_sure_beside_dead_valves
 from diagnosis.results.assessment import Assessment, Finding
 from diagnosis.results.machine_words import HYDRAULIC
 from diagnosis.results.result import Sat
