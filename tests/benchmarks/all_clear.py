@@ -9,7 +9,7 @@ mission is
     wrong part        of what is not named: a fault of severity high on a part that does not fail
     abstained         neither cleared nor named
     (not counted)     no part that fails was driven, or steered, for three seconds of its fault; of one that fades, from where
-                      it has lost what counts
+                      it has lost what counts; of a recorded channel that is changed, where it is off by what counts
 
 Tune on ``--seeds tuning``; the structures of ``reporting`` are others.
 """
@@ -46,7 +46,8 @@ from variation import recorded_signals
 
 from diagnosis.pipeline import diagnose_mission, diagnose_signals
 from replay.errors import MfhcaError
-from replay.machine.config import Limits, haulotte
+from replay.machine.config import Limits, Machine, haulotte
+from replay.signals.signal import Signals
 from replay.simulation.options import SimulationOptions
 from replay.simulation.run import simulate_mission
 from replay.simulation.structures import STRUCTURES, StructureOptions
@@ -60,6 +61,7 @@ OTHERS = {
 }
 _DRIVEN, _STEERED = 0.06, 0.02  # m/s, rad/s
 _DRIVEN_S, _STEERED_S = 3.0, 1.0
+_LEAST_SPEED, _LEAST_ANGLE = 0.16, 0.06  # of the top speed, rad: what is less is read off by a share of these
 
 
 def options_of(task: Task) -> SimulationOptions:
@@ -88,7 +90,9 @@ def run(task: Task) -> list[Outcome]:
         assert tier in EVIDENCE
         signals = recorded_signals(mission, tier)
         if trouble is not None and trouble.edit is not None:
-            signals = trouble.edit(signals)
+            before, signals = signals, trouble.edit(signals)
+            if trouble.parts and not deformed(before, signals, machine):
+                continue
         try:
             report = diagnose_signals(signals, machine).report
         except MfhcaError as error:
@@ -113,7 +117,9 @@ def run_other(task: Task, physics: ModuleType) -> list[Outcome]:
     for tier in task.tiers:
         signals = physics.signals(task.seed, trouble.faults if trouble else (), task.duration, tier)
         if trouble is not None and trouble.edit is not None:
-            signals = trouble.edit(signals)
+            before, signals = signals, trouble.edit(signals)
+            if trouble.parts and not deformed(before, signals, machine):
+                continue
         try:
             report = diagnose_signals(signals, machine).report
         except Exception as error:  # a bug of the diagnosis, which the campaign outlives
@@ -154,6 +160,19 @@ def exercised(t: np.ndarray, asked: Mapping[str, np.ndarray], trouble: Trouble |
             np.count_nonzero(used & (t >= counts) & (t < f.stop_s))
         )
     return any(s >= (_STEERED_S if c in ("front", "rear") else _DRIVEN_S) for c, s in time.items())
+
+
+def deformed(before: Signals, after: Signals, machine: Machine) -> bool:
+    """Whether what happened to a recorded channel takes away, or adds, the share that counts, for three seconds in all."""
+    for name, one in after.items.items():
+        old = before.items[name]
+        if not np.array_equal(one.stamps, old.stamps):
+            return True
+        floor = _LEAST_ANGLE if name.startswith("steer.") else _LEAST_SPEED * machine.max_speed
+        counts = ~(np.abs(one.values - old.values) < Limits().clear_at * np.maximum(np.abs(old.values), floor))
+        if np.count_nonzero(counts & np.isfinite(old.values)) * np.median(np.diff(one.stamps)) * 1e-9 >= _DRIVEN_S:
+            return True
+    return False
 
 
 def tasks_of(

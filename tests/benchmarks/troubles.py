@@ -244,6 +244,83 @@ def _times(factor: float) -> Callable[[np.ndarray, np.ndarray], np.ndarray]:
     return lambda t, y: factor * y
 
 
+_GROWING = (
+    ("front", Side.ACTUATOR, "steering valve", Form("fades to .4", _M.INEFFICIENT, 0.6, ramp=True)),
+    ("rear", Side.SENSOR, "steering sensor", Form("fades to .6", _M.INEFFICIENT, 0.4, ramp=True)),
+    ("FL", Side.SENSOR, "sensor", Form("comes to read 1.4", _M.OUTSIDE_TABLE, -0.4, ramp=True)),
+    ("RR", Side.ACTUATOR, "valve", Form("comes to open 1.4", _M.OUTSIDE_TABLE, -0.4, ramp=True)),
+    ("front", Side.SENSOR, "steering sensor", Form("comes to read 1.4", _M.OUTSIDE_TABLE, -0.4, ramp=True)),
+    ("rear", Side.ACTUATOR, "steering valve", Form("comes to be biased by .15", _M.OUTSIDE_TABLE, 0.02, sat=7.5, ramp=True)),
+)  # fmt: skip
+
+
+def _growing(duration: float) -> Iterator[Trouble]:
+    """One part that gets worse, slowly."""
+    for component, side, words, form in _GROWING:
+        for course in ("whole", "last half"):
+            faults = faults_of(component, side, form, courses(duration)[course])
+            yield Trouble(
+                f"{component} {words} {form.name}, {course}", faults, parts=frozenset({(component, side.value)})
+            )
+
+
+def _slow(seconds: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Lags by a second."""
+    kept = math.exp(-float(np.median(np.diff(seconds))) / 1.0)
+    out, state = np.empty_like(values), values[0]
+    for k, y in enumerate(values):
+        state = kept * state + (1.0 - kept) * y
+        out[k] = state
+    return out
+
+
+def _clipped(seconds: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Reads no more than half of its largest value."""
+    most = 0.5 * float(np.quantile(np.abs(values), 0.99))
+    return np.clip(values, -most, most)
+
+
+def _deaf(seconds: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Reads nothing below four tenths of its largest value."""
+    return np.where(np.abs(values) < 0.4 * float(np.quantile(np.abs(values), 0.99)), 0.0, values)
+
+
+def _loose(seconds: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """A contact that opens for a fifth of a second, five times in three seconds."""
+    at = np.random.default_rng(5).random(int(seconds[-1] / 0.2) + 2) < 1 / 3
+    return np.where(at[(seconds / 0.2).astype(int)], 0.0, values)
+
+
+def _held(seconds: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Renews its value every 1.2 s."""
+    first = np.searchsorted(seconds, np.floor(seconds / 1.2) * 1.2)
+    return values[first]
+
+
+def _behaving(duration: float) -> Iterator[Trouble]:
+    """Sensors that deform what they read."""
+    forms = (
+        ("slow", _slow, ("RR", "rear")),
+        ("clipped", _clipped, ("FL", "front")),
+        ("deaf to small values", _deaf, ("RL", "rear")),
+        ("with a loose contact", _loose, ("FR", "front")),
+        ("renewed every 1.2 s", _held, ("RL", "rear")),
+    )
+    for words, change, parts in forms:
+        for part in parts:
+            wheel = part not in ("front", "rear")
+            name = f"wheel.{part}.v" if wheel else f"steer.{part}.phi"
+            about = frozenset({(part, "sensor")})
+            yield Trouble(
+                f"{part}{'' if wheel else ' steering'} sensor {words}", edit=_changed(name, change), parts=about
+            )
+    drift = _changed("steer.front.phi", lambda t, y: y + 0.2 * t / duration)
+    yield Trouble("front steering sensor drifts", edit=drift, parts=frozenset({("front", "sensor")}))
+
+
 def troubles(duration: float) -> list[Trouble]:
     """All kinds."""
-    return [*_single(duration), *_several(duration), *_recorded(duration), *_misnamed(duration)]
+    return [
+        *_single(duration), *_several(duration), *_recorded(duration), *_misnamed(duration),
+        *_growing(duration), *_behaving(duration),
+    ]  # fmt: skip
