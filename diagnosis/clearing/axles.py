@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from diagnosis.clearing.cells import Array, Cells, Frame
 from diagnosis.clearing.measure import alone, compared, lasts, lowest_passed, off_commands, times, worst
-from diagnosis.clearing.responses import largest_change
+from diagnosis.clearing.responses import growth, largest_change
 from diagnosis.results.clearing import Check, Checked
 from diagnosis.results.vocabulary import Kind
 from replay.faults import Side
@@ -36,7 +36,8 @@ VALVE = 1.4  # dead band and hysteresis of a healthy valve: its limit, likewise
 #: Limits of the rate in windows and over the mission, as multiples of the loss that counts, by whether angle and opening are measured twice.
 RATE = {False: (2.0, 1.0), True: (3.0, 2.0)}
 _LEAST_WINDOWS = 16  # for a change
-_CHANGED, _ALONE = 0.75, 3.0  # of the loss that counts, and times the other axle's: a change of one axle alone
+#: Of the loss that counts, and times the other axle's: a change of one axle alone. Dead bands that are not known hide half of one.
+_CHANGED, _ALONE = 0.3, 1.5
 _FEW_S = 2.0  # in which an axle is steered, for its usual rate
 
 
@@ -257,12 +258,13 @@ def _changes(cells: Cells, frame: Frame, off: Array, j: int) -> float | None:
     own = np.where(cells.explained(name, frame), np.nan, off[:, j])
     if np.count_nonzero(np.isfinite(own)) < _LEAST_WINDOWS:
         return None
-    found = [largest_change(own, [np.isfinite(own)])]
-    for k in range(off.shape[1]):
-        beside = np.isfinite(own - off[:, k])
-        if k != j and np.count_nonzero(beside) >= _LEAST_WINDOWS:
-            found.append(largest_change(own - off[:, k], [beside]))
-    return float(min(found))
+    apart = [own, *(own - off[:, k] for k in range(off.shape[1]) if k != j)]
+    every = [np.ones(own.size, np.bool_)]
+    return min(
+        max(largest_change(x, every), growth(x, every))
+        for x in apart
+        if np.count_nonzero(np.isfinite(x)) >= _LEAST_WINDOWS
+    )
 
 
 def _beyond(rate: Array, opening: Array, use: Flags, dead: Array) -> tuple[Flags, Array, Array]:

@@ -17,6 +17,7 @@ USUAL_TOP = 0.36  # m/s, of the machine for which speeds here are
 MOVING = 0.08  # m/s, for such a machine
 _LEAST_CELLS = 0.5  # of a window
 _LEAST_WINDOWS, _PART = 8, 0.2  # before and after a change, at least
+_GROWS = 40  # windows, for what grows
 _ALIKE = 0.5  # of the limit: where half of the wheels deviate by more, openings tell little of speeds
 #: Of the power of a speed, what its opening explains: on tuning machines 0.91 and more of a healthy valve's and 0.69 and less of a
 #: torque's, and 0.56 and more of valves with wide dead bands.
@@ -68,8 +69,9 @@ class Responses(NamedTuple):
         Speed that counts in a window, 0 where none does [m/s].
     ahead : NDArray[np.bool_], shape (windows, wheels)
         Windows whose usual one is that of driving forward.
-    changes : list[float | None]
-        By how much each wheel's usual one changes in the mission at most; None where it is not known.
+    changes, grown : list[float | None]
+        By how much each wheel's usual one changes in the mission at most, and over half of it at its usual pace; None where it is not
+        known.
     """
 
     windows: Array
@@ -78,6 +80,7 @@ class Responses(NamedTuple):
     weight: Array
     ahead: NDArray[np.bool_]
     changes: list[float | None]
+    grown: list[float | None]
 
 
 def responses_of(cells: Cells, speed: Array, opening: Array, reference: Array, moving: float = MOVING) -> Responses:
@@ -105,6 +108,7 @@ def responses_of(cells: Cells, speed: Array, opening: Array, reference: Array, m
     off = np.full(log.shape, np.nan)
     lasting: list[Usual] = []
     changes: list[float | None] = []
+    grown: list[float | None] = []
     for i, wheel in enumerate(cells.machine.wheels):
         own = np.where(cells.explained(wheel), np.nan, log[:, i])  # a stated fault is not what is usual
         if np.count_nonzero(np.isfinite(own)) < _LEAST_WINDOWS:  # it is nearly all that there is
@@ -120,13 +124,15 @@ def responses_of(cells: Cells, speed: Array, opening: Array, reference: Array, m
                 if np.count_nonzero(here) * frame.hop * cells.dt >= 3.0:
                     usual.append(middle)
                     ways[-1] = middle
-        changes.append(largest_change(own, [ahead[:, i], ~ahead[:, i]]) if usual else None)
+        ways_apart = [ahead[:, i], ~ahead[:, i]]
+        changes.append(largest_change(own, ways_apart) if usual else None)
+        grown.append(growth(own, ways_apart) if usual else None)
         lasting.append(
             Usual(max(0.0, -min(usual)), max(0.0, *usual), min(usual), max(usual), (ways[0], ways[1]))
             if usual
             else Usual()
         )
-    return Responses(off, log, lasting, np.where(settled, np.abs(speed), 0.0), ahead, changes)
+    return Responses(off, log, lasting, np.where(settled, np.abs(speed), 0.0), ahead, changes, grown)
 
 
 def largest_change(log: Array, ways: Sequence[NDArray[np.bool_]]) -> float:
@@ -143,6 +149,23 @@ def largest_change(log: Array, ways: Sequence[NDArray[np.bool_]]) -> float:
     return float(largest)
 
 
+def growth(log: Array, ways: Sequence[NDArray[np.bool_]]) -> float:
+    """Change over half of the mission at the median pace between windows a third to two thirds apart, of each sort alone [ln]; shape (windows,).
+
+    By as much halves differ of what grows all the time; what merely comes and goes has no pace, and is not in the way.
+    """
+    largest = 0.0
+    for way in ways:
+        at = np.flatnonzero(way & np.isfinite(log))
+        n = at.size
+        if n < _GROWS:
+            continue
+        apart = [(at[:-k], at[k:]) for k in range(n // 3, 2 * n // 3 + 1, max(1, n // 24))]
+        pace = _median(np.concatenate([(log[b] - log[a]) / (b - a) for a, b in apart]))
+        largest = max(largest, 0.5 * abs(pace) * float(at[-1] - at[0]))
+    return largest
+
+
 def _median(x: Array) -> float:
     """Median of finite values; `np.median` looks for NaN and axes first, which takes most of its time here."""
     half = x.size // 2
@@ -153,11 +176,12 @@ def _median(x: Array) -> float:
 
 
 class Limits(NamedTuple):
-    """Limits of a wheel's speed per opening [ln]: in windows below and above, of a change, and over the mission."""
+    """Limits of a wheel's speed per opening [ln]: in windows below and above, of a change, of one that grows, and over the mission."""
 
     below: float
     above: float
     changed: float
+    grown: float
     lasting_below: float
     lasting_above: float
 
@@ -174,7 +198,8 @@ def usual_limits(twice: tuple[bool, bool], clear_at: float) -> Limits:
     """Limits of a wheel whatever the other wheels do; `twice` as of `measured_twice`, `clear_at` the loss that counts [1]."""
     share = -float(np.log1p(-clear_at))
     (below, lasting_below), (above, lasting_above) = RESPONSE[twice]
-    return Limits(*(share * x for x in (below, above, lasting_below / _CHANGED, lasting_below, lasting_above)))
+    changed = lasting_below / _CHANGED
+    return Limits(*(share * x for x in (below, above, changed, changed, lasting_below, lasting_above)))
 
 
 def response_limits(
@@ -204,12 +229,16 @@ def _beside_others(responses: Responses, twice: Sequence[tuple[bool, bool]], cle
     usual = [usual_limits(both, clear_at) for both in twice]
     least = -_LEAST_TWICE * float(np.log1p(-clear_at))
     return [
-        limit._replace(changed=alone(responses.changes, i, limit.changed, least, _CHANGED_ALONE))
+        limit._replace(
+            changed=alone(responses.changes, i, limit.changed, least, _CHANGED_ALONE),
+            grown=alone(responses.grown, i, limit.grown, least, _CHANGED_ALONE),
+        )
         if all(twice[i])
         else limit._replace(
             below=alone(most[0], i, limit.below, seen, _ALONE),
             above=alone(most[1], i, limit.above, seen, _ALONE),
             changed=alone(responses.changes, i, limit.changed, seen, _CHANGED_ALONE),
+            grown=alone(responses.grown, i, limit.grown, seen, _CHANGED_ALONE),
         )
         for i, limit in enumerate(usual)
         for seen in (_LEAST_SEEN_TWICE if any(twice[i]) else _LEAST_SEEN,)

@@ -98,7 +98,8 @@ def wheel_checks(cells: Cells, clear_at: float) -> Iterator[Checked]:
                 yield max(driven, worst(cells, response, -slow[:, i], most_slow, apart=True), key=times)
             below = lasts(cells, (*about, either, Check.LASTING_RESPONSE), lasting[i].below, own.lasting_below)
             changed = lasts(cells, (*about, either, Check.LASTING_RESPONSE), changes[i], own.changed)
-            yield max(below, changed, key=times)
+            grown = lasts(cells, (*about, either, Check.LASTING_RESPONSE), responses.grown[i], own.grown)
+            yield max(below, changed, grown, key=times)
             if not all(twice[i]):  # of a wheel that is measured twice on both sides, it is the ground's doing
                 yield worst(cells, (*about, either, Check.EXCESS), windows[:, i], own.above, apart=True)
                 yield lasts(cells, (*about, either, Check.LASTING_EXCESS), lasting[i].above, own.lasting_above)

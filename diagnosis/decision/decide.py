@@ -39,7 +39,7 @@ Part = tuple[str, str]
 _COMPARED_WHEELS = 3
 _UNEXPLAINED_S = 0.5
 _MOSTLY = 0.5
-_NO_YAW = "An offset of a steering sensor that is there from start to end does not show in this log; a yaw rate (imu.yaw_rate) would show it."
+_NO_YAW = "An offset of a steering sensor that is there from start to end, or grows slowly, does not show in this log; a yaw rate (imu.yaw_rate) would show it."
 
 _SENSORS_ALONE = "No sensor fault seen, drives not judged"
 

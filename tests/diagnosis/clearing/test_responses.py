@@ -13,6 +13,7 @@ from diagnosis.clearing.cells import Frame
 from diagnosis.clearing.responses import (
     Responses,
     Usual,
+    growth,
     openings_tell,
     response_limits,
     usual_limits,
@@ -26,14 +27,14 @@ def responses(*largest: float, changes: tuple[float | None, ...] = ()) -> Respon
     rows = [np.concatenate([np.zeros(20), [x, -x]]) for x in largest]
     windows = np.column_stack(rows)
     known = list(changes or [0.0] * len(largest))
-    return Responses(windows, windows, [Usual()] * len(largest), windows, windows >= 0.0, known)
+    return Responses(windows, windows, [Usual()] * len(largest), windows, windows >= 0.0, known, known)
 
 
 def test_a_wheel_that_deviates_alone_is_held_to_a_lower_limit() -> None:
     of, usual = responses(0.17, 0.01, 0.015, 0.015, changes=(0.15, 0.02, 0.01, None)), usual_limits(ONCE, CLEAR_AT)
     first, second, *_ = response_limits(of, [ONCE] * 4, CLEAR_AT)
     assert first.below == first.above == pytest.approx(0.06)  # no lower than that, however quiet the others are
-    assert first.changed == pytest.approx(0.06)
+    assert first.changed == first.grown == pytest.approx(0.06)
     half = response_limits(of, [(True, False)] * 4, CLEAR_AT)[0]
     assert half.below == half.changed == pytest.approx(0.1)  # where openings are measured, less hangs on it
     assert (first.lasting_below, first.lasting_above) == (usual.lasting_below, usual.lasting_above)
@@ -44,7 +45,7 @@ def test_a_wheel_that_is_measured_twice_on_both_sides_keeps_its_limit() -> None:
     of = responses(0.3, 0.02, 0.03, 0.03, changes=(0.3, 0.02, 0.01, None))
     usual = usual_limits(TWICE, CLEAR_AT)
     limits = response_limits(of, [TWICE] * 4, CLEAR_AT)
-    assert [limit._replace(changed=usual.changed) for limit in limits] == [usual] * 4
+    assert [limit._replace(changed=usual.changed, grown=usual.grown) for limit in limits] == [usual] * 4
 
 
 def test_a_change_that_one_wheel_alone_makes_counts_although_it_is_measured_twice() -> None:
@@ -90,3 +91,11 @@ def test_what_the_ground_hides_of_a_loss_is_not_left_to_the_limit_over_the_missi
     assert second.lasting_below == usual.lasting_below
     half = response_limits(of, [(True, False)] * 4, CLEAR_AT, [0.5] * 4)[0]
     assert half.lasting_below == usual_limits((True, False), CLEAR_AT).lasting_below
+
+
+def test_what_grows_is_seen_although_no_moment_parts_it() -> None:
+    grows, every = np.linspace(0.0, 0.34, 130), np.ones(130, np.bool_)
+    assert growth(grows, [every]) == pytest.approx(0.17)
+    assert growth(np.where(np.arange(130) % 26 < 13, 0.2, 0.0), [every]) == 0.0  # comes and goes
+    assert growth(np.where(every, np.nan, grows), [every]) == 0.0
+    assert growth(np.r_[grows, -grows], [np.arange(260) < 130, np.arange(260) >= 130]) == pytest.approx(0.17)
