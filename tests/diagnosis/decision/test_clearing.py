@@ -102,11 +102,19 @@ def test_every_check_has_words(check: Check) -> None:
     ("check", "worst", "words"),
     [
         (Check.RESPONSE, 0.62, "the speed of FR per opening is 46 % below the other wheels'"),
-        (Check.LASTING_RESPONSE, 6.9, "the speed of FR per opening is over 99 % below the other wheels' over the mission"),
+        (
+            Check.LASTING_RESPONSE,
+            6.9,
+            "the speed of FR per opening is over 99 % below the other wheels' over the mission",
+        ),
         (Check.EXCESS, 0.4, "the speed of FR per opening is 49 % above the other wheels'"),
         (Check.EXCESS, 3.15, "the speed of FR per opening is 23.3 times the other wheels'"),
         (Check.RATE, 0.5, "the steering rate of the FR axle per opening is off its usual one by a factor of 1.65"),
-        (Check.TRACKING, 1.78, "the error of FR against its commanded speed exceeds the other wheels' by 178 % of that speed"),
+        (
+            Check.TRACKING,
+            1.78,
+            "the error of FR against its commanded speed exceeds the other wheels' by 178 % of that speed",
+        ),
         (Check.ROUGHNESS, 0.2, "the speed of FR jumps by 20 % of itself"),
     ],
 )

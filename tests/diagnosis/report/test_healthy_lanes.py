@@ -18,4 +18,6 @@ def test_checks_of_both_sides_stand_in_both_lanes() -> None:
     assert found["FL", "sensor"].checks == (("speed per opening", "the mission does not show it"),)
     beyond = {**check, "worst": 7.78, "start_s": 5.0, "stop_s": 8.0, "passed": False}
     found = healthy_lanes({**samples.no_faults()[0], "clearing": [beyond]})  # type: ignore[typeddict-item]
-    assert found["FR", "sensor"].checks == (("speed per opening", "over 99 %, limit 33 %, beyond it; largest at 0:05.0"),)
+    assert found["FR", "sensor"].checks == (
+        ("speed per opening", "over 99 %, limit 33 %, beyond it; largest at 0:05.0"),
+    )
