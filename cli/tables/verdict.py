@@ -37,11 +37,12 @@ def verdict_parts(report: ReportDocument) -> list[RenderableType]:
     first = verdict_title(verdict["status"], label)
     if answer:
         first.append_text(text(f"– {answer}", "bold"))
-    parts: list[RenderableType] = [*_assumed(report["machine"]), first]
+    parts: list[RenderableType] = [first]
     if title.casefold() != label.casefold():
         parts.append(text(title, "bold"))
     if verdict["text"] and verdict["text"] != title:
         parts.append(text(verdict["text"]))
+    parts += _assumed(report["machine"])
     if verdict["actions"]:
         parts += [section("What to do"), _actions(verdict["actions"], report)]
     if report["intervals"]:
@@ -60,7 +61,7 @@ def verdict_parts(report: ReportDocument) -> list[RenderableType]:
 
 
 def _assumed(machine: MachineRow) -> list[RenderableType]:
-    """Numbers of the paper's machine that stand in for this one's, before anything that rests on them."""
+    """Numbers of the paper's machine that stand in for this one's, behind the verdict that rests on them."""
     if not machine["assumed"]:
         return []
     given = machine["source"] != PAPER_DEFAULTS
@@ -71,9 +72,9 @@ def _assumed(machine: MachineRow) -> list[RenderableType]:
         else "`mfhca config init --log LOG -o machine.toml` writes a machine file from the log."
     )
     return [
+        "",
         text(f"{what}: the paper's Haulotte 16RTJ PRO stands in.", "bold yellow"),
         text(f"Of that machine, not known to be of this one: {'; '.join(machine['assumed'])}. {do}"),
-        "",
     ]
 
 
@@ -164,7 +165,8 @@ def _fault(fault: IntervalRow, words: MachineWords, bounds: bool) -> tuple[objec
 def _epsilon(epsilon: EpsilonRow | None, bounds: bool) -> str:
     if epsilon is None:
         return "–"
-    return f"{epsilon['value']:.2f}" + (f" ({epsilon['low']:.2f}–{epsilon['high']:.2f})" if bounds else "")
+    to = " to " if epsilon["low"] < 0 else "–"
+    return f"{epsilon['value']:.2f}" + (f" ({epsilon['low']:.2f}{to}{epsilon['high']:.2f})" if bounds else "")
 
 
 def _sat(sat: SatRow | None, words: MachineWords) -> str:

@@ -9,7 +9,7 @@ from diagnosis.results.document import ActionRow
 from diagnosis.results.fault_rows import mode_words
 from diagnosis.results.machine_words import MachineWords
 from diagnosis.results.result import FaultInterval
-from diagnosis.results.sizes import loss_known
+from diagnosis.results.sizes import gain_words, loss_known
 from diagnosis.results.vocabulary import Severity
 from replay.faults import FaultMode, Side
 
@@ -114,6 +114,9 @@ def _how_long(words: str, faults: Sequence[FaultInterval]) -> str:
 
 def _lost(faults: Sequence[FaultInterval]) -> str:
     """What faults take of their part's effectiveness, where that is what they are, with 95 % bounds; of several with their course."""
+    if all(f.mode is FaultMode.OUTSIDE_TABLE and f.epsilon is not None for f in faults):
+        gains = dict.fromkeys(gain_words(f.epsilon.value) for f in faults if f.epsilon is not None)
+        return f" ({join_words(list(gains))})" if all(gains) else ""
     if not all(f.mode.scaled and f.mode is not FaultMode.OUTSIDE_TABLE for f in faults):
         return ""
     sized = [f.epsilon for f in faults if f.epsilon is not None]

@@ -17,7 +17,7 @@ from diagnosis.results.document import IntervalRow
 from diagnosis.results.fault_rows import LOOKS, row_of, state_label
 from diagnosis.results.machine_words import MachineWords
 from diagnosis.results.size_rows import EpsilonRow
-from diagnosis.results.sizes import loss_known
+from diagnosis.results.sizes import gain_words, loss_known
 from replay.faults import FaultMode, Side
 from replay.machine.quantities import OPENING
 
@@ -174,4 +174,5 @@ def fault_title(fault: IntervalRow, words: MachineWords) -> str:
     row = row_of(side, mode)
     if row is not None and row.title and {name for _, name, _, _ in Formatter().parse(row.title) if name} <= set(sizes):
         return row.title.format_map(sizes)
-    return f"{part} {state_label(mode, side).lower()}"
+    gain = gain_words(epsilon["value"]) if epsilon and mode == FaultMode.OUTSIDE_TABLE else ""
+    return f"{part} {state_label(mode, side).lower()}" + (f": {gain}" if gain else "")

@@ -39,33 +39,33 @@ class Check(StrEnum):
 CHECK_WORDS: dict[Check, tuple[str, str]] = {
     Check.SECOND_MEASUREMENT: (
         "against its second measurement",
-        "the {part} is off its second measurement by {value} % of what it should show",
+        "the {part} is off its second measurement by {value} of what it should show",
     ),
     Check.RESPONSE: (
         "speed per {unit_command} below the other {wheels}', for 3 s",
-        "the speed of {part} per {unit_command} falls below the other {wheels}' by {value} %",
+        "the speed of {part} per {unit_command} is {value} the other {wheels}'",
     ),
     Check.LASTING_RESPONSE: (
         "speed per {unit_command} below the other {wheels}', over the mission",
-        "the speed of {part} per {unit_command} is below the other {wheels}' by {value} % over the mission",
+        "the speed of {part} per {unit_command} is {value} the other {wheels}' over the mission",
     ),
     Check.EXCESS: (
         "speed per {unit_command} above the other {wheels}', for 3 s",
-        "the speed of {part} per {unit_command} rises above the other {wheels}' by {value} %",
+        "the speed of {part} per {unit_command} is {value} the other {wheels}'",
     ),
     Check.LASTING_EXCESS: (
         "speed per {unit_command} above the other {wheels}', over the mission",
-        "the speed of {part} per {unit_command} is above the other {wheels}' by {value} % over the mission",
+        "the speed of {part} per {unit_command} is {value} the other {wheels}' over the mission",
     ),
     Check.CARRIED: (
         "share of the speed that the ground gives a {wheel} whose {valve} is dead",
-        "the ground carries {part}: by this mission's own model of the {wheels} a dead {valve} would leave it {value} % of its speed",
+        "the ground carries {part}: by this mission's own model of the {wheels} a dead {valve} would leave it {value} of its speed",
     ),
     Check.TRACKING: (
         "error of tracking, less that of the other {wheels}",
-        "{part} is off its commanded speed by {value} % more than the other {wheels} are",
+        "the error of {part} against its commanded speed exceeds the other {wheels}' by {value} of that speed",
     ),
-    Check.ROUGHNESS: ("quick changes of the speed", "the speed of {part} jumps by {value} % of itself"),
+    Check.ROUGHNESS: ("quick changes of the speed", "the speed of {part} jumps by {value} of itself"),
     Check.DELAY: (
         "delay against the other {wheels}",
         "the speed of {part} comes {value} later than the other {wheels}'",
@@ -76,15 +76,15 @@ CHECK_WORDS: dict[Check, tuple[str, str]] = {
     ),
     Check.RATE: (
         "steering rate per {unit_command} against the axle's usual one",
-        "the steering rate of the {part} axle per {unit_command} deviates from its usual one by {value} %",
+        "the steering rate of the {part} axle per {unit_command} is off its usual one by a {value}",
     ),
     Check.LASTING_RATE: (
         "steering rate per {unit_command} against the other axle, over the mission",
-        "the steering rate of the {part} axle per {unit_command} is off the other axle's by {value} % over the mission",
+        "the steering rate of the {part} axle per {unit_command} is off the other axle's by a {value} over the mission",
     ),
     Check.PLANT_RATE: (
         "steering rate per {unit_command} against that of the machine file's [steering], over the mission",
-        "the steering rate of the {part} axle per {unit_command} is off that of [steering] in the machine file by {value} % over the mission",
+        "the steering rate of the {part} axle per {unit_command} is off that of [steering] in the machine file by a {value} over the mission",
     ),
     Check.YAW: (
         "yaw rate against that by the steering angles, for 3 s",
@@ -104,7 +104,10 @@ CHECK_WORDS: dict[Check, tuple[str, str]] = {
 #: Share of a window that a fault must cover to explain what deviates over it: means of less are no total loss.
 MAY_EXPLAIN = 1 / 3
 _AFTER_S = (0.5, 3.0)  # of a fault, in which it still shows, at least and at most
+#: Checks whose values and limits are natural logarithms of a ratio: how far below another it is, how far above, or either.
 _BELOW = (Check.RESPONSE, Check.LASTING_RESPONSE)
+_ABOVE = (Check.EXCESS, Check.LASTING_EXCESS)
+_EITHER_WAY = (Check.RATE, Check.LASTING_RATE, Check.PLANT_RATE)
 
 
 @dataclass(frozen=True)
@@ -118,7 +121,8 @@ class Checked:
     check : Check
         What was asked.
     worst : float or None
-        Largest value [1, seconds for `Check.DELAY`, radians for the yaw rate and jumps]; None: the mission does not show it.
+        Largest value [1, seconds for `Check.DELAY`, radians for the yaw rate and jumps; natural logarithm of the ratio for speeds and
+        steering rates per opening]; None: the mission does not show it.
     limit : float
         From here on the part is not cleared.
     start_s, stop_s : float or None
@@ -168,9 +172,11 @@ class Checked:
     @property
     def _value(self) -> str:
         assert self.worst is not None
-        if self.check in _BELOW and self.worst > 1.0:
-            return "over 100"
-        return size_words(self.check, self.worst).removesuffix(" %")
+        size = size_words(self.check, self.worst)
+        if self.check is Check.STILL:
+            return size.removesuffix(" %")
+        side = " below" if self.check in _BELOW else " above" if self.check in _ABOVE and size.endswith("%") else ""
+        return size + side
 
 
 def after_s(start_s: float, stop_s: float) -> float:
@@ -192,10 +198,32 @@ def lasts_in(start_s: float, stop_s: float, fault: tuple[float, float]) -> bool:
 
 
 def size_words(check: str, value: float) -> str:
-    """A value of a check in its unit. By the check: a share [1], rad, rad/s or m/s."""
+    """A value of a check in words: ``37 %``, ``3.2 times``, ``factor of 1.6``, ``0.25 s``, ``4.0°``.
+
+    Parameters
+    ----------
+    check : str
+        Which check.
+    value : float
+        Of it, or its limit, as `Checked.worst` has it.
+    """
     if check in (Check.YAW, Check.LASTING_YAW, Check.JUMP):
         return f"{math.degrees(value):.1f}°"
-    return f"{value:.2f} s" if check == Check.DELAY else f"{100 * min(value, 9.99):.0f} %"
+    if check == Check.DELAY:
+        return f"{value:.2f} s"
+    if check in _EITHER_WAY:
+        return f"factor of {_ratio_words(value)}"
+    if check in _ABOVE and value >= math.log(2.0):
+        return f"{_ratio_words(value)} times"
+    share = -math.expm1(-value) if check in _BELOW else math.expm1(value) if check in _ABOVE else value
+    most = 0.99 if check in _BELOW else 9.99
+    return f"over {100 * most:.0f} %" if share > most else f"{100 * share:.0f} %"
+
+
+def _ratio_words(log: float) -> str:
+    """A ratio by its natural logarithm."""
+    ratio = math.exp(min(log, math.log(100.0)))
+    return "over 100" if ratio >= 99.5 else f"{ratio:.1f}" if ratio >= 2.0 else f"{ratio:.2f}"
 
 
 def clearing_rows(checks: Sequence[Checked]) -> list[ClearingRow]:

@@ -10,7 +10,8 @@ from diagnosis.results.document_numbers import Seconds
 class ClearingRow(TypedDict):
     """One check behind an all-clear: a fault of the size `LimitsRow.clear_at` would have been beyond the limit for three seconds.
 
-    `worst` is null where the mission does not show it; `start_s` and `stop_s` are null where it holds for the whole mission.
+    `worst` and `limit` are shares [1], s for delays, rad for angles, and natural logarithms of a ratio for what is compared per opening
+    (response, excess, rate); `worst` is null where the mission does not show it; `start_s` and `stop_s` are null where it holds for the whole mission.
     `shows` is the smallest loss that the mission would have shown with 95 %, for three seconds, or lasting where the check is of
     the whole mission. `text` says why the part is not cleared, and is empty where it is.
     """

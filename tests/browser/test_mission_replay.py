@@ -21,6 +21,13 @@ def test_one_clock_moves_everything(open_page: OPEN) -> None:
     expect(page.locator("#clock")).to_have_text("33.00 s")
     expect(page.locator("#stage-machine [data-c=FR] rect.tyre")).to_have_class("tyre stuck")
     expect(page.locator("#stage-machine [data-c=FR] .live text").first).to_contain_text("0.21 m/s")
+    inside = """() => [...document.querySelectorAll('#stage-machine [data-c] > rect.tyre')].every(tyre => [...tyre.parentNode.querySelectorAll(
+      '.live rect')].every(bar => { const [a, b] = [bar, tyre].map(e => e.getBoundingClientRect()); return b.left < a.left && a.right < b.right && b.top
+      < a.top && a.bottom < b.bottom; }))"""
+    assert page.evaluate(inside), "no bar is hidden by an axle"
+    expect(page.locator("#stage-machine [data-c=FR] .live text").first).to_contain_text(
+        re.compile(r"(valve|asked) −?[\d.]+ %")
+    )
     expect(page.locator("#stage-machine [data-c=FR] .says")).to_have_text("stuck")  # at this time, not over the mission
     assert page.locator("#stage-path .here").get_attribute("visibility") == "visible"
     expect(page.locator("#stage-modes > div", has_text="FR speed sensor")).to_contain_text("stuck 96 %")

@@ -157,7 +157,12 @@ def _counts(fleet: Fleet, first: Mapping[int, str]) -> CountsRow:
         "missions": len(fleet.missions),
         "counted": len(runs),
         "states": {s.value: states[s] for s in ENDS},
-        "not_assessed": sum(r.verdict is Verdict.NOT_ASSESSED for r in results),
+        "not_assessed": sum(
+            m.result is not None
+            and m.result.verdict is Verdict.NOT_ASSESSED
+            and m.name == fleet.copies.get(m.name, first[m.result.id])
+            for m in fleet.missions
+        ),
         "unknown": len(fleet.unknown),
         "pending": len(fleet.missions) - len(results),
         "copies": len(results) - len(first) + len(fleet.copies),

@@ -48,7 +48,7 @@ class CountsRow(TypedDict):
     states : dict[str, int]
         How missions ended.
     not_assessed : int
-        Missions that were read, but in which nothing could be assessed.
+        Missions that were read, but whose verdict is *not assessed*; copies of a log once.
     unknown : int
         Missions that were not judged, are perhaps newer than what was, and of no known machine.
     pending : int

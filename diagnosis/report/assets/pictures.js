@@ -22,30 +22,38 @@ class Pictures {
     return e;
   }
 
+  // Two bars within a wheel, speed on the left and opening on the right: filled where it is measured, a line or a hollow bar where it is
+  // only asked for. Words stand outward on the stage, where nothing else does, else below.
   wheel(g) {
-    const c = g.dataset.c, rect = g.querySelector("rect"), [x, y, w, h] = ["x", "y", "width", "height"].map((k) => +rect.getAttribute(k)), inner = x + w / 2 < 186 ? 1 : -1, steer = rect.matches(".axle");
+    const c = g.dataset.c, svg = g.ownerSVGElement, rect = g.querySelector("rect"), [x, y, w, h] = ["x", "y", "width", "height"].map((k) => +rect.getAttribute(k)), steer = rect.matches(".axle"), middle = y + h / 2;
     const kind = steer ? "steer" : "wheel", of = (name) => this.names.get(`${kind}.${c}.${name}`), live = Pictures.svg("g", { class: "live", "aria-hidden": "true" });
-    const bars = [[of(steer ? "phi" : "v"), "v"], [of("u"), "u"]].filter(([k]) => k !== undefined).map(([channel, name], i) => {
-      const bar = Pictures.svg("rect", { x: inner > 0 ? x + w + 3 + 7 * i : x - 8 - 7 * i, width: 5, class: name });
-      if (!steer) live.append(bar);
-      return { channel, name, bar };
-    });
-    const words = Pictures.svg("text", { x: x + w / 2, y: y + h + (steer ? 11 : 12) });
+    const names = steer ? ["phi"] : ["v", ...(of("u_applied") === undefined ? ["u"] : ["u_applied", "u"])];
+    const bars = names.map((name, i) => {
+      const channel = of(name), line = name === "u" && names.length > 2, bar = Pictures.svg("rect", { x: i ? x + w - 10 : x + 4, width: 6, height: 2, class: name === "u" && !line ? "asked" : name });
+      if (channel !== undefined && !steer) live.append(bar);
+      return { channel, name, bar, line };
+    }).filter((b) => b.channel !== undefined);
+    const beside = [...svg.querySelectorAll(".tyre")].filter((e) => e.getAttribute("y") === rect.getAttribute("y")), stage = g.closest("#stage") && !steer, out = stage && beside.length < 3, left = beside.length > 1 && x + w / 2 < 186;
+    const at = out ? { x: left ? x - 9 : x + w + 9, class: left ? "left" : "right" } : { x: x + w / 2, class: "" };
+    const words = Pictures.svg("text", { ...at, y: out ? middle : y + h + (steer ? 11 : 12) });
     live.append(words);
     g.append(live);
-    const says = g.closest("#stage") && !steer ? Pictures.svg("text", { x: x + w / 2, y: y + h / 2 + 8, class: "says" }) : null;
+    const says = stage ? Pictures.svg("text", { ...at, y: out ? middle - 17 : y + h / 2 + 8, class: `says ${at.class}` }) : null;
     if (says) live.append(says);
-    return { c, live, bars, words, says, rect, middle: y + h / 2, half: h / 2, steer, usual: rect.getAttribute("class") };
+    const drive = (document.querySelector(`.lane[data-c="${CSS.escape(c)}"][data-side=actuator] .what`)?.textContent ?? "").trim().split(" ").at(-1);
+    return { c, live, bars, words, says, out, drive, rect, middle, half: h / 2 - 6, steer, usual: rect.getAttribute("class") };
   }
 
-  // Largest size of a channel over the mission: what a full bar means.
-  async full(channel) {
+  // Largest size of a signal of all parts over the mission: what a full bar means.
+  async full(name) {
+    const kind = name === "u_applied" ? "u" : name;
     this.sizes ??= new Map();
-    if (!this.sizes.has(channel)) {
-      const { y } = await Data.curve(channel, Data.view.t0, Data.view.duration, 300);
-      this.sizes.set(channel, y.reduce((m, v) => (Math.abs(v) > m ? Math.abs(v) : m), 1e-9));
+    if (!this.sizes.has(kind)) {
+      let most = 1e-9;
+      for (const { channel, name: other } of this.wheels.flatMap((w) => w.bars)) if (other === kind || (kind === "u" && other === "u_applied")) most = (await Data.curve(channel, Data.view.t0, Data.view.duration, 300)).y.reduce((m, v) => (Math.abs(v) > m ? Math.abs(v) : m), most);
+      this.sizes.set(kind, most);
     }
-    return this.sizes.get(channel);
+    return this.sizes.get(kind);
   }
 
   // The worst fault of a part at a time.
@@ -83,14 +91,16 @@ class Pictures {
       w.rect.setAttribute("class", off ? w.usual : w.usual.replace(/ \w+$/, ` ${state}`));
       if (w.says) w.says.textContent = off ? "" : Pictures.fault(w.c, t)?.words ?? state.replaceAll("_", " ");
       const texts = [];
-      for (const { channel, name, bar } of off ? [] : w.bars) {
-        const { k, unit } = Data.view.channels[channel], [low, high] = await Data.at(channel, t), value = (low + high) / 2, part = Math.max(-1, Math.min(1, value / await this.full(channel))) || 0;
+      for (const { channel, name, bar, line } of off ? [] : w.bars) {
+        const { k, unit } = Data.view.channels[channel], [low, high] = await Data.at(channel, t), value = (low + high) / 2, part = Math.max(-1, Math.min(1, value / await this.full(name))) || 0, tall = Math.abs(part) * w.half;
         if (job !== this.job) return;
-        bar.setAttribute("y", w.middle - Math.max(0, part) * w.half);
-        bar.setAttribute("height", Math.abs(part) * w.half);
-        if (!w.steer || name === "v") texts.push(`${name === "u" ? "u " : ""}${Now.number(+(value * k).toPrecision(2))}${unit === "1" ? "" : unit === "°" ? unit : ` ${unit.replace("% of opening", "%")}`}`);
+        bar.setAttribute("y", line ? w.middle - part * w.half - 1 : w.middle - Math.max(0, part) * w.half);
+        if (!line) bar.setAttribute("height", Math.max(1, tall));
+        const size = `${Now.number(+(value * k).toPrecision(2))}${unit === "1" ? "" : unit === "°" ? unit : ` ${unit.replace("% of opening", "%")}`}`;
+        if (w.out || !line) texts.push(name === "u" ? `asked ${size}` : name === "u_applied" ? `${w.drive} ${size}` : size);
       }
-      w.words.textContent = texts.join(" · ");
+      if (w.out) w.words.replaceChildren(...texts.map((text, i) => { const line = Pictures.svg("tspan", { x: w.words.getAttribute("x"), dy: i ? 15 : 0 }); line.textContent = text; return line; }));
+      else w.words.textContent = texts.join(" · ");
     }
   }
 }

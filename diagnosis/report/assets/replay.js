@@ -55,7 +55,7 @@ class Replay {
       traces.forEach((t, i) => { t.role = `free-${i}`; });
       return traces.length ? [{ key, title, traces, unit: traces[0].unit, component: "\0" }] : [];
     };
-    return [...row("v", "Speed", /^wheel\.[^.]+\.v$/), ...row("u", "Opening", /^wheel\.[^.]+\.u$/), ...row("phi", "Steering angle", /^steer\.[^.]+\.phi$/)];
+    return [...row("v", "Speed", /^wheel\.[^.]+\.v$/), ...row("u", "Asked of the drives", /^wheel\.[^.]+\.u$/), ...row("phi", "Steering angle", /^steer\.[^.]+\.phi$/)];
   }
 
   async open() {
@@ -80,7 +80,7 @@ class Replay {
     }));
     this.events = found;
     this.one("#events-none").hidden = found.length > 0 && !left;
-    this.one("#events-none").textContent = left ? `${left} more crossings of residuals, which led to no finding, are left out.` : "No residual or probability passes its threshold in this mission.";
+    this.one("#events-none").textContent = left ? `${left} more crossing${left > 1 ? "s" : ""} of residuals, which led to no finding, ${left > 1 ? "are" : "is"} left out.` : "No residual or probability passes its threshold in this mission.";
     return this.show();
   }
 

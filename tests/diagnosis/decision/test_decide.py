@@ -57,6 +57,12 @@ def test_verdict_follows_the_worst_fault(part: Finding, expected: str) -> None:
     assert verdict(machine(FR_actuator=assessed(part))).status == expected
 
 
+def test_a_gain_outside_the_tables_is_told_in_the_sentence() -> None:
+    got = verdict(machine(FR_sensor=assessed(finding(Side.SENSOR, FaultMode.OUTSIDE_TABLE, epsilon=-0.9))))
+    assert got.text == "The FR speed sensor was outside the tables (1.9 times what it should be) for 8.0 s."
+    assert got.actions[0]["text"].endswith("outside the tables (1.9 times what it should be) for 8.0 s.")
+
+
 def test_brief_and_persistent_loss_of_a_sensor() -> None:
     brief = finding(Side.SENSOR, FaultMode.NO_SIGNAL, 5000, 5800)
     assert verdict(machine(FL_sensor=assessed(brief))).status == "watch"

@@ -79,6 +79,10 @@ def test_titles_name_part_mode_and_size() -> None:
     )
     assert labels.fault_title(fault(side="actuator", mode="noisy", sat=None), HYDRAULIC) == "FR drive valve disturbed"
     assert labels.fault_title(fault(mode="outside_table"), HYDRAULIC) == "FR speed sensor outside the tables"
+    for value, gain in ((-0.907, "1.91"), (1.8, "−0.8")):
+        size = {"value": value, "low": value - 0.1, "high": value + 0.1}
+        title = labels.fault_title(fault(mode="outside_table", epsilon=size), HYDRAULIC)
+        assert title == f"FR speed sensor outside the tables: {gain} times what it should be"
 
 
 def test_legend_names_both_sides_where_they_differ() -> None:

@@ -125,7 +125,7 @@ def test_parts_that_were_judged_and_those_that_were_cleared_are_counted_apart() 
     assert judged(samples.report_with(coverage=rows, intervals=[watched], verdict=about)) == (
         "4 of 4 parts judged, 3 cleared"
     )
-    about["to_clear"] = [{"reason": "The speed of FL per opening falls below the others' by 30 %.", "act": "lift it"}]
+    about["to_clear"] = [{"reason": "The speed of FL per opening is 30 % below the others'.", "act": "lift it"}]
     assert judged(samples.report_with(coverage=rows, intervals=[watched], verdict=about)) == (
         "4 of 4 parts judged, 1 cleared"
     )

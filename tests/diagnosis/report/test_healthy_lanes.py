@@ -13,9 +13,11 @@ def test_checks_of_both_sides_stand_in_both_lanes() -> None:
     }  # fmt: skip
     unseen = {**check, "component": "FL", "side": "sensor", "worst": None}
     found = healthy_lanes({**samples.no_faults()[0], "clearing": [check, unseen]})  # type: ignore[typeddict-item]
-    words = LaneDetail((("speed per opening", "10 %, limit 40 %; over the whole mission"),), ())
+    words = LaneDetail((("speed per opening", "10 %, limit 33 %; over the whole mission"),), ())
     assert found["FR", "sensor"] == found["FR", "actuator"] == words
     assert found["FL", "sensor"].checks == (("speed per opening", "the mission does not show it"),)
     beyond = {**check, "worst": 7.78, "start_s": 5.0, "stop_s": 8.0, "passed": False}
     found = healthy_lanes({**samples.no_faults()[0], "clearing": [beyond]})  # type: ignore[typeddict-item]
-    assert found["FR", "sensor"].checks == (("speed per opening", "778 %, limit 40 %, beyond it; largest at 0:05.0"),)
+    assert found["FR", "sensor"].checks == (
+        ("speed per opening", "over 99 %, limit 33 %, beyond it; largest at 0:05.0"),
+    )

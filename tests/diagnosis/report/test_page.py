@@ -329,10 +329,10 @@ def test_loss_over_the_mission_stands_with_the_coverage() -> None:
     assert "0.123 (0.100 to 0.150)" in page
 
 
-def test_the_paper_s_numbers_are_said_before_the_verdict() -> None:
+def test_the_paper_s_numbers_are_said_in_the_verdict_behind_its_answer() -> None:
     report, columns = samples.no_faults()
     assert 'id="assumed"' not in build_page(report, columns)
     machine = {**report["machine"], "source": "paper defaults", "assumed": ["gear ratio 17.7"]}
     page = build_page({**report, "machine": machine}, columns)
-    assert page.index("gear ratio 17.7") < page.index('id="verdict"')
+    assert page.index('id="verdict"') < page.index("<h1>") < page.index("gear ratio 17.7") < page.index('class="facts"')
     assert f"{machine['name']} (assumed)" in page

@@ -27,7 +27,6 @@ def kpis(document: ShownDocument) -> list[tuple[str, str, str]]:
     rest = [
         f"{labels.grouped(n)} {words}"
         for n, words in (
-            (c["not_assessed"], "not assessed"),
             (c["pending"], MissionState.PENDING.words),
             (c["copies"], "copy" if c["copies"] == 1 else "copies"),
             (c["gone"], "log no longer there" if c["gone"] == 1 else "logs no longer there"),
@@ -45,7 +44,8 @@ def kpis(document: ShownDocument) -> list[tuple[str, str, str]]:
         (
             labels.grouped(c["missions"]),
             "missions",
-            ", ".join([f"{labels.grouped(counted)} counted", *unread, *rest]),
+            ", ".join([f"{labels.grouped(counted)} counted", *unread, *rest])
+            + (f"; of all {labels.grouped(c['not_assessed'])} not assessed" if c["not_assessed"] else ""),
         ),
         (
             hours(c["driving_s"]),
@@ -56,7 +56,8 @@ def kpis(document: ShownDocument) -> list[tuple[str, str, str]]:
         (
             f"{f['new']} / {f['recurring']} / {f['past']}",
             "new, recurring, past faults",
-            f"{count(f['once'], 'other')} found once",
+            f"{count(f['once'], 'other')} found once"
+            + (f", {labels.grouped(f['repaired'])} repaired" if f["repaired"] else ""),
         ),
         (
             "–" if c["decided"] is None else f"{100 * c['decided']:.1f} %",

@@ -275,6 +275,18 @@ def test_missions_that_count_are_told_from_all(tmp_path: Path) -> None:
     assert "5 missions, 2 of them counted" in build_fleet_page(d)
 
 
+def test_a_copy_adds_nothing_to_what_was_not_assessed_and_the_figures_add_up(tmp_path: Path) -> None:
+    fault = [Fault(mode="stuck", severity="high")]
+    d = document(
+        tmp_path,
+        Sample("a", copies=["copy"], verdict="not_assessed"),
+        Sample("b", day=1.0, verdict="stop", faults=fault),
+    )
+    assert d["counts"]["not_assessed"] == 1
+    assert any("1 mission was read, but not assessed." in line for line in d["verdict"]["text"])
+    assert "2 counted, 1 copy; of all 1 not assessed" in build_fleet_page(d)
+
+
 def test_parts_that_the_last_mission_did_not_assess_are_named(tmp_path: Path) -> None:
     d = document(tmp_path, Sample("a"), Sample("b", day=1.0, blind=[("rear", "sensor"), ("RL", "actuator")]))
     assert "RL drive valve and rear steering sensor – <a" in build_fleet_page(d)

@@ -124,3 +124,19 @@ def test_faults_of_a_mission_that_read_alike_are_counted(tmp_path: Path) -> None
     page = build_fleet_page(document(tmp_path, Sample("a", verdict="stop", faults=(alike, alike, alike))))
     assert "RL drive valve stuck, 3 times" in page
     assert "RL drive valve stuck; RL drive valve stuck" not in page
+
+
+def test_a_rise_far_below_its_limit_is_told_as_such_and_the_line_beside_the_last_mission(tmp_path: Path) -> None:
+    def page(name: str, losses: list[float], half: float) -> str:
+        return build_fleet_page(
+            document(
+                tmp_path / name,
+                *(Sample(f"d{k}", day=float(k), epsilon={VALVE: bounds(x, half)}) for k, x in enumerate(losses)),
+            )
+        )
+
+    low = page("low", [0.000, 0.001, 0.002, 0.003, 0.004, 0.006], 0.0005)
+    assert "0.01 in its last mission, rising far below its limit" in low
+    assert "no step, and no limit that comes near" in low
+    high = page("high", [0.1, 0.2, 0.3, 0.35, 0.4, 0.45], 0.02)
+    assert re.search(r"The last mission lost 0\.450; the line through all of them is at 0\.\d{3} now", high)
