@@ -30,7 +30,7 @@ from replay.faults import FaultMode, Side, State
 #: A component and its side.
 Part = tuple[str, str]
 
-_BESIDE_OTHERS = (Check.RESPONSE, Check.LASTING_RESPONSE, Check.EXCESS, Check.LASTING_EXCESS)
+_BESIDE_OTHERS = (Check.RESPONSE, Check.LASTING_RESPONSE, Check.CHANGE, Check.EXCESS, Check.LASTING_EXCESS)
 _FAR, _ALONE = 3.0, 2.0  # times the limit of the all-clear, and times what the next wheel deviates by
 _OTHERS = 1.5  # times the limit: where others deviate by more, speed per opening says little of this machine, ...
 _BY_FAR = 5.0  # ... unless a wheel deviates this many times as far
@@ -185,7 +185,9 @@ def _alone_not_following(checks: Sequence[Checked], cells: Cells) -> Checked | N
     if len(tracking) < _WHEELS or _times(tracking[0]) < max(_STILL, _BY_FAR * _times(tracking[1])):
         return None
     part = tracking[0].component
-    answers = [c for c in own if c.component == part and c.check in (Check.RESPONSE, Check.LASTING_RESPONSE)]
+    answers = [
+        c for c in own if c.component == part and c.check in (Check.RESPONSE, Check.LASTING_RESPONSE, Check.CHANGE)
+    ]
     if cells.stated.get(part) or not answers or not speeds_follow_openings(cells):
         return None
     twice = dict(zip(cells.machine.wheels, measured_twice(cells), strict=True))[part]
@@ -199,4 +201,6 @@ def _by_usual_limit(check: Checked, usual: Limits) -> Checked:
         return replace(check, limit=usual.below)
     if check.check is Check.EXCESS:
         return replace(check, limit=usual.above)
+    if check.check is Check.CHANGE:
+        return replace(check, limit=usual.changed)
     return replace(check, limit=usual.changed) if check.limit < usual.lasting_below else check

@@ -54,7 +54,7 @@ def wheel_checks(cells: Cells, clear_at: float) -> Iterator[Checked]:
     slowest = [float(x) for x in largest(behind)]
     responses = responses_of(cells, speed, used, reference)
     tells = openings_tell(cells, responses)
-    windows, lasting, changes = responses.windows, responses.usual, responses.changes
+    windows, lasting = responses.windows, responses.usual
     slow = np.full(windows.shape, np.nan)
     if not all(second for _, second in twice):
         slow = responses_of(cells, speed, used, reference, CREEPING * USUAL_TOP).windows
@@ -96,10 +96,10 @@ def wheel_checks(cells: Cells, clear_at: float) -> Iterator[Checked]:
             else:
                 most_slow = max(own.below, -_CREEPING_RESPONSE * float(np.log1p(-clear_at)))
                 yield max(driven, worst(cells, response, -slow[:, i], most_slow, apart=True), key=times)
-            below = lasts(cells, (*about, either, Check.LASTING_RESPONSE), lasting[i].below, own.lasting_below)
-            changed = lasts(cells, (*about, either, Check.LASTING_RESPONSE), changes[i], own.changed)
-            grown = lasts(cells, (*about, either, Check.LASTING_RESPONSE), responses.grown[i], own.grown)
-            yield max(below, changed, grown, key=times)
+            yield lasts(cells, (*about, either, Check.LASTING_RESPONSE), lasting[i].below, own.lasting_below)
+            changed = lasts(cells, (*about, either, Check.CHANGE), responses.changes[i], own.changed)
+            grown = lasts(cells, (*about, either, Check.CHANGE), responses.grown[i], own.grown)
+            yield max(changed, grown, key=times)
             if not all(twice[i]):  # of a wheel that is measured twice on both sides, it is the ground's doing
                 yield worst(cells, (*about, either, Check.EXCESS), windows[:, i], own.above, apart=True)
                 yield lasts(cells, (*about, either, Check.LASTING_EXCESS), lasting[i].above, own.lasting_above)

@@ -19,6 +19,7 @@ class Check(StrEnum):
     SECOND_MEASUREMENT = "second_measurement"
     RESPONSE = "response"
     LASTING_RESPONSE = "lasting_response"
+    CHANGE = "change"
     EXCESS = "excess"
     LASTING_EXCESS = "lasting_excess"
     CARRIED = "carried"
@@ -48,6 +49,10 @@ CHECK_WORDS: dict[Check, tuple[str, str]] = {
     Check.LASTING_RESPONSE: (
         "speed per {unit_command} below the other {wheels}', over the mission",
         "the speed of {part} per {unit_command} is {value} the other {wheels}' over the mission",
+    ),
+    Check.CHANGE: (
+        "speed per {unit_command} beside the other {wheels}', from one part of the mission to the next, or growing",
+        "the speed of {part} per {unit_command} changes beside the other {wheels}' by a {value} in the mission",
     ),
     Check.EXCESS: (
         "speed per {unit_command} above the other {wheels}', for 3 s",
@@ -107,7 +112,7 @@ _AFTER_S = (0.5, 3.0)  # of a fault, in which it still shows, at least and at mo
 #: Checks whose values and limits are natural logarithms of a ratio: how far below another it is, how far above, or either.
 _BELOW = (Check.RESPONSE, Check.LASTING_RESPONSE)
 _ABOVE = (Check.EXCESS, Check.LASTING_EXCESS)
-_EITHER_WAY = (Check.RATE, Check.LASTING_RATE, Check.PLANT_RATE)
+_EITHER_WAY = (Check.CHANGE, Check.RATE, Check.LASTING_RATE, Check.PLANT_RATE)
 
 
 @dataclass(frozen=True)
