@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from diagnosis.decision.behind import behind_drives
 from diagnosis.decision.caveats import (
     Reservations,
     by_model,
@@ -182,7 +183,8 @@ def decide(
     hidden = (_NO_YAW,) if any(_offset_hidden(checks, axle) for axle in axles) else ()
     if found.status is Verdict.READY:
         exempt = exempt_axles(assessments, decided_s, driven, axles, limits, words, open_state=against.open_state)
-        found = replace(found, text=" ".join((found.text, *exempt, *hidden)))
+        behind = behind_drives(assessments, axles, checks, model, words)
+        found = replace(found, text=" ".join((found.text, *exempt, *behind, *hidden)))
     else:
         caveats += hidden
     caveats = tuple(c for c in caveats if c != found.text)

@@ -318,9 +318,36 @@ def _behaving(duration: float) -> Iterator[Trouble]:
     yield Trouble("front steering sensor drifts", edit=drift, parts=frozenset({("front", "sensor")}))
 
 
+def _opened(name: str) -> Callable[[Signals], Signals]:
+    """A valve that opens as it is told, by its own measurement: what its wheel lacks is behind it."""
+
+    def edit(signals: Signals) -> Signals:
+        told, opening = (signals.items.get(f"wheel.{name}.{leaf}") for leaf in ("u", "u_applied"))
+        if told is None or opening is None:
+            return signals
+        values = np.interp(opening.stamps - opening.stamps[0], told.stamps - opening.stamps[0], told.values)
+        return replace(signals, items={**signals.items, opening.name: replace(opening, values=values)})
+
+    return edit
+
+
+def _behind(duration: float) -> Iterator[Trouble]:
+    """Motors and brakes behind valves that are sound, where that is measured."""
+    forms = (
+        ("FR", "motor loses .5", VALVE[5]),
+        ("RL", "brake locked", VALVE[0]),
+        ("FL", "motor loses .35", replace(VALVE[4], epsilon=0.35)),
+    )
+    for component, words, form in forms:
+        for course in ("whole", "last half", "12 s"):
+            faults = faults_of(component, Side.ACTUATOR, form, courses(duration)[course])
+            about = frozenset({(component, side.value) for side in (Side.ACTUATOR, Side.SENSOR_OR_ACTUATOR)})
+            yield Trouble(f"{component} {words}, {course}", faults, _opened(component), about)
+
+
 def troubles(duration: float) -> list[Trouble]:
     """All kinds."""
     return [
         *_single(duration), *_several(duration), *_recorded(duration), *_misnamed(duration),
-        *_growing(duration), *_behaving(duration),
+        *_growing(duration), *_behaving(duration), *_behind(duration),
     ]  # fmt: skip
