@@ -49,6 +49,20 @@ def test_a_wheel_that_stands_out_is_named_and_stays_open(all_clear: ModuleType) 
     assert "FR excess" in found.words
 
 
+def test_what_slowly_grows_beside_the_other_wheels_is_not_cleared(all_clear: ModuleType) -> None:
+    names = [t.name for t in all_clear.troubles(75.0)]
+    kind = names.index("RR valve comes to open 1.4, whole")
+    (found,) = all_clear.run(all_clear.Task("default", kind, 1207, 75.0, ("base",)))
+    assert found.outcome == "abstained"
+    assert "RR change" in found.words
+
+
+def test_a_sensor_that_the_mission_hardly_shows_to_be_wrong_does_not_count(all_clear: ModuleType) -> None:
+    """It reads nothing while its wheel is slow, which that hardly is in 20 s."""
+    kind = [t.name for t in all_clear.troubles(20.0)].index("RL sensor deaf to small values")
+    assert all_clear.run(all_clear.Task("default", kind, 11, 20.0, ("base",))) == []
+
+
 def test_healthy_machines_are_not_stopped_and_mostly_cleared(all_clear: ModuleType) -> None:
     found = [
         o for seed in (21, 22) for o in all_clear.run(all_clear.Task("default", None, seed, 60.0, all_clear.TIERS))
