@@ -134,7 +134,7 @@ def _read_table(path: Path) -> tuple[dict[str, NDArray[Any]], Layout]:
     except (OSError, pa.ArrowException, ValueError, KeyError, TypeError, OverflowError) as error:
         said = " ".join(str(error).split())[:200]
         raise LogError(f"{path}: cannot be read ({said}); {_AGAIN}") from error
-    if wrong := next((name for name, values in columns.items() if values.dtype.kind not in "fiu"), None):
+    if (wrong := next((name for name, values in columns.items() if values.dtype.kind not in "fiu"), None)) is not None:
         raise LogError(f"{path}: column {wrong[:80]!r} holds no numbers; {_AGAIN}")
     kept = (np.float32, np.float64)  # what this tool writes; whole numbers and halves that another wrote become floats
     numbers = {k: v if k == "step" or v.dtype in kept else v.astype(np.float64) for k, v in columns.items()}

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from diagnosis.body.rolling import CELL_S, Rolling
 from diagnosis.body.track_kernel import STATES, TrackInput, TrackModel, TrackOutput, filter_track, smooth_track
+from replay.arrays.sliding import largest_within
 
 Array = NDArray[np.float64]
 
@@ -126,9 +127,7 @@ def _run(
 
 def _around(values: Array) -> Array:
     """Largest value of the cells around each."""
-    from scipy.ndimage import maximum_filter1d
-
-    return np.asarray(maximum_filter1d(values, 2 * _AROUND + 1))
+    return largest_within(values, _AROUND, _AROUND)
 
 
 def _inflation(misfit: Array) -> Array:

@@ -77,7 +77,7 @@ def axis_of(columns: Columns, rate: float) -> Axis:
     t = columns.get("t")
     if t is None or len(t) < 2:
         return Axis(0.0, 1.0, 0)
-    if wrong := next((k for k, v in columns.items() if v.shape != t.shape), None):
+    if (wrong := next((k for k, v in columns.items() if v.shape != t.shape), None)) is not None:
         raise ValueError(f"column {wrong!r} has shape {columns[wrong].shape}, but t has {t.shape}")
     step = float(t[-1] - t[0]) / (len(t) - 1) if np.isfinite(t).all() else 0.0
     if not 0 < step < np.inf or np.abs(t - (t[0] + step * np.arange(len(t)))).max() > 0.5 * step:

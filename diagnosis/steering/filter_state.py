@@ -119,7 +119,7 @@ class FilterBank(NamedTuple):
         α and β of the inverse gamma distribution of the sensor's noise, where it is learned.
     gap : Array, shape (models, 2)
         How far the cylinder is ahead of the sensor's shaft [rad], and the variance of that [rad²].
-    room : Array, shape (3, 6)
+    room : Array, shape (6,)
         Room to work in.
     """
 

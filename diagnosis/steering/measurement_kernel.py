@@ -13,9 +13,7 @@ from numba import njit
 from diagnosis.steering.filter_constants import AxleConstants, SensorConstants
 from diagnosis.steering.filter_state import Array, Block, FilterBank, RedundantBlock
 from diagnosis.steering.model_bank import (
-    ACTIVE,
     ACTUATOR,
-    FREE,
     HEALTHY,
     INEFFICIENT,
     NO_SIGNAL,
@@ -62,6 +60,16 @@ def _learned_noise(alpha: float, beta: float, nu: float, power: float) -> float:
     return lgamma(after) - lgamma(alpha) + alpha * log(beta) - after * log(scaled)
 
 
+@njit(cache=True, error_model="numpy", inline="always")
+def _learn(m: int, gain: Array, total: float, innovation: float, z: Array, P: Array) -> None:
+    """x += K·innovation, P −= K·gainᵀ with K = gain/total; what a model does not free has no gain and stays."""
+    for i in range(STATES):
+        share = gain[i] / total
+        z[m, i] += share * innovation
+        for k in range(STATES):
+            P[m, i, k] -= share * gain[k]
+
+
 @njit(cache=True, error_model="numpy")
 def update(m: int, block: Block, least: float, axle: AxleConstants, sensor: SensorConstants, bank: FilterBank) -> float:
     """Kalman update with a block's mean, and the evidence of mean and white power; returns the log-likelihood.
@@ -71,7 +79,7 @@ def update(m: int, block: Block, least: float, axle: AxleConstants, sensor: Sens
     that the angle is given in the likelihood.
     """
     stop = axle.stop
-    z, P, noise, gain = bank.mean, bank.cov, bank.noise, bank.room[2]
+    z, P, noise, gain = bank.mean, bank.cov, bank.noise, bank.room
     s, power = SENSOR[m], block.power
     nu = sensor.white_dof * block.samples
     nu = nu / (1 + 0.5 * nu * sensor.white_spread)
@@ -85,9 +93,7 @@ def update(m: int, block: Block, least: float, axle: AxleConstants, sensor: Sens
     d, phi = z[m, 4], z[m, 0]
     # S = H P Hᵀ + R with H = [d, 0, 0, 0, φ, 1]
     total = r
-    gain[:] = 0.0
-    for n in range(FREE[m]):
-        i = ACTIVE[m, n]
+    for i in range(STATES):
         gain[i] = P[m, i, 0] * d + P[m, i, 4] * phi + P[m, i, 5]
     total += gain[0] * d + gain[4] * phi + gain[5]
     innovation = block.mean - d * phi - z[m, 5]
@@ -101,12 +107,7 @@ def update(m: int, block: Block, least: float, axle: AxleConstants, sensor: Sens
             P[m, 0, 0] += min(innovation * innovation, (axle.rate_limit * _LOST_S) ** 2)
         return float(floor)
     noise[m, 0], noise[m, 1] = after, scaled
-    for n in range(FREE[m]):
-        i = ACTIVE[m, n]
-        share = gain[i] / total
-        z[m, i] += share * innovation
-        for k in range(FREE[m]):
-            P[m, i, ACTIVE[m, k]] -= share * gain[ACTIVE[m, k]]
+    _learn(m, gain, total, innovation, z, P)
     if s == INEFFICIENT:
         _learn_sensor_gain(m, nu, power, sensor, z, P, gain)
         z[m, 4] = min(max(z[m, 4], _LEAST_GAIN), _MOST_GAIN)
@@ -178,27 +179,21 @@ def measure_redundant(m: int, seen: RedundantBlock, g: float, rate_limit: float,
 
 @njit(cache=True, error_model="numpy")
 def _linear(
-    m: int, h0: float, h2: float, h3: float, innovation: float, r: float, z: Array, P: Array, room: Array
+    m: int, h0: float, h2: float, h3: float, innovation: float, r: float, z: Array, P: Array, gain: Array
 ) -> float:
     """Kalman update with one measurement of φ, a and b alone; an outlier teaches nothing. Returns the log-likelihood."""
     if h0 == 0.0 and h2 == 0.0 and h3 == 0.0:
         likelihood = -0.5 * (innovation * innovation / r)
         return _OUTLIER if likelihood < _OUTLIER else likelihood
     total = r
-    for n in range(FREE[m]):
-        i = ACTIVE[m, n]
-        room[1, i] = P[m, i, 0] * h0 + P[m, i, 2] * h2 + P[m, i, 3] * h3
-    total += h0 * room[1, 0]
-    total += h3 * room[1, 3]
-    total += h2 * room[1, 2]
+    for i in range(STATES):
+        gain[i] = P[m, i, 0] * h0 + P[m, i, 2] * h2 + P[m, i, 3] * h3
+    total += h0 * gain[0]
+    total += h3 * gain[3]
+    total += h2 * gain[2]
     # relative to what the measurement's own noise gives
     likelihood = -0.5 * (innovation * innovation / total + log(total / r))
     if likelihood < _OUTLIER:
         return _OUTLIER
-    for n in range(FREE[m]):
-        i = ACTIVE[m, n]
-        share = room[1, i] / total
-        z[m, i] += share * innovation
-        for k in range(FREE[m]):
-            P[m, i, ACTIVE[m, k]] -= share * room[1, ACTIVE[m, k]]
+    _learn(m, gain, total, innovation, z, P)
     return float(likelihood)

@@ -1,4 +1,4 @@
-"""The models of a steering axle: which rows of the two tables each combines, and which states it frees."""
+"""The models of a steering axle: which rows of the two tables each combines."""
 
 from __future__ import annotations
 
@@ -39,16 +39,3 @@ NO_SIGNAL_MODEL = _MODELS.index((NO_SIGNAL, HEALTHY))
 #: From this model on only a redundant measurement tells the two faults apart.
 FIRST_HIDDEN = len(_SINGLE) + len(_DOUBLE)
 STATES = 6
-
-
-def _active_states(sensor: int, actuator: int) -> list[int]:
-    """States that a model frees, φ, r and b first; the others have no variance."""
-    gain, scale = actuator in (INEFFICIENT, NOISY), sensor in (INEFFICIENT, NOISY, COLOURED)
-    offset = sensor in (STUCK, NOISY, COLOURED)
-    return [0, 1, 3] + [state for state, free in ((2, gain), (4, scale), (5, offset)) if free]
-
-
-_ACTIVE = [_active_states(sensor, actuator) for sensor, actuator in _MODELS]
-#: States that each model frees, the first `FREE` of each line.
-ACTIVE = np.array([free + [2] * (STATES - len(free)) for free in _ACTIVE], np.uint64)
-FREE = np.array([len(free) for free in _ACTIVE], np.uint64)

@@ -161,7 +161,7 @@ def empty_bank() -> FilterBank:
         np.zeros((MODELS, STATES, STATES)),
         np.ones((MODELS, 2)),
         np.zeros((MODELS, 2)),
-        np.zeros((3, STATES)),
+        np.zeros(STATES),
     )
 
 

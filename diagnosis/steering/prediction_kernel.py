@@ -14,10 +14,8 @@ from numba import njit
 from diagnosis.steering.filter_constants import AxleConstants
 from diagnosis.steering.filter_state import Array, Block, FilterBank
 from diagnosis.steering.model_bank import (
-    ACTIVE,
     ACTUATOR,
     COLOURED,
-    FREE,
     HEALTHY,
     INEFFICIENT,
     NO_SIGNAL,
@@ -86,7 +84,7 @@ def predict(m: int, block: Block, axle: AxleConstants, coloured_decay: float, ba
 
     Angles in rad, openings in fractions; `coloured_decay` is the factor per block of coloured noise [1].
     """
-    z, P, row = bank.mean, bank.cov, bank.room
+    z, P = bank.mean, bank.cov
     dt, fade, lift = axle.dt, axle.rate_decay, axle.rate_limit
     f, by_a, by_b = _drive(m, block, axle, bank)
     # r' = fade·r + (1 − fade)·f,  φ' = φ + τ(1 − fade)·r + (dt − τ(1 − fade))·f
@@ -97,16 +95,12 @@ def predict(m: int, block: Block, axle: AxleConstants, coloured_decay: float, ba
     k_r, k_f = share * k_r, share * k_f
     z[m, 1] = fade * r + (1 - fade) * f
     late = axle.lag_error * (1 - fade) * (f - r)
-    for n in range(FREE[m]):
-        j = ACTIVE[m, n]
+    for j in range(STATES):
         force = by_a * P[m, 2, j] + by_b * P[m, 3, j]
-        row[0, j] = P[m, 0, j] + k_r * P[m, 1, j] + k_f * force
-        row[1, j] = fade * P[m, 1, j] + (1 - fade) * force
-    for n in range(FREE[m]):
-        j = ACTIVE[m, n]
-        P[m, 0, j], P[m, 1, j] = row[0, j], row[1, j]
-    for n in range(FREE[m]):
-        i = ACTIVE[m, n]
+        p0 = P[m, 0, j] + k_r * P[m, 1, j] + k_f * force
+        P[m, 1, j] = fade * P[m, 1, j] + (1 - fade) * force
+        P[m, 0, j] = p0
+    for i in range(STATES):
         force = by_a * P[m, i, 2] + by_b * P[m, i, 3]
         p0 = P[m, i, 0] + k_r * P[m, i, 1] + k_f * force
         P[m, i, 1] = fade * P[m, i, 1] + (1 - fade) * force
@@ -153,8 +147,8 @@ def _drift(m: int, spread: float, axle: AxleConstants, coloured_decay: float, z:
 def _relax(m: int, i: int, f: float, q: float, z: Array, P: Array) -> None:
     """One step of x_i' = f·x_i + noise of variance q."""
     z[m, i] *= f
-    for n in range(FREE[m]):
-        P[m, i, ACTIVE[m, n]] *= f
-    for n in range(FREE[m]):
-        P[m, ACTIVE[m, n], i] *= f
+    for k in range(STATES):
+        P[m, i, k] *= f
+    for k in range(STATES):
+        P[m, k, i] *= f
     P[m, i, i] += q

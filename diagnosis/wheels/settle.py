@@ -49,7 +49,7 @@ def settled(blocks: WheelBlocks, model: JointModel, done: JointPass) -> JointPas
                 taken_back += 1
         if not taken_back:
             return done
-        better = forward(blocks, model, given=paths)
+        better = trial if taken_back == len(doubted) else forward(blocks, model, given=paths)
         if better.evidence <= done.evidence:
             return done
         done = better

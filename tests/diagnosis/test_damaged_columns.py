@@ -11,6 +11,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from diagnosis.output import rebuild, write_result
+from diagnosis.report.plot_data import axis_of
 from diagnosis.results.result import MissionResult
 from replay.errors import LogError
 from tests.report_samples import five_faults, no_faults
@@ -39,6 +40,7 @@ def _misspelt() -> bytes:
         ({"t": [0.0, np.inf, 2.0]}, "column 't' is not uniform"),
         ({"t": [0.0, 1.0, 2.0], "v": ["a", "b", "c"]}, "column 'v' holds no numbers"),
         ({"t": [0.0, 1.0, 2.0], "v": [[1.0], [2.0], [3.0]]}, "column 'v' holds no numbers"),
+        ({"t": [0.0, 1.0, 2.0], "": ["a", "b", "c"]}, "column '' holds no numbers"),
         (_misspelt(), "cannot be read"),
     ],
 )
@@ -50,6 +52,11 @@ def test_one_sentence_says_what_is_wrong(saved: Path, columns: dict[str, list[ob
     with pytest.raises(LogError, match=words) as found:
         rebuild(saved)
     assert "run `mfhca diagnose` on the log again" in str(found.value)
+
+
+def test_a_column_without_a_name_may_be_of_another_length() -> None:
+    with pytest.raises(ValueError, match="column '' has shape"):
+        axis_of({"t": np.arange(3.0), "": np.arange(2.0)}, 1.0)
 
 
 @pytest.mark.parametrize("value", [np.inf, -np.inf, 3e38, -3e38, 1e-45])

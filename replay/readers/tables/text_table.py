@@ -29,6 +29,7 @@ SEPARATORS = ("\t", ";", ",", "|")
 HEAD = 128 << 10
 _LONGEST_HEAD = 4 << 20
 _MOSTLY = 0.5
+_SAMPLED = 1 << 21  # cells that a sample holds at most
 
 
 @dataclass(frozen=True)
@@ -111,10 +112,13 @@ class TextTable:
 
 
 def _gathered(rows: Rows, text: bytes) -> list[NDArray[Any]]:
+    """Columns of the first rows; of tiny cells not all, as each takes eight bytes."""
     columns = [CellColumn(rows.report.store) for _ in rows.kinds]
+    left = max(_SAMPLED // max(len(columns), 1), 1)
     for cells in rows.blocks([text], 0):
         for column, kind, values in zip(columns, rows.kinds, cells, strict=True):
-            column.append(values, int(kind))
+            column.append(values[:left], int(kind))
+        left = max(left - cells.shape[1], 0)
     return [c.moments() if k == MOMENT else c.finish() for c, k in zip(columns, rows.kinds, strict=True)]
 
 

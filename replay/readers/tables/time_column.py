@@ -220,7 +220,8 @@ def _course(column: NDArray[Any], unit: str) -> str:
     """Say why a column was taken for time."""
     if unit == "dc32":
         return "because it rises and starts again at 2^32, like a 32-bit distributed clock"
-    back = int((np.diff(_given(column)) < 0).sum())
+    with np.errstate(over="ignore"):  # steps beyond the largest number
+        back = int((np.diff(_given(column)) < 0).sum())
     return f"because it rises in all but {back} of its first {len(column)} rows" if back else "because it only rises"
 
 
@@ -234,11 +235,12 @@ def _bare(name: str) -> str:
 
 
 def _given(column: NDArray[Any]) -> NDArray[Any]:
+    """Cells that can be a time: neither empty nor infinite."""
     given: NDArray[Any]
     if column.dtype.kind == "M":
         given = column[~np.isnat(column)].astype(np.int64)
         return given
-    given = column[~np.isnan(column)] if column.dtype.kind == "f" else column
+    given = column[np.isfinite(column)] if column.dtype.kind == "f" else column
     return given
 
 
@@ -250,7 +252,7 @@ def rises(column: NDArray[Any], often: bool = True) -> bool:
     values = _given(column)
     if len(values) < 2 or len(values) < 0.9 * min(len(column), 2000):
         return often and len(column) == 1 and len(values) == 1
-    with np.errstate(over="ignore", invalid="ignore"):  # infinite cells, and steps beyond the largest number
+    with np.errstate(over="ignore"):
         steps = np.diff(values) if values.dtype.kind in "iM" else np.diff(values.astype(np.float64))
     ups = (steps > 0).mean()
     return bool((steps >= 0).mean() > 0.99 and (ups > 0.5 if often else ups > 0))
@@ -297,7 +299,8 @@ def _time_unit(path: Path, name: str, column: NDArray[Any], options: SourceOptio
     for unit, low, high in _SIZES:
         if low < size < high:
             return unit
-    step = float(np.median(np.diff(values))) if len(values) > 1 else 1.0
+    with np.errstate(over="ignore"):
+        step = float(np.median(np.diff(values))) if len(values) > 1 else 1.0
     if step > _LONGEST_STEP:
         clock = ", 'dc32' (a 32-bit distributed clock)" if size < _TURN else ", 'dc' (a distributed clock)"
         raise LogError(

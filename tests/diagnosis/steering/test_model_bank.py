@@ -4,16 +4,13 @@ from __future__ import annotations
 
 from diagnosis.results.fault_rows import FAULT_ROWS
 from diagnosis.steering.model_bank import (
-    ACTIVE,
     ACTUATOR,
     COLOURED,
     FIRST_HIDDEN,
-    FREE,
     HEALTHY,
     MODELS,
     MODES,
     SENSOR,
-    STUCK,
 )
 from replay.faults import FaultMode, Side
 
@@ -29,8 +26,3 @@ def test_every_row_has_a_model_of_its_own() -> None:
     assert pairs[0] == (HEALTHY, HEALTHY)
     for side, row in MODES:
         assert ((row, HEALTHY) if side is Side.SENSOR else (HEALTHY, row)) in pairs[:FIRST_HIDDEN]
-
-
-def test_a_stuck_sensor_frees_its_constant_alone() -> None:
-    m = [(s, a) for s, a in zip(SENSOR, ACTUATOR, strict=True)].index((STUCK, HEALTHY))
-    assert ACTIVE[m, : FREE[m]].tolist() == [0, 1, 3, 5]

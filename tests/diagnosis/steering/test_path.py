@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose
 
 from diagnosis.steering.blocks import SensorNoise, blocks_of
 from diagnosis.steering.driven import driven_by
-from diagnosis.steering.model_bank import HEALTHY, SENSOR, STUCK
+from diagnosis.steering.model_bank import ACTUATOR, HEALTHY, INEFFICIENT, NOISY, SENSOR, STUCK
 from diagnosis.steering.models import model_of
 from diagnosis.steering.path import AxleFilter, allowed_models, evidence_of, follow_path, most_probable
 from diagnosis.steering.path_refinement import refine_path
@@ -45,6 +45,20 @@ def test_a_stuck_sensor_lies_where_it_was_put(axle: AxleFilter) -> None:
     stuck = np.flatnonzero(rows == STUCK) * axle.blocks.dt
     assert stuck[0] == pytest.approx(START, abs=0.03)
     assert stuck[-1] == pytest.approx(STOP, abs=0.03)
+
+
+@pytest.mark.parametrize(
+    ("pair", "free"),
+    [((HEALTHY, HEALTHY), "φrb"), ((STUCK, HEALTHY), "φrbc"), ((NOISY, INEFFICIENT), "φrabdc"), ((INEFFICIENT, STUCK), "φrbd")],
+)  # fmt: skip
+def test_what_a_model_does_not_free_stays_as_it_was_entered(axle: AxleFilter, pair: tuple[int, int], free: str) -> None:
+    model = list(zip(SENSOR.tolist(), ACTUATOR.tolist(), strict=True)).index(pair)
+    path = follow_path(axle, np.full(axle.blocks.mean.size, model, np.uint8))
+    fixed = [i for i, name in enumerate("φrabdc") if name not in free]
+    assert (np.delete(path.variance, fixed, axis=1)[10:] > 0.0).all()
+    assert (path.cov[:, fixed] == 0.0).all()
+    assert (path.cov[:, :, fixed] == 0.0).all()
+    assert (path.mean[:, fixed] == path.mean[0, fixed]).all()
 
 
 def test_evidence_from_any_block_ends_in_the_state_of_the_whole_path(axle: AxleFilter) -> None:

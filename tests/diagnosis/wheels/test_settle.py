@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
@@ -9,7 +11,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from diagnosis.channels.sample_status import PAIR
 from diagnosis.estimation.back_pointers import STAY
 from diagnosis.wheels.blocks import WheelBlocks, blocks_of
-from diagnosis.wheels.filter import forward, most_probable
+from diagnosis.wheels.filter import JointPass, forward, most_probable
 from diagnosis.wheels.joint_types import SHARE_NONE
 from diagnosis.wheels.models import A_GAIN, A_NONE, HEALTHY, JointModel, WheelFilterModel
 from diagnosis.wheels.settle import settled
@@ -87,3 +89,23 @@ def test_one_valve_explains_what_all_wheels_suffer(fault: float) -> None:
     middle = paths[ONSET // WIDTH + 50 : STOP // WIDTH - 10, 2]
     assert np.isin(middle, (A_GAIN, A_NONE)).mean() > 0.8  # half a loss may pass for an unusual load at first
     assert (paths[: ONSET // WIDTH - 30, 2] == HEALTHY).all()
+
+
+def test_where_all_is_taken_back_the_pass_without_it_is_taken_as_it_is(monkeypatch: pytest.MonkeyPatch) -> None:
+    u = openings()
+    applied = u.copy()
+    applied[ONSET:STOP, 2] = 0.0
+    cut = blocks(applied, u)
+    first = forward(cut, MODEL)
+    asked: list[dict[str, Any]] = []
+
+    def counted(*words: Any, **named: Any) -> JointPass:
+        asked.append(named)
+        return forward(*words, **named)
+
+    monkeypatch.setattr("diagnosis.wheels.settle.forward", counted)
+    monkeypatch.setattr("diagnosis.wheels.settle._doubted", lambda runs, near: [(0, ONSET // WIDTH, STOP // WIDTH)])
+    got = settled(cut, MODEL, first)
+    assert len(asked) == 1
+    assert got.evidence > first.evidence
+    assert_array_equal(got.gains, forward(cut, MODEL, given=asked[0]["given"]).gains)

@@ -426,6 +426,25 @@ def test_it_only_rises_is_said_where_it_does(target: Path) -> None:
     assert any("because it rises in all but 1 of its first 500 rows" in n for n in notes)
 
 
+@pytest.mark.filterwarnings("error")
+def test_infinite_cells_of_a_clock_are_no_times(target: Path) -> None:
+    cells = [str(2**63 - 400 + i) for i in range(500)]  # doubles from the middle on
+    cells[100] = cells[400] = "1e5000"
+    table_of(target, "clk", cells)
+    assert open_log(target).summarise(target, SourceOptions()).topics
+    log = read(table_of(target, "clk", [c if i in (100, 400) else f"{i / 100}" for i, c in enumerate(cells)]))
+    assert len(log.channels["a"].values) == 498
+    assert any("because it only rises" in n for n in log.summary.notes)
+    assert any("2 of 500 rows have no readable time" in d for d in log.summary.damage)
+
+
+@pytest.mark.filterwarnings("error")
+def test_steps_beyond_the_largest_number_are_told_as_what_they_are(target: Path) -> None:
+    cells = [f"{-1.7e308 if i < 2 else 1.7e308 + i * 1e300}" for i in range(4)]
+    with pytest.raises(LogError, match="'clk' rises by"):
+        read(table_of(target, "clk", cells))
+
+
 def test_times_of_day_run_on_over_midnight_and_take_their_date_from_the_epoch(target: Path) -> None:
     moments = [datetime(2025, 1, 1, 23, 59, 58) + timedelta(seconds=i / 100) for i in range(400)]
     table_of(target, "time", [f"{m:%H:%M:%S.%f}" for m in moments])

@@ -13,6 +13,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
+import zstandard
 
 from replay.errors import LogError
 from replay.log.raw_log import RawLog
@@ -158,3 +159,19 @@ def test_hostile_text_takes_bounded_memory(tmp_path: Path, text: str, reason: st
     elif isinstance(found, RawLog):
         assert found.channels["v"].values[:2].tolist() == [1, 2]
         assert found.summary.damage
+
+
+@pytest.mark.parametrize("filler", [b"1\t1\n", bytes(4), b"1,1\n"], ids=["tabs", "zeros", "commas"])
+def test_a_packed_table_that_expands_beyond_measure_takes_bounded_memory(tmp_path: Path, filler: bytes) -> None:
+    path = tmp_path / "log.csv.zst"
+    path.write_bytes(zstandard.compress(b"a\tb\n5\t1\n5\t2\n" + filler * (32 << 18)))
+    assert path.stat().st_size < 4096
+    tracemalloc.start()
+    found = outcome(path)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 140 << 20
+    if isinstance(found, RawLog):  # zeros behind three rows
+        assert any("bytes are zero" in d for d in found.summary.damage)
+    else:
+        assert "no time column" in found or "almost empty" in found
