@@ -117,7 +117,7 @@ CANONICAL: tuple[CanonicalSignal, ...] = (
         "rotation",
         "commanded yaw rate ω_c",
         1,
-        Named(4, _ASKED + r".*(yaw_?rate|omega|turn|vel_(z|ang\w*)$)|^" + _ASKED + r"_(w|yaw)$"),
+        Named(4, _ASKED + r".*(yaw_?rate|omega|turn|vel_(z|w|yaw|theta|ang\w*)$)|^" + _ASKED + r"_(w|yaw)$"),
     ),
     _Entry("cmd", "lateral", "speed", "commanded speed to the left, of wheels with rollers"),
     _Entry("wheel", "v_ref", "speed", "commanded speed v_c,i", 6, Named(6, _SPEED_COMMAND)),

@@ -28,6 +28,7 @@ from replay.setup.read import options_of
 from replay.setup.robot_description import RobotDescription, parse_description
 from replay.setup.structure import ONE, Structure, described_structure, named_structure, preset_structure
 from replay.setup.unstated_units import usual_units, valve_currents
+from replay.setup.unsure_signals import unsure_signals
 from replay.signals.file_names import named_channels
 from replay.signals.mapping import by_number, map_signals
 from replay.signals.signal import Signals
@@ -100,6 +101,10 @@ def draft_machine(logs: Sequence[RawLog], preset: Preset | None = None) -> Draft
         draft.say("signals", f"Not used: {unfilled_note(array)}.")
     raw = replace(structure.machine(1.0), signals=given)
     found = map_signals(logs, raw)
+    unsure = unsure_signals(draft, channels, raw, found)
+    if unsure:
+        raw = replace(raw, signals={**raw.signals, **unsure})
+        found = map_signals(logs, raw)
     left = [w for w, p in (structure.places or {}).items() if p.y > 0]
     raw = replace(
         raw, sources=table_sources(logs, draft, lags(found, structure.wheels, left, [log.source for log in logs]))

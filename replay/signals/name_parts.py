@@ -104,6 +104,11 @@ def is_drive(name: str) -> bool:
     return _DRIVE.search(name.lower()) is not None and not is_steering(name)
 
 
+def speaks_of_no_wheel(name: str) -> bool:
+    """Whether a name speaks of an arm, a caster or the like."""
+    return _NO_DRIVE.search(name.lower()) is not None
+
+
 def side_of(name: str) -> str | None:
     """Left or right of a name that says nothing of front and rear; None where it says more, or neither."""
     along, across = position(name)
@@ -120,7 +125,7 @@ def wheel_of(name: str, machine: Machine) -> str | None:
             return wheel
     sides = {side_of(w): w for w in machine.wheels}
     if len(machine.wheels) == 2 and set(sides) == {"left", "right"}:  # one wheel, or chain of wheels, on each side
-        return None if _NO_DRIVE.search(name.lower()) else sides.get(side_of(name))
+        return None if speaks_of_no_wheel(name) else sides.get(side_of(name))
     place = position(name)
     if None in place or re.search(r"cast[eo]r", name.lower()):
         return None

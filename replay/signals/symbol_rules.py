@@ -99,12 +99,17 @@ def by_symbol(channel: Channel, machine: Machine, first: Mapping[str, int]) -> I
 
 
 def valve_current(channel: Channel, machine: Machine) -> str | None:
-    """Canonical name of the command that a valve's current or voltage stands for; None where a channel is none.
+    """Canonical name of the command that a valve's current or voltage stands for, by its words or unit; None where a channel is none.
 
     A current opens its valve, by a scale that no name tells: it is no opening until somebody says which current is a full one.
     """
     said = _said(channel, machine)
-    if said is None or not said.valve or not _ELECTRIC & {*said.last} or said.asked == "both":
+    if (
+        said is None
+        or not _is_valve_current(said)
+        or said.asked == "both"
+        or any(_NO_SIGNAL.search(w) for w in said.last)
+    ):
         return None
     part = axle_of(said.bare, machine) if said.steering else wheel_of(said.bare, machine)
     return None if part is None else f"{'steer' if said.steering else 'wheel'}.{part}.u"
@@ -192,7 +197,7 @@ def _leaf(said: _Said) -> str | None:
         return None
     patterns = _PART_PATTERNS[Scope.AXLE if said.steering else Scope.WHEEL]
     leaf = next((leaf for leaf, pattern in patterns if re.search(pattern, "_".join(last))), None)
-    if said.valve and _ELECTRIC & {*last}:  # of a valve: no effort of its wheel, and no opening
+    if _is_valve_current(said):  # no effort of its wheel, and no opening
         return None
     quantity = UNITS[known] if (known := known_unit(said.unit)) is not None else ("", 1.0)
     words = {w for w in last if not w.isdigit()} - _ANGLES
@@ -203,6 +208,10 @@ def _leaf(said: _Said) -> str | None:
     if leaf in ("v", "phi") and asked == "ref":
         return f"{leaf}_ref"
     return leaf
+
+
+def _is_valve_current(said: _Said) -> bool:
+    return said.valve and (bool(_ELECTRIC & {*said.last}) or known_unit(said.unit) in ("A", "mA", "V"))
 
 
 def _effort_unit(word: str) -> str:
@@ -234,7 +243,12 @@ def _by_word(channel: Channel, text: str, last: Sequence[str], unit: str) -> Ite
     if turns and asks != "both":
         named = signal is not None or asks == "ref"
         signal = "cmd.omega" if asks == "ref" else signal or "imu.yaw_rate"
-    elif signal is None and (asks == "ref" or "joystick" in last) and _is_speed(last, unit) and {*last} <= _WHOLE:
+    elif (
+        signal is None
+        and (asks == "ref" or "joystick" in last)
+        and _is_speed(last, unit)
+        and {*last} - {*tokens(unit)} <= _WHOLE
+    ):
         signal = "cmd.v"
     if signal is not None:
         yield Candidate(signal, source_of(channel, unit), 9 if named else 10, f"{channel.name} by its name")

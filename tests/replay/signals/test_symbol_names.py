@@ -44,6 +44,10 @@ def found(channel: Channel) -> list[tuple[str, str]]:
         ("n VL [1/min]", "wheel.FL.v"),
         ("Vitesse roue AV G (tr/min)", "wheel.FL.v"),
         ("Courant vanne AVG (mA)", None),
+        ("fVentil_Soll_VL [mA]", None),
+        ("Ventil_VL [V]", None),
+        ("cmd_vel_yaw", "cmd.omega"),
+        ("speed_cmd_mm_s", "cmd.v"),
         ("y_Ventil_soll_VR [%]", "wheel.FR.u"),
         ("y_Ventil_ist_VR [%]", "wheel.FR.u_applied"),
         ("Stellgröße_HR (%)", "wheel.RR.u"),
@@ -201,6 +205,8 @@ def test_currents_of_valves_are_known_for_what_they_are() -> None:
     machine = haulotte()
     assert valve_current(column("Drive/FL valve current [mA]"), machine) == "wheel.FL.u"
     assert valve_current(column("Ventilstrom Lenkung hinten [mA]"), machine) == "steer.rear.u"
+    assert valve_current(column("fVentil_Soll_VL [mA]"), machine) == "wheel.FL.u"
+    assert valve_current(column("fVentil_Soll_VL [%]"), machine) is None
     assert valve_current(column("Drive/FL motor current [A]"), machine) is None
 
 
@@ -244,6 +250,7 @@ def test_units_in_names() -> None:
         ("speed_cmd_mps", "cmd.v", "m/s"),
         ("fFahrSollwert [km/h]", "cmd.v", "km/h"),
         ("Fahrzeug [km/h]", None, ""),
+        ("front_left_wheel_speed_mm_s", "wheel.FL.v", "mm/s"),
         ("front_left_wheel_cmd_mps", "wheel.FL.v_ref", "m/s"),
         ("front_left_wheel_speed_rad_per_s", "wheel.FL.v", "rad/s"),
         ("front_left_wheel_setpoint_radps", "wheel.FL.v_ref", "rad/s"),
