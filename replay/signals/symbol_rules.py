@@ -51,6 +51,9 @@ _PLAIN = (
     )
 )
 _ANGLES = frozenset(("deg", "grad"))  # units
+_TURN = frozenset(
+    ("dreh", "drehung", "turn", "turning", "rotation", "rot", "wende", "fahr", "vehicle", "machine", "fahrzeug")
+)
 _STATES = frozenset(("state", "states", "status", "feedback", "telemetry"))  # topics of what is measured
 _OWN = frozenset(("n", "v", "rad", "wheel"))  # that say it even alone: ``Rad VL [1/min]``
 _VEHICLE = frozenset(("fahr", "fahrzeug", "fzg", "vehicle", "machine", "maschine"))
@@ -231,6 +234,15 @@ def _is_speed(last: Sequence[str], unit: str) -> bool:
     return bool({"speed", "velocity", "vel"} & {*last}) or (speed and bool(says))
 
 
+def _is_yaw_rate(last: Sequence[str], unit: str) -> bool:
+    """Whether words speak of turning and nothing else, in a unit of it: ``Drehvorgabe [°/s]``."""
+    return (
+        known_unit(unit) in ("rad/s", "deg/s")
+        and {*last} & _TURN != set()
+        and {*last} - ASKING - {*tokens(unit)} <= _TURN
+    )
+
+
 def _by_word(channel: Channel, text: str, last: Sequence[str], unit: str) -> Iterator[Candidate]:
     """Yield signals of the whole machine by the words of their symbol or column."""
     if re.search(r"wheel|steer|valve|axle", text) or any(is_place(w) and w != "fwd" for w in last):
@@ -240,6 +252,7 @@ def _by_word(channel: Channel, text: str, last: Sequence[str], unit: str) -> Ite
         return
     asks, named = role(last), True
     turns = "yaw_rate" in last or ({*last} - MEASURED == {"yaw", "rate"} and not re.search(r"odom|est", text))
+    turns |= asks == "ref" and _is_yaw_rate(last, unit)
     if turns and asks != "both":
         named = signal is not None or asks == "ref"
         signal = "cmd.omega" if asks == "ref" else signal or "imu.yaw_rate"

@@ -259,8 +259,12 @@ def test_small_wheels_of_joints_called_wheels_are_no_motors(tmp_path: Path, monk
 
 def test_a_log_without_a_drive_says_what_to_record(tmp_path: Path) -> None:
     pd.DataFrame({"time": np.arange(50.0), "temperature": 20.0}).to_csv(tmp_path / "run.csv", index=False)
-    with pytest.raises(LogError, match="no wheel speed is in the log"):
+    with pytest.raises(LogError, match=r"no wheel speed is in the log: none of its columns \(temperature\)"):
         draft_machine(read_everything([tmp_path / "run.csv"]))
+    places = {f"drivewheel_{n}": (0.0, y) for n, y in (("port", TRACK / 2), ("starboard", -TRACK / 2))}
+    write_robot(tmp_path / "run.mcap", Robot(wheels=places), 5.0)
+    with pytest.raises(LogError, match=r"none of its joints \(drivewheel_port, drivewheel_starboard\)"):
+        draft_machine(read_everything([tmp_path / "run.mcap"], every=False))
 
 
 @pytest.mark.parametrize("preset", Preset)
