@@ -56,11 +56,11 @@ _TURN = frozenset(
 )
 _STATES = frozenset(("state", "states", "status", "feedback", "telemetry"))  # topics of what is measured
 _OWN = frozenset(("n", "v", "rad", "wheel"))  # that say it even alone: ``Rad VL [1/min]``
-_VEHICLE = frozenset(("fahr", "fahrzeug", "fzg", "vehicle", "machine", "maschine"))
+_VEHICLE = frozenset(("fahr", "fahren", "fahrt", "fahrzeug", "fzg", "vehicle", "machine", "maschine"))
 # Words beside which an asked speed is that of the whole machine.
-_WHOLE = ASKING | frozenset(
-    (*("speed", "velocity", "vel", "v", "r", "f", "lr", "x", "lin", "linear", "longitudinal", "fahr", "fahrzeug", "fzg", "vehicle"),
-     *("machine", "maschine", "engin", "vehicule", "body", "robot", "chassis", "forward", "joystick")),
+_WHOLE = ASKING | _VEHICLE | frozenset(
+    (*("speed", "velocity", "vel", "v", "r", "f", "lr", "x", "lin", "linear", "longitudinal"),
+     *("engin", "vehicule", "body", "robot", "chassis", "forward", "joystick")),
 )  # fmt: skip
 
 

@@ -331,6 +331,22 @@ def test_tables_that_begin_or_end_apart_are_not_taken_to_share_a_clock(
     assert any("stamped by one computer" in q for q in draft.questions)
 
 
+@pytest.mark.parametrize(("rows", "clock"), [(600, ["as recorded"]), (560, [])], ids=["alike", "shorter"])
+def test_tables_that_count_from_their_own_start_share_a_clock_where_they_end_together(
+    tmp_path: Path, rows: int, clock: list[str]
+) -> None:
+    v = np.repeat(np.random.default_rng(1).uniform(-0.5, 0.5, 15), 40)
+    t = np.arange(600) * 0.05
+    wheels = {f"{w} {what}": v for w in ("FR", "FL") for what in ("speed setpoint [m/s]", "speed [m/s]")}
+    pd.DataFrame({"time [s]": t, **wheels}).to_csv(tmp_path / "a.csv", index=False)
+    pd.DataFrame({"time [s]": t, "Temperatur": v, "steer_angle_front [rad]": 0.1}).iloc[:rows].to_csv(
+        tmp_path / "b.csv", index=False
+    )
+    draft = draft_machine(read_everything([tmp_path / "a.csv", tmp_path / "b.csv"]))
+    assert [o.clock for o in draft.machine.sources.values()] == clock
+    assert any("stamped by one computer" in q for q in draft.questions)
+
+
 @pytest.mark.parametrize(("late", "shared"), [(0, True), (3, False)])
 def test_tables_that_only_begin_together_share_a_clock_where_their_signals_fit(
     tmp_path: Path, late: float, shared: bool

@@ -62,6 +62,7 @@ def found(channel: Channel) -> list[tuple[str, str]]:
         ("vFzgSoll [km/h]", "cmd.v"),
         ("Fahrhebel [km/h]", "cmd.v"),
         ("Fahrhebel [%]", None),
+        ("GVL_HMI.fJoystickFahren [km/h]", "cmd.v"),
         ("Joystick_v [m/s]", "cmd.v"),
         ("Sollwert [m/s]", "cmd.v"),
         ("Sollwert [bar]", None),
