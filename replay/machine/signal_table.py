@@ -103,7 +103,9 @@ _ASKED = r"(joystick|cmd|command|driver|desired|ref)"
 _SECOND_SPEED = r"(velo(city)?|speed|vel)_?(redundant|true|second)"
 _SPEED = r"velo(city)?|speed|(^|_)vel(_|$)|rpm|drehzahl|geschw|^omega"
 _EFFORT = r"effort|torque|current|duty|pwm|moment$"
-_YAW_RATE = r"(imu|gyro).*(yaw_?rate|gyro_?z|omega_?z|angular_velocity_z)"
+_YAW_RATE = (
+    r"(imu|gyro).*(yaw_?rate|gyro_?z|omega_?z|angular_velocity_z)|^gyro_(z|yaw)(_(rad|deg)_s)?$|^angular_velocity_z$"
+)
 _Entry = CanonicalSignal
 
 #: In reading order: group, leaf, quantity, words, rank for clocks, name in symbols.

@@ -51,9 +51,9 @@ _PLAIN = (
     )
 )
 _ANGLES = frozenset(("deg", "grad"))  # units
-_TURN = frozenset(
-    ("dreh", "drehung", "turn", "turning", "rotation", "rot", "wende", "fahr", "vehicle", "machine", "fahrzeug")
-)
+_TURN = frozenset(("dreh", "drehung", "turn", "turning", "rotation", "rot", "wende"))
+_OMEGA = frozenset(("w", "omega", "wz", "yaw", "yaw_rate", "angular", "turn"))  # that say so beside a word that asks
+_RATES = frozenset(("speed", "velocity", "vel", "rate", "z"))
 _STATES = frozenset(("state", "states", "status", "feedback", "telemetry"))  # topics of what is measured
 _OWN = frozenset(("n", "v", "rad", "wheel"))  # that say it even alone: ``Rad VL [1/min]``
 _VEHICLE = frozenset(("fahr", "fahren", "fahrt", "fahrzeug", "fzg", "vehicle", "machine", "maschine"))
@@ -89,7 +89,7 @@ def by_symbol(channel: Channel, machine: Machine, first: Mapping[str, int]) -> I
     said = _said(channel, machine)
     if said is None:
         return
-    yield from _by_word(channel, said.text, said.parts[-1], said.unit)
+    yield from _by_word(channel, said.text, said.parts[-1], said.unit, len(machine.wheels) > 1)
     leaf = _leaf(said)
     if leaf is None:
         return
@@ -234,17 +234,16 @@ def _is_speed(last: Sequence[str], unit: str) -> bool:
     return bool({"speed", "velocity", "vel"} & {*last}) or (speed and bool(says))
 
 
-def _is_yaw_rate(last: Sequence[str], unit: str) -> bool:
-    """Whether words speak of turning and nothing else, in a unit of it: ``Drehvorgabe [°/s]``."""
-    return (
-        known_unit(unit) in ("rad/s", "deg/s")
-        and {*last} & _TURN != set()
-        and {*last} - ASKING - {*tokens(unit)} <= _TURN
-    )
+def _is_yaw_rate(last: Sequence[str], unit: str, alone: bool) -> bool:
+    """Whether words speak of turning and nothing else: ``Drehvorgabe [°/s]``, ``w_cmd``; the latter where ω is not of a single wheel."""
+    bare = {*last} - ASKING - {*tokens(unit)} - _VEHICLE
+    if known_unit(unit) in ("rad/s", "deg/s") and bare & _TURN and bare <= _TURN:
+        return True
+    return alone and known_unit(unit) in (None, "rad/s", "deg/s") and bool(bare & _OMEGA) and bare <= _OMEGA | _RATES
 
 
-def _by_word(channel: Channel, text: str, last: Sequence[str], unit: str) -> Iterator[Candidate]:
-    """Yield signals of the whole machine by the words of their symbol or column."""
+def _by_word(channel: Channel, text: str, last: Sequence[str], unit: str, turns_alone: bool) -> Iterator[Candidate]:
+    """Yield signals of the whole machine by words of their symbol; `turns_alone`: ω asked for is the machine's, not of its only wheel."""
     if re.search(r"wheel|steer|valve|axle", text) or any(is_place(w) and w != "fwd" for w in last):
         return
     signal = next((signal for signal, pattern in _MACHINE_PATTERNS if re.search(pattern, text)), None)
@@ -252,7 +251,7 @@ def _by_word(channel: Channel, text: str, last: Sequence[str], unit: str) -> Ite
         return
     asks, named = role(last), True
     turns = "yaw_rate" in last or ({*last} - MEASURED == {"yaw", "rate"} and not re.search(r"odom|est", text))
-    turns |= asks == "ref" and _is_yaw_rate(last, unit)
+    turns |= asks == "ref" and _is_yaw_rate(last, unit, turns_alone)
     if turns and asks != "both":
         named = signal is not None or asks == "ref"
         signal = "cmd.omega" if asks == "ref" else signal or "imu.yaw_rate"
