@@ -231,7 +231,7 @@ def _is_speed(last: Sequence[str], unit: str) -> bool:
     """Whether words speak of a speed: by name, or as ``v``, a joystick or nothing but a setpoint in a unit of speed."""
     speed = (known := known_unit(unit)) is not None and UNITS[known][0] == "speed"
     says = {"v", "joystick"} & {*last} or ({*last} <= ASKING | _VEHICLE and ASKING & {*last})
-    return bool({"speed", "velocity", "vel"} & {*last}) or (speed and bool(says))
+    return bool({"speed", "velocity", "vel", "lin", "linear"} & {*last}) or (speed and bool(says))
 
 
 def _is_yaw_rate(last: Sequence[str], unit: str, alone: bool) -> bool:

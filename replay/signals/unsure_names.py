@@ -134,7 +134,11 @@ def _said(channel: Channel, machine: Machine) -> _Said | None:
         return None
     named = {w.lower() for w in machine.wheels}
     parts = re.split(r"[./]", name)
-    told = [p for p in parts[:-1] if position(p) != (None, None) or named & {*tokens(p)}] + parts[-1:]
+    roles = ASKING | MEASURED
+    told = [
+        p for p in parts[:-1] if position(p) != (None, None) or {*tokens(p)} & named or {*english(tokens(p))} <= roles
+    ]
+    told += parts[-1:]
     words = {w for p in told for w in english(tokens(p)) if not is_place(w) and not w.isdigit()} - {"l", "r"} - named
     unit = stated or (channel.unit if channel.unit and known_unit(channel.unit) else "")
     by_end = "" if unit else unit_by_end(name, doubtful=True)

@@ -88,6 +88,7 @@ def found(channel: Channel) -> list[tuple[str, str]]:
         ("Drehvorgabe [°/s]", "cmd.omega"),
         ("Drehvorgabe [1/min]", None),
         ("w_cmd", "cmd.omega"),
+        ("cmd_linear", "cmd.v"),
         ("omega_ref [rad/s]", "cmd.omega"),
         ("angular_velocity_setpoint", "cmd.omega"),
         ("target_yaw_rate [deg/s]", "cmd.omega"),

@@ -37,6 +37,7 @@ def columns(*names: str) -> dict[str, Channel]:
         (("v_left_cmd", "v_left"), {"wheel.L.v_ref": "v_left_cmd", "wheel.L.v": "v_left"}),
         (("target_left", "actual_left"), {"wheel.L.v_ref": "target_left", "wheel.L.v": "actual_left"}),
         (("left", "left_setpoint"), {"wheel.L.v": "left", "wheel.L.v_ref": "left_setpoint"}),
+        (("setpoint.left", "feedback.left"), {"wheel.L.v_ref": "setpoint.left", "wheel.L.v": "feedback.left"}),
         (("right.actual", "right.target"), {"wheel.R.v": "right.actual", "wheel.R.v_ref": "right.target"}),
     ],
 )
@@ -84,6 +85,7 @@ def test_what_may_be_anything_is_not_guessed(names: tuple[str, ...]) -> None:
         ("left_ticks", Open.COUNTS, ""),
         ("EncoderLeft", Open.COUNTS, ""),
         ("enc_l", Open.COUNTS, ""),
+        ("encL", Open.COUNTS, ""),
         ("left_wheel_encoder_position [counts]", Open.COUNTS, ""),
     ],
 )
