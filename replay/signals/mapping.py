@@ -29,10 +29,11 @@ from replay.signals.steering_command import turn_by_steering
 from replay.signals.to_si import Converted, choose_motor_or_wheel, convert, usable_unit
 from replay.signals.unfilled import unfilled, unfilled_note
 from replay.signals.unit_doubts import Doubt, doubt, questions
-from replay.signals.unsure_names import unsure
+from replay.signals.unsure_names import NOT_USED, unsure
 
 #: Why a signal is missing for which nothing was found.
 NO_CHANNEL = "no channel fits by its name or message type"
+_NAMED = 4  # channels in a note
 
 
 def plan_topics(
@@ -149,10 +150,18 @@ def map_signals(logs: Sequence[RawLog], machine: Machine) -> Signals:
 
 def _name_the_unsure(draft: _Draft, logs: Sequence[RawLog]) -> None:
     """Give missing signals the channel that may hold them as their reason, with what its name leaves open."""
+    named: list[str] = []
     for log, channels in zip(logs, named_channels(logs), strict=True):
         for found in unsure(channels, draft.machine):
             if draft.missing.get(found.signal) == NO_CHANNEL:
-                draft.missing[found.signal] = replace(found, origin=in_its_file(found.origin, log)).reason
+                there = replace(found, origin=in_its_file(found.origin, log))
+                draft.missing[found.signal] = there.reason
+                named.append(f"{there.origin.label} ({found.signal})")
+    if named:
+        more = f" and {len(named) - _NAMED} more" if len(named) > _NAMED else ""
+        draft.notes.append(
+            f"{NOT_USED}: {', '.join(named[:_NAMED])}{more}; `mfhca channels LOG` has the line to write for each"
+        )
 
 
 def by_number(items: Mapping[str, Signal], machine: Machine) -> list[str]:

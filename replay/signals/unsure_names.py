@@ -25,6 +25,9 @@ from replay.signals.named_units import bare_name, unit_by_end
 from replay.signals.rules import candidates
 from replay.signals.symbol_rules import valve_current
 
+#: Begin of the note that names such channels.
+NOT_USED = "not used, for their names leave open what they hold"
+
 
 class Open(StrEnum):
     """What a name leaves open."""

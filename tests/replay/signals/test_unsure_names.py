@@ -125,4 +125,5 @@ def test_a_missing_signal_names_the_column_that_may_hold_it(tmp_path: Path) -> N
     _, signals = read_signals([tmp_path / "run.csv"], haulotte())
     reason = signals.missing["wheel.FL.u"]
     assert "'fVentil_Soll_FL [mA]' is a valve's current or voltage" in reason
+    assert any("leave open what they hold: fVentil_Soll_FR [mA] (wheel.FR.u)" in note for note in signals.notes)
     assert '"wheel.FL.u" = { column = "fVentil_Soll_FL [mA]", unit = "1" }' in reason
