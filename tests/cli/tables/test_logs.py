@@ -24,7 +24,7 @@ def printed(*files: dict[str, Any], width: int = 200, quality: tuple[str, ...] =
             "machine": {"wheels": ["FR"]},
             "verdict": {"status": "ready", "title": "", "text": "", "caveats": [], "actions": []},
             "intervals": [],
-            "quality": [{"result": text} for text in quality],
+            "quality": [{"check": "mapping", "result": text, "effect": "", "ok": False} for text in quality],
         }
     )
     console = Console(file=io.StringIO(), width=width, markup=False)
