@@ -71,8 +71,8 @@ def require_use(files: Sequence[ReadFile], signals: Signals) -> None:
             )
         raise LogError(
             f"{', '.join(str(f.path) for f in files)}: no wheel signal: no column{shown} is called like a signal of a machine "
-            "or stands in the machine file's [signals]; name them there (`mfhca channels LOG --all` lists them), or leave the file "
-            "out where it is no machine's log (an audit takes patterns: 'logs/**/*.mcap')"
+            "or stands in the machine file's [signals]; name them there (`mfhca config init --log LOG` proposes what it can, `mfhca channels "
+            "LOG --all` lists them all), or leave the file out where it is no machine's log (an audit takes patterns: 'logs/**/*.mcap')"
         )
     used = {signal.source for signal in signals.items.values()}
     idle = [file for file in files if str(file.path) not in used and not file.strange and not file.joined]

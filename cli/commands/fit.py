@@ -61,6 +61,7 @@ def fit(
         if output.exists() and not force:
             raise ConfigError(f"{output}: exists and was not changed; give another name, or --force to replace it")
     with terminal.progress(Stage.STARTING) as progress:
+        from diagnosis.decision.assumed import assumed_words
         from diagnosis.fitting.document import fit_document, fit_toml
         from diagnosis.fitting.files import missions_of_files
         from diagnosis.fitting.missions import fit_missions
@@ -73,6 +74,11 @@ def fit(
     for files in groups:
         if len(files) > 1:
             terminal.note(f"one mission: {', '.join(str(f) for f in files)}")
+    if assumed := assumed_words(the_machine):
+        terminal.note(
+            f"{'no machine file was given' if machine is None else f'{source} leaves out some numbers'}: of the paper's {the_machine.name}, "
+            f"not known to be of this machine, are {'; '.join(assumed)}; constants and unit errors rest on them"
+        )
     for error in result.unit_errors:
         terminal.note(f"unit error: {error.text}")
     if not json:

@@ -15,7 +15,6 @@ from replay.machine.config import Machine
 from replay.setup.all_channels import ChannelRow
 
 _LONG_ARRAY = 4
-_LONG_ARRAY = 4
 _NARROW, _WIDE = 25, 44  # characters of a field that share a line with the rest, on terminals of 80 and of 120 columns
 
 

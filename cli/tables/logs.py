@@ -11,6 +11,7 @@ from cli.tables.layout import bullets, section, text
 from cli.terminal.dates import shown_moment
 from diagnosis.results.document import ClockRow, FileRow, ReportDocument
 from diagnosis.results.left_out import is_left_out
+from replay.signals.unsure_names import NOT_USED
 
 
 def log_parts(report: ReportDocument) -> list[RenderableType]:
@@ -21,6 +22,7 @@ def log_parts(report: ReportDocument) -> list[RenderableType]:
         return []
     when = f"from {shown_moment(log['start_ns'])} on, {log['duration_s']:.0f} s, {log['driving_s']:.0f} s of driving"
     lines = [_line(file, files) for file in files]
+    lines += [text(row["result"], "yellow") for row in report["quality"] if row["result"].startswith(NOT_USED)]
     return [section("Log" if len(files) == 1 else "Logs"), text(when, "dim"), bullets(lines)]
 
 

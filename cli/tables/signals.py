@@ -137,8 +137,11 @@ def _signal(signal: Signal, words: MachineWords) -> MappedSignal:
     }
 
 
-_LIST_ALL = "`mfhca channels LOG --all` lists what the log holds; name its signals in [signals] of a machine file."
-_CHANNEL = re.compile(r"'[^']*'|/\S+|; similar: .*")  # of a reason: what differs from part to part
+_LIST_ALL = (
+    "`mfhca channels LOG --all` lists what the log holds; name its signals in [signals] of a machine file, which "
+    "`mfhca config init --log LOG` drafts with what it finds likely."
+)
+_CHANNEL = re.compile(r"'[^']*'|\"[^\"]*\"|/\S+|; similar: .*")  # of a reason: what differs from part to part
 _LIKEWISE = "; the others likewise"
 _OF_ANOTHER = (" times max_speed ", "max_steer is", "in step with cmd.v")  # compare with the paper's machine
 _STANDS_IN = (

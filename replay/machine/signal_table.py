@@ -103,7 +103,9 @@ _ASKED = r"(joystick|cmd|command|driver|desired|ref)"
 _SECOND_SPEED = r"(velo(city)?|speed|vel)_?(redundant|true|second)"
 _SPEED = r"velo(city)?|speed|(^|_)vel(_|$)|rpm|drehzahl|geschw|^omega"
 _EFFORT = r"effort|torque|current|duty|pwm|moment$"
-_YAW_RATE = r"(imu|gyro).*(yaw_?rate|gyro_?z|omega_?z|angular_velocity_z)"
+_YAW_RATE = (
+    r"(imu|gyro).*(yaw_?rate|gyro_?z|omega_?z|angular_velocity_z)|^gyro_(z|yaw)(_(rad|deg)_s)?$|^angular_velocity_z$"
+)
 _Entry = CanonicalSignal
 
 #: In reading order: group, leaf, quantity, words, rank for clocks, name in symbols.
@@ -117,7 +119,7 @@ CANONICAL: tuple[CanonicalSignal, ...] = (
         "rotation",
         "commanded yaw rate ω_c",
         1,
-        Named(4, _ASKED + r".*(yaw_?rate|omega|turn|vel_(z|ang\w*)$)|^" + _ASKED + r"_(w|yaw)$"),
+        Named(4, _ASKED + r".*(yaw_?rate|omega|turn|vel_(z|w|yaw|theta|ang\w*)$)|^" + _ASKED + r"_(w|yaw)$"),
     ),
     _Entry("cmd", "lateral", "speed", "commanded speed to the left, of wheels with rollers"),
     _Entry("wheel", "v_ref", "speed", "commanded speed v_c,i", 6, Named(6, _SPEED_COMMAND)),

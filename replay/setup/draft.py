@@ -28,6 +28,7 @@ from replay.setup.read import options_of
 from replay.setup.robot_description import RobotDescription, parse_description
 from replay.setup.structure import ONE, Structure, described_structure, named_structure, preset_structure
 from replay.setup.unstated_units import usual_units, valve_currents
+from replay.setup.unsure_signals import unsure_signals
 from replay.signals.file_names import named_channels
 from replay.signals.mapping import by_number, map_signals
 from replay.signals.signal import Signals
@@ -35,6 +36,7 @@ from replay.signals.unfilled import unfilled, unfilled_note
 
 _SUPPOSED = "left and right turn against each other"
 _SPEEDS = ("v", "v_true", "v_ref")
+_SHOWN = 6  # names in a message
 
 
 def structure_of(logs: Sequence[RawLog]) -> Structure:
@@ -100,6 +102,10 @@ def draft_machine(logs: Sequence[RawLog], preset: Preset | None = None) -> Draft
         draft.say("signals", f"Not used: {unfilled_note(array)}.")
     raw = replace(structure.machine(1.0), signals=given)
     found = map_signals(logs, raw)
+    unsure = unsure_signals(draft, channels, raw, found)
+    if unsure:
+        raw = replace(raw, signals={**raw.signals, **unsure})
+        found = map_signals(logs, raw)
     left = [w for w, p in (structure.places or {}).items() if p.y > 0]
     raw = replace(
         raw, sources=table_sources(logs, draft, lags(found, structure.wheels, left, [log.source for log in logs]))
@@ -196,10 +202,20 @@ def _structure(
     if odometry(channels) is not None:
         return Structure(ONE, None, how="odometry: no wheel is in the log, the drive is judged as a whole")
     raise LogError(
-        "no wheel speed is in the log: no joint, symbol or column is called like a wheel's speed, and there is no odometry; "
-        "`mfhca channels LOG --all` lists what it holds; record /joint_states, or give the structure with --preset and name "
-        'the signals in [signals]; an arm needs a machine file with its joints as wheels and part = "joint"'
+        f"no wheel speed is in the log: {_nameless(joints, channels)}, and there is no odometry; `mfhca channels LOG --all` lists "
+        "what it holds; record /joint_states, or give the structure with --preset and name the signals in [signals]; an arm "
+        'needs a machine file with its joints as wheels and part = "joint"'
     )
+
+
+def _nameless(joints: Sequence[str], channels: Mapping[str, Channel]) -> str:
+    """What the log holds that may be wheels, whose names tell no place."""
+    columns = [c.name for c in channels.values() if not c.topic]
+    for what, names in (("joints", [j for j in dict.fromkeys(joints) if not j.isdigit()]), ("columns", columns)):
+        if names:
+            more = ", …" if len(names) > _SHOWN else ""
+            return f"none of its {what} ({', '.join(names[:_SHOWN])}{more}) is called like a wheel (front_left, FL, left) and its speed"
+    return "no joint, symbol or column is called like a wheel's speed"
 
 
 def _name(description: RobotDescription | None, logs: Sequence[RawLog]) -> str:

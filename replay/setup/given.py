@@ -17,6 +17,7 @@ from replay.setup.structure import ONE, Structure
 
 _DATED = 10**18  # ns; stamps before are of a clock without a date
 _TOGETHER = 5 * 10**9  # ns; tables of one recorder begin and end together
+_ALIKE = 2 * 10**8  # ns; the same of tables that count from their own start, which begin alike in any case
 _JOINT_TYPES = ("JointState", "DynamicJointState")
 
 
@@ -92,9 +93,9 @@ def _command(channels: Mapping[str, Channel]) -> SignalSource | None:
 def table_sources(
     logs: Sequence[RawLog], draft: Draft, lags: Mapping[str, Lag] | None = None
 ) -> dict[str, SourceOptions]:
-    """Several tables with dated stamps are taken to come from one recorder, if they are of one format and begin and end together, or their signals fit.
+    """Several tables are taken to come from one recorder, if they are of one format and begin and end together, or their signals fit.
 
-    The zone of dates that state none is asked for.
+    Tables without dates must do so to a fraction of a second. The zone of dates that state none is asked for.
 
     Parameters
     ----------
@@ -111,7 +112,8 @@ def table_sources(
     if any(NO_ZONE in note for log in tables for note in log.summary.notes):
         options = replace(options, time_zone="UTC")
     pattern = f"*{PurePath(tables[0].source).suffix}" if tables else ""
-    if len(tables) > 1 and all(t.summary.start_ns >= _DATED for t in tables):
+    dated = [t.summary.start_ns >= _DATED for t in tables]
+    if len(tables) > 1 and (all(dated) or not any(dated)):
         apart = _apart([t.summary for t in tables], lags)
         if apart:
             add = (
@@ -147,9 +149,10 @@ def _apart(tables: Sequence[LogSummary], lags: Mapping[str, Lag]) -> str:
         if lag.apart:
             side = "later" if lag.seconds > 0 else "earlier"
             return f"{lag.by} in {PurePath(source).name} is about {abs(lag.seconds):.1f} s {side} than what it goes with in {PurePath(lag.other).name}"
+    most = _TOGETHER if tables[0].start_ns >= _DATED else _ALIKE
     far = max(t.start_ns for t in tables) - min(t.start_ns for t in tables)
     late = max(t.stop_ns for t in tables) - min(t.stop_ns for t in tables)
     fit = all(t.source in lags and lags[t.source].fits for t in tables[1:])
-    if max(far, late) > _TOGETHER and not fit:
-        return f"they begin {far / 1e9:.0f} s and end {late / 1e9:.0f} s apart"
+    if max(far, late) > most and not fit:
+        return f"they begin {far / 1e9:.1f} s and end {late / 1e9:.1f} s apart"
     return ""

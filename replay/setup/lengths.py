@@ -6,8 +6,6 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
-import numpy as np
-
 from replay.log.raw_log import RawLog
 from replay.log.source_options import SignalSource
 from replay.machine.config import Limits, Machine, haulotte
@@ -18,6 +16,7 @@ from replay.setup.by_the_body import Measured, base_by_yaw, is_rotation, track_b
 from replay.setup.draft_notes import Draft
 from replay.setup.motion import WheelMotion
 from replay.setup.structure import ONE, Structure
+from replay.setup.unit_of_speeds import DIFFERS, WHEEL_SIZES, agreed, by_their_mean, turns_commanded, unit_of_speeds
 from replay.signals.mapping import map_signals
 from replay.signals.name_words import english, tokens
 from replay.signals.signal import Signal, Signals
@@ -26,12 +25,10 @@ from replay.signals.to_si import peak_of
 _RADII, _TRACKS = (0.02, 2.5), (0.05, 4.0)  # m
 _BASES = 20.0  # m; the longest
 _HEADROOM = 1.2
-_DIFFERS = 0.15
 _STANDS_IN_RADIUS = 0.1  # m; where nothing tells it
 _LEAST_SPEED = 0.05  # m/s
 _ANY_MACHINE, _STANDS_IN = 30.0, 10.0  # m/s; faster than any wheeled machine, and what is written then
-_AGREE = 1.33
-_WHEEL_SIZES = (0.04, 1.0)  # m; of a radius that explains a speed without a unit
+_SLOW = 0.2  # m/s; from which top speed on a number too large may be one in mm/s
 
 
 def wheel_radius(
@@ -45,13 +42,15 @@ def wheel_radius(
     told = [
         n for n in turning if "cmd.v" in found.items or f"{n}_ref" not in asked
     ]  # rotations tell no size of each other
-    exact = _agreed([1 / abs(motions[n].gain) for n in asked if n in motions])
-    measured = exact or _agreed([1 / abs(motions[n].gain) for n in told if n in motions])
+    exact = agreed([1 / abs(motions[n].gain) for n in asked if n in motions])
+    measured = exact or agreed([1 / abs(motions[n].gain) for n in told if n in motions])
+    if measured is None and told and (gain := by_their_mean(found, told, origins)) is not None:
+        measured = 1 / abs(gain)
     if bare:
-        measured = _unit_of_speeds(draft, structure, found, bare, motions, origins) or measured
+        measured = unit_of_speeds(draft, structure, found, bare, motions, origins) or measured
     if structure.radius is not None:
         draft.say("geometry", f"Wheel radius {structure.radius:g} m from {structure.how}.")
-        if measured is not None and abs(measured / structure.radius - 1) > _DIFFERS:
+        if measured is not None and abs(measured / structure.radius - 1) > DIFFERS:
             draft.ask(
                 "geometry",
                 f"is the wheel radius {structure.radius:g} m? By commanded and measured speeds it would be {measured:.3g} m.",
@@ -70,7 +69,7 @@ def wheel_radius(
         return float(_round(by_body.length))
     # a ROS joint that is called a wheel turns as the wheel; symbols of a PLC called so often hold its motor's turns
     wheels_own = all(origins[n].topic is not None and "wheel" in english(tokens(origins[n].label)) for n in turning)
-    if measured is not None and measured < (_RADII[0] if wheels_own else _WHEEL_SIZES[0]):
+    if measured is not None and measured < (_RADII[0] if wheels_own else WHEEL_SIZES[0]):
         draft.ask(
             "geometry",
             f"were the motors measured? Radius over gear ratio is {measured:.3g} m, and rotations are written with at = "
@@ -87,6 +86,14 @@ def wheel_radius(
             "does not show with it. Measure the wheel.",
         )
         return float(_round(measured))
+    if measured is not None and (unit := turns_commanded(origins, turning, measured)):
+        gain = float(f"{UNITS[unit][1] * _STANDS_IN_RADIUS:.6g}")
+        draft.ask(
+            "signals",
+            f"does {origins['cmd.v'].label} command turns of the wheels ({unit}) rather than a speed? It is as large as these, and is "
+            f"written so: gain = {UNITS[unit][1]:.6g} × the radius of the wheels, or of the radius over gear_ratio.",
+        )
+        origins["cmd.v"] = replace(origins["cmd.v"], unit="m/s", gain=gain)
     if turning:
         draft.ask(
             "geometry",
@@ -110,51 +117,6 @@ def without_size(origin: SignalSource, radius: float) -> SignalSource:
     return replace(origin, unit=unit, gain=float(f"{origin.gain * factor * radius:.6g}"))
 
 
-def _agreed(values: Sequence[float]) -> float | None:
-    """Median of values that agree within a third; None where they do not."""
-    if not values or max(values) > _AGREE * min(values):
-        return None
-    return float(np.median(values))
-
-
-def _unit_of_speeds(
-    draft: Draft, structure: Structure, found: Signals, names: Sequence[str], motions: Mapping[str, WheelMotion],
-    origins: dict[str, SignalSource],
-) -> float | None:  # fmt: skip
-    """Give speeds without a unit the one that makes the wheels a usual size, else a scale; return the radius, if one fits."""
-    how = "it makes them follow the command"
-    gain = _agreed([abs(motions[n].gain) for n in names if n in motions]) if set(names) <= set(motions) else None
-    asked = found.items.get("cmd.v")
-    if gain is None and asked is not None and peak_of(asked.values) > 0:
-        gain = float(np.median([peak_of(found.items[n].values) for n in names])) / peak_of(asked.values)
-        how = "by the largest commanded and measured speeds"
-    labels = ", ".join(origins[n].label for n in names)
-    if gain is None or gain <= 0:
-        draft.ask("signals", f"in which unit are {labels}? None is stated, and m/s is taken.")
-        return None
-    if abs(gain - 1) <= _DIFFERS:
-        return None
-    for unit, turn in (("rad/s", 1.0), ("rpm", 2 * math.pi / 60)):
-        radius = 1 / (gain * turn)
-        if structure.places is not None and _WHEEL_SIZES[0] <= radius <= _WHEEL_SIZES[1]:
-            for n in (*names, *_asked_alike(found, names, origins)):
-                origins[n] = replace(origins[n], unit=unit)
-            draft.ask("signals", f"are {labels} in {unit}? None is stated; {how} with wheels of {radius:.3g} m radius.")
-            return radius
-    for n in (*names, *_asked_alike(found, names, origins)):
-        scale = float(f"{origins[n].gain / gain:.6g}")
-        origins[n] = replace(origins[n], unit="m/s", gain=scale)
-    draft.ask("signals", f"what is the scale of {labels}? No unit is stated; {1 / gain:.6g} makes it m/s: {how}.")
-    return None
-
-
-def _asked_alike(found: Signals, names: Sequence[str], origins: Mapping[str, SignalSource]) -> list[str]:
-    """Commanded speeds of wheels without a unit, which are as large as the measured ones: they have the same one."""
-    asked = [n for name in names if (n := f"{name}_ref") in origins and not origins[n].unit]
-    sizes = [peak_of(found.items[n].values) / max(peak_of(found.items[n[:-4]].values), 1e-9) for n in asked]
-    return asked if sizes and all(0.4 < size < 2.5 for size in sizes) else []
-
-
 def _round(value: float) -> str:
     return f"{value:.3g}"
 
@@ -174,7 +136,7 @@ def wheel_places(
         return None if structure.wheels == ONE else _sides(draft, structure.wheels, motions)
     turned = None if measured is None else track_by_yaw(measured[0], places, *measured[1:])
     tracks = [2 * m.y * (1 if places[n.split(".")[1]].y > 0 else -1) for n, m in motions.items() if m.y is not None]
-    asked = _agreed([t if _TRACKS[0] <= t <= _TRACKS[1] else math.inf for t in tracks])
+    asked = agreed([t if _TRACKS[0] <= t <= _TRACKS[1] else math.inf for t in tracks])
     fixed = all(p.axle == "fixed" for p in places.values())
     track = max(p.y for p in places.values()) - min(p.y for p in places.values())
     if "track" in structure.measured:
@@ -263,12 +225,20 @@ def with_speeds(draft: Draft, machine: Machine, logs: Sequence[RawLog]) -> Machi
     reached = max(tops[(len(tops) - 1) // 2] if tops else 0.0, asked)
     top = float(_round(max(_HEADROOM * reached, _LEAST_SPEED)))
     if reached > _ANY_MACHINE:
+        fast = [
+            s for s in (*filter(None, [found.get("cmd.v"), found.get("cmd.omega")]), *wheels) if _top(s) > _ANY_MACHINE
+        ]
+        slow = top * UNITS["mm/s"][1]
+        by_mm = _SLOW <= slow <= _STANDS_IN and not any(s.origin.unit for s in fast)
+        stands_in = slow if by_mm else _STANDS_IN
+        hint = f" (in mm/s it would be {reached * UNITS['mm/s'][1]:.3g} m/s)" if by_mm else ""
+        named = ", ".join(s.origin.label for s in fast) or "the speeds"
         draft.ask(
             "geometry",
-            f"in which unit are the speeds? As they are taken the machine reaches {reached:.3g} m/s, as none does; give it under [signals]. "
-            f"max_speed = {_STANDS_IN:g} m/s stands in.",
+            f"in which unit {'is' if len(fast) == 1 else 'are'} {named}? As they are taken the machine reaches "
+            f"{reached:.3g} m/s, as none does{hint}; give it under [signals]. max_speed = {stands_in:g} m/s stands in.",
         )
-        return replace(machine, max_speed=_STANDS_IN, limits=limits_for(_STANDS_IN), assumed=())
+        return replace(machine, max_speed=stands_in, limits=limits_for(stands_in), assumed=())
     draft.ask(
         "geometry",
         f"how fast can it go? max_speed = {top:g} m/s is a fifth more than this log shows; limits grow and shrink with it.",

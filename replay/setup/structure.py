@@ -15,6 +15,7 @@ from replay.signals.name_parts import end_of, index_of, is_steering, position, w
 from replay.signals.name_words import tokens
 from replay.signals.named_units import bare_name
 from replay.signals.rules import candidates
+from replay.signals.unsure_names import unsure
 
 FOUR, SIX = ("FR", "FL", "RR", "RL"), ("FR", "FL", "MR", "ML", "RR", "RL")
 GERMAN, FRENCH = ("VR", "VL", "HR", "HL"), ("AVD", "AVG", "ARD", "ARG")
@@ -154,8 +155,19 @@ def named_structure(channels: Mapping[str, Channel]) -> Structure | None:
         wheels = FOUR if count == 4 else TWO if count == 2 else tuple(f"W{i + 1}" for i in range(count))
         if _covers(channels, wheels):
             return Structure(wheels, supposed(wheels, _steered(channels, wheels)), how="numbers in the log")
-    if _covers(channels, ONE):
+    places = _unsure_structure(channels)
+    if places is None and _covers(channels, ONE):
         return Structure(ONE, None, how="the only drive in the log")
+    return places
+
+
+def _unsure_structure(channels: Mapping[str, Channel]) -> Structure | None:
+    """Structure by columns that speak of a place each and may be speeds; None where these are not of every wheel."""
+    for names in (SIX, FOUR, TWO):
+        trial = Structure(names, supposed(names)).machine(1.0)
+        if {f"wheel.{w}.v" for w in names} <= {found.signal for found in unsure(channels, trial)}:
+            wheels = _called(channels) if names == FOUR else names
+            return Structure(wheels, supposed(wheels, _steered(channels, wheels)), how="the names in the log")
     return None
 
 

@@ -22,6 +22,8 @@ _USUAL = {
     "angle": ("deg", 3.2, 180.0, "radians"),
     "rotation": ("deg/s", 6.3, 400.0, "rad/s"),
 }
+_TOO_FAST = 100.0  # m/s
+_SPEEDS = ("v", "v_ref", "v_true")
 
 
 def valve_currents(
@@ -80,7 +82,7 @@ def usual_units(draft: Draft, found: Signals) -> Mapping[str, SignalSource]:
     found : Signals
         As found by their names, SI where no unit is stated.
     """
-    out: dict[str, SignalSource] = {}
+    out = dict(_millimetres(draft, found))
     for quantity, (unit, least, most, si) in _USUAL.items():
         bare = {
             n: s
@@ -94,3 +96,17 @@ def usual_units(draft: Draft, found: Signals) -> Mapping[str, SignalSource]:
         named = ", ".join(s.origin.label for s in bare.values())
         draft.ask("signals", f"are {named} in {unit}? None is stated; in {si} they would reach {peak:.3g}.")
     return out
+
+
+def _millimetres(draft: Draft, found: Signals) -> Mapping[str, SignalSource]:
+    """Commanded and measured speeds without a unit that are as large as each other, and such as no machine has in m/s."""
+    asked = found.items.get("cmd.v")
+    if asked is None or asked.origin.unit or not _TOO_FAST < (most := peak_of(asked.values)) <= _TOO_FAST * 100:
+        return {}
+    wheels = {n: s for n, s in found.items.items() if n.startswith("wheel.") and n.rpartition(".")[2] in _SPEEDS}
+    if not wheels or any(s.origin.unit or not 0.4 < peak_of(s.values) / most < 2.5 for s in wheels.values()):
+        return {}
+    alike = {"cmd.v": asked, **wheels}
+    named = ", ".join(s.origin.label for s in alike.values())
+    draft.ask("signals", f"are {named} in mm/s? None is stated; in m/s they would reach {most:.3g}.")
+    return {n: replace(s.origin, unit="mm/s") for n, s in alike.items()}

@@ -29,9 +29,11 @@ from replay.signals.steering_command import turn_by_steering
 from replay.signals.to_si import Converted, choose_motor_or_wheel, convert, usable_unit
 from replay.signals.unfilled import unfilled, unfilled_note
 from replay.signals.unit_doubts import Doubt, doubt, questions
+from replay.signals.unsure_names import NOT_USED, unsure
 
 #: Why a signal is missing for which nothing was found.
 NO_CHANNEL = "no channel fits by its name or message type"
+_NAMED = 4  # channels in a note
 
 
 def plan_topics(
@@ -126,6 +128,7 @@ def map_signals(logs: Sequence[RawLog], machine: Machine) -> Signals:
     for name in machine.canonical_signals():
         if name not in machine.signals:
             _take_guess(draft, name, by_signal.get(name, []))
+    _name_the_unsure(draft, logs)
     turn_by_steering(draft.items, draft.missing, machine)
     if draft.named:
         draft.notes.append(
@@ -143,6 +146,22 @@ def map_signals(logs: Sequence[RawLog], machine: Machine) -> Signals:
         )
     draft.notes += filter(None, [scale_doubt(items, machine)])
     return Signals(items, draft.missing, tuple(dict.fromkeys(draft.notes)), asked, store=store)
+
+
+def _name_the_unsure(draft: _Draft, logs: Sequence[RawLog]) -> None:
+    """Give missing signals the channel that may hold them as their reason, with what its name leaves open."""
+    named: list[str] = []
+    for log, channels in zip(logs, named_channels(logs), strict=True):
+        for found in unsure(channels, draft.machine):
+            if draft.missing.get(found.signal) == NO_CHANNEL:
+                there = replace(found, origin=in_its_file(found.origin, log))
+                draft.missing[found.signal] = there.reason
+                named.append(f"{there.origin.label} ({found.signal})")
+    if named:
+        more = f" and {len(named) - _NAMED} more" if len(named) > _NAMED else ""
+        draft.notes.append(
+            f"{NOT_USED}: {', '.join(named[:_NAMED])}{more}; `mfhca channels LOG` has the line to write for each"
+        )
 
 
 def by_number(items: Mapping[str, Signal], machine: Machine) -> list[str]:

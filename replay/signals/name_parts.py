@@ -46,6 +46,7 @@ _DRIVE = re.compile(
     r"(?<![a-z0-9])[wm]\d(?![a-z0-9])"  # w0_rpm, m1_speed
 )
 _LOOSE = re.compile(r"(?<![A-Za-z0-9])[fblr](?![A-Za-z0-9])")
+_SIDE_AT_END = re.compile(r"(?<=[a-z])([LR])(?![A-Za-z])")  # encL, speedR
 _NO_DRIVE = re.compile(r"castor|caster|arm|grip|finger|flipper|head|neck|elbow|shoulder|wrist|hip|knee|lift|torso")
 _INDEX = re.compile(r"\[(\d+)\]|(?<=[A-Za-z_])[ #-]?(\d+)(?![\d.,/])")
 
@@ -104,6 +105,11 @@ def is_drive(name: str) -> bool:
     return _DRIVE.search(name.lower()) is not None and not is_steering(name)
 
 
+def speaks_of_no_wheel(name: str) -> bool:
+    """Whether a name speaks of an arm, a caster or the like."""
+    return _NO_DRIVE.search(name.lower()) is not None
+
+
 def side_of(name: str) -> str | None:
     """Left or right of a name that says nothing of front and rear; None where it says more, or neither."""
     along, across = position(name)
@@ -120,7 +126,7 @@ def wheel_of(name: str, machine: Machine) -> str | None:
             return wheel
     sides = {side_of(w): w for w in machine.wheels}
     if len(machine.wheels) == 2 and set(sides) == {"left", "right"}:  # one wheel, or chain of wheels, on each side
-        return None if _NO_DRIVE.search(name.lower()) else sides.get(side_of(name))
+        return None if speaks_of_no_wheel(name) else sides.get(side_of(_SIDE_AT_END.sub(r"_\1", name)))
     place = position(name)
     if None in place or re.search(r"cast[eo]r", name.lower()):
         return None

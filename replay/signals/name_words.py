@@ -34,7 +34,7 @@ _PARTS = (
     "geschwindigkeit", "geschw", "drehzahl", "drehmoment", "drehrate", "gierrate", "gier", "winkel", "lenkung", "lenk",
     "ventil", "schieber", "stellung", "stell", "groesse", "ansteuerung", "strom", "spannung", "moment", "druck", "motor",
     "fahr", "antrieb", "achse", "achs", "vorder", "hinter", "vorne", "vorn", "hinten", "links", "rechts", "rad", "soll", "ist",
-    "mess", "wert", "werte", "vorgabe", "rate", "position",
+    "mess", "wert", "werte", "vorgabe", "rate", "position", "dreh", "kolben", "weg", "hub",
 )  # fmt: skip
 _TOGETHER = re.compile(rf"(?:{'|'.join(_PARTS)})+")
 _PART = re.compile("|".join(sorted(_PARTS, key=len, reverse=True)))
@@ -62,6 +62,15 @@ _MEANINGS = {
 _ENGLISH = {word: meaning for meaning, words in _MEANINGS.items() for word in words.split()}
 # Words that say nothing more behind others: Gierrate, Ventil Y VR.
 _DROPPED = {"yaw_rate": ("rate", "geschwindigkeit", "vitesse", "vit"), "valve": ("y", "u")}
+_OF_A_VALVE = {
+    "kolben": "spool",
+    "piston": "spool",
+    "weg": "pos",
+    "hub": "pos",
+    "stroke": "pos",
+    "travel": "pos",
+    "course": "pos",
+}
 _FILLERS = frozenset(
     ("wert", "werte", "value", "val", "values", "percent", "pct", "prozent", "pourcent",
      *("mps", "kmh", "kph", "radps", "rads", "degps", "degs", "dps"))  # units that are no other word
@@ -112,6 +121,8 @@ def english(words: Sequence[str]) -> list[str]:
             continue
         else:
             out.append("valve" if word.endswith("ventil") else _ENGLISH.get(word, word))  # Proportionalventil
+    if "valve" in out:  # Kolbenweg of a valve: the way of its spool
+        out = [_OF_A_VALVE.get(word, word) for word in out]
     roles = ASKING | MEASURED
     for i, word in enumerate(out):
         if word in ("n", "v") and {*out[max(i - 1, 0) : i], *out[i + 1 : i + 2]} & roles:

@@ -9,7 +9,8 @@ from replay.signals.name_words import folded
 
 # Ends of names that people give to columns.
 _ENDS = (
-    (r"rpm|u_?min|umdr_?min|tr_?min|1_min|min_1", "rpm"), (r"mps|m_s|m_per_s|mpers", "m/s"), (r"kmh|kph|km_h", "km/h"),
+    (r"rpm|u_?min|umdr_?min|tr_?min|1_min|min_1", "rpm"), (r"mm_s|mmps|mm_per_s", "mm/s"), (r"cm_s|cm_per_s", "cm/s"),
+    (r"mps|m_s|m_per_s|mpers", "m/s"), (r"kmh|kph|km_h", "km/h"),
     (r"rads|rad_s|radps|rad_per_s", "rad/s"), (r"degs|deg_s|degps|deg_per_s|dps|grad_s", "deg/s"), (r"deg|grad", "deg"),
     (r"pct|percent|prozent|pourcent", "%"), (r"bar", "bar"), (r"nm", "N·m"),
 )  # fmt: skip

@@ -51,13 +51,16 @@ _PLAIN = (
     )
 )
 _ANGLES = frozenset(("deg", "grad"))  # units
+_TURN = frozenset(("dreh", "drehung", "turn", "turning", "rotation", "rot", "wende"))
+_OMEGA = frozenset(("w", "omega", "wz", "yaw", "yaw_rate", "angular", "turn"))  # that say so beside a word that asks
+_RATES = frozenset(("speed", "velocity", "vel", "rate", "z"))
 _STATES = frozenset(("state", "states", "status", "feedback", "telemetry"))  # topics of what is measured
 _OWN = frozenset(("n", "v", "rad", "wheel"))  # that say it even alone: ``Rad VL [1/min]``
-_VEHICLE = frozenset(("fahr", "fahrzeug", "fzg", "vehicle", "machine", "maschine"))
+_VEHICLE = frozenset(("fahr", "fahren", "fahrt", "fahrzeug", "fzg", "vehicle", "machine", "maschine"))
 # Words beside which an asked speed is that of the whole machine.
-_WHOLE = ASKING | frozenset(
-    (*("speed", "velocity", "vel", "v", "r", "f", "lr", "x", "lin", "linear", "longitudinal", "fahr", "fahrzeug", "fzg", "vehicle"),
-     *("machine", "maschine", "engin", "vehicule", "body", "robot", "chassis", "forward", "joystick")),
+_WHOLE = ASKING | _VEHICLE | frozenset(
+    (*("speed", "velocity", "vel", "v", "r", "f", "lr", "x", "lin", "linear", "longitudinal"),
+     *("engin", "vehicule", "body", "robot", "chassis", "forward", "joystick")),
 )  # fmt: skip
 
 
@@ -86,7 +89,7 @@ def by_symbol(channel: Channel, machine: Machine, first: Mapping[str, int]) -> I
     said = _said(channel, machine)
     if said is None:
         return
-    yield from _by_word(channel, said.text, said.parts[-1], said.unit)
+    yield from _by_word(channel, said.text, said.parts[-1], said.unit, len(machine.wheels) > 1)
     leaf = _leaf(said)
     if leaf is None:
         return
@@ -99,12 +102,17 @@ def by_symbol(channel: Channel, machine: Machine, first: Mapping[str, int]) -> I
 
 
 def valve_current(channel: Channel, machine: Machine) -> str | None:
-    """Canonical name of the command that a valve's current or voltage stands for; None where a channel is none.
+    """Canonical name of the command that a valve's current or voltage stands for, by its words or unit; None where a channel is none.
 
     A current opens its valve, by a scale that no name tells: it is no opening until somebody says which current is a full one.
     """
     said = _said(channel, machine)
-    if said is None or not said.valve or not _ELECTRIC & {*said.last} or said.asked == "both":
+    if (
+        said is None
+        or not _is_valve_current(said)
+        or said.asked == "both"
+        or any(_NO_SIGNAL.search(w) for w in said.last)
+    ):
         return None
     part = axle_of(said.bare, machine) if said.steering else wheel_of(said.bare, machine)
     return None if part is None else f"{'steer' if said.steering else 'wheel'}.{part}.u"
@@ -192,7 +200,7 @@ def _leaf(said: _Said) -> str | None:
         return None
     patterns = _PART_PATTERNS[Scope.AXLE if said.steering else Scope.WHEEL]
     leaf = next((leaf for leaf, pattern in patterns if re.search(pattern, "_".join(last))), None)
-    if said.valve and _ELECTRIC & {*last}:  # of a valve: no effort of its wheel, and no opening
+    if _is_valve_current(said):  # no effort of its wheel, and no opening
         return None
     quantity = UNITS[known] if (known := known_unit(said.unit)) is not None else ("", 1.0)
     words = {w for w in last if not w.isdigit()} - _ANGLES
@@ -203,6 +211,10 @@ def _leaf(said: _Said) -> str | None:
     if leaf in ("v", "phi") and asked == "ref":
         return f"{leaf}_ref"
     return leaf
+
+
+def _is_valve_current(said: _Said) -> bool:
+    return said.valve and (bool(_ELECTRIC & {*said.last}) or known_unit(said.unit) in ("A", "mA", "V"))
 
 
 def _effort_unit(word: str) -> str:
@@ -219,11 +231,19 @@ def _is_speed(last: Sequence[str], unit: str) -> bool:
     """Whether words speak of a speed: by name, or as ``v``, a joystick or nothing but a setpoint in a unit of speed."""
     speed = (known := known_unit(unit)) is not None and UNITS[known][0] == "speed"
     says = {"v", "joystick"} & {*last} or ({*last} <= ASKING | _VEHICLE and ASKING & {*last})
-    return bool({"speed", "velocity", "vel"} & {*last}) or (speed and bool(says))
+    return bool({"speed", "velocity", "vel", "lin", "linear"} & {*last}) or (speed and bool(says))
 
 
-def _by_word(channel: Channel, text: str, last: Sequence[str], unit: str) -> Iterator[Candidate]:
-    """Yield signals of the whole machine by the words of their symbol or column."""
+def _is_yaw_rate(last: Sequence[str], unit: str, alone: bool) -> bool:
+    """Whether words speak of turning and nothing else: ``Drehvorgabe [°/s]``, ``w_cmd``; the latter where ω is not of a single wheel."""
+    bare = {*last} - ASKING - {*tokens(unit)} - _VEHICLE
+    if known_unit(unit) in ("rad/s", "deg/s") and bare & _TURN and bare <= _TURN:
+        return True
+    return alone and known_unit(unit) in (None, "rad/s", "deg/s") and bool(bare & _OMEGA) and bare <= _OMEGA | _RATES
+
+
+def _by_word(channel: Channel, text: str, last: Sequence[str], unit: str, turns_alone: bool) -> Iterator[Candidate]:
+    """Yield signals of the whole machine by words of their symbol; `turns_alone`: ω asked for is the machine's, not of its only wheel."""
     if re.search(r"wheel|steer|valve|axle", text) or any(is_place(w) and w != "fwd" for w in last):
         return
     signal = next((signal for signal, pattern in _MACHINE_PATTERNS if re.search(pattern, text)), None)
@@ -231,10 +251,16 @@ def _by_word(channel: Channel, text: str, last: Sequence[str], unit: str) -> Ite
         return
     asks, named = role(last), True
     turns = "yaw_rate" in last or ({*last} - MEASURED == {"yaw", "rate"} and not re.search(r"odom|est", text))
+    turns |= asks == "ref" and _is_yaw_rate(last, unit, turns_alone)
     if turns and asks != "both":
         named = signal is not None or asks == "ref"
         signal = "cmd.omega" if asks == "ref" else signal or "imu.yaw_rate"
-    elif signal is None and (asks == "ref" or "joystick" in last) and _is_speed(last, unit) and {*last} <= _WHOLE:
+    elif (
+        signal is None
+        and (asks == "ref" or "joystick" in last)
+        and _is_speed(last, unit)
+        and {*last} - {*tokens(unit)} <= _WHOLE
+    ):
         signal = "cmd.v"
     if signal is not None:
         yield Candidate(signal, source_of(channel, unit), 9 if named else 10, f"{channel.name} by its name")

@@ -31,6 +31,7 @@ _ANY_MACHINE = 30.0  # m/s; faster than any machine whose top speed was not give
 _SOUND = 2  # other signals of the kind, recorded in the same unit, that are plausible: then it is a fault of this one
 _TURN = 3.1  # rad; a machine file can give no larger limit of steering
 _ROTATIONS, _TURNING = ("rad/s", "rpm", "deg/s"), ("rad/s", "rpm", "deg/s", "rev/s")
+_ANGLES, _LENGTHS = ("rad", "deg"), ("m", "mm")  # of positions, whose slopes are speeds
 _LINEAR = re.compile(r"(^|\.)linear\.[xyz]$")  # of a Twist, which is in m/s by definition
 _JOINT = re.compile(r"(^|\.)velocit\w*\[")  # of a JointState, which is no speed over ground
 _PER_MINUTE = re.compile(r"drehzahl|rpm|umdr|u_?min|tr_?min", re.IGNORECASE)  # of a name: turns per minute
@@ -125,11 +126,12 @@ def _fitting_speed(signal: str, peak: float, origin: SignalSource, machine: Mach
     if _LINEAR.search(origin.field or ""):
         return ""
     recorded = peak / abs(factor_of(signal, origin, machine))
-    turns = [replace(origin, unit=unit, at="wheel") for unit in _ROTATIONS]
+    rotations, lengths = (_ANGLES, _LENGTHS) if origin.derivative else (_ROTATIONS, _SPEED_UNITS)
+    turns = [replace(origin, unit=unit, at="wheel") for unit in rotations]
     if machine.gear_ratio > 1:
-        turns += [replace(origin, unit=unit, at="motor") for unit in _ROTATIONS]
-    speeds = [replace(origin, unit=unit, at="wheel") for unit in _SPEED_UNITS]
-    rotation = known_unit(origin.unit) in _TURNING
+        turns += [replace(origin, unit=unit, at="motor") for unit in rotations]
+    speeds = [replace(origin, unit=unit, at="wheel") for unit in lengths]
+    rotation = known_unit(origin.unit) in (*_TURNING, *_ANGLES)
     joint = _JOINT.search(origin.field or "") is not None
     ways_to_try = (turns,) if joint else (turns, speeds) if rotation else (speeds + turns,)
     if _PER_MINUTE.search(origin.label):

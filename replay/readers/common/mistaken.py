@@ -10,6 +10,8 @@ _POINTER = b"version https://git-lfs.github.com/spec/"
 _MOST_POINTER = 1024
 _HEAD = 512
 _NAMED = 5
+_NUMBER = re.compile(r"[+-]?(\d+([.,]\d*)?|[.,]\d+)([eE][+-]?\d+)?")
+_LEAST_LINES = 4  # of a table of one column
 _PAGE = re.compile(rb"\s*(<!doctype html|<html)", re.IGNORECASE)
 #: First bytes, what they are of, and what to do.
 _KINDS = (
@@ -63,7 +65,18 @@ def mistaken(path: Path) -> str:
         return f"{path} is a tar archive, not a log; unpack it and give what is in it"
     if _PAGE.match(head):
         return f"{path} is a web page, not a log: the download gave a page in its place; download the file itself"
-    return ""
+    return _one_column(path, head)
+
+
+def _one_column(path: Path, head: bytes) -> str:
+    """Sentence on a table whose lines hold one number each, below a name or not; else empty."""
+    first, *rest = head.decode("utf-8", "replace").split("\n")[:-1] or [""]
+    if len(rest) < _LEAST_LINES - 1 or not all(_NUMBER.fullmatch(line.strip()) for line in rest):
+        return ""
+    return (
+        f"{path} is a table of one column (first line {first.strip()[:40]!r}); expected a time and at least one signal side by "
+        "side: export them together, separated by commas, semicolons or tabs"
+    )
 
 
 def _zip(path: Path) -> str:

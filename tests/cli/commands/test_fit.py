@@ -28,7 +28,8 @@ def test_the_written_file_is_checked_and_used(
 ) -> None:
     file = tmp_path / "machine.toml"
     assert run(["fit", str(healthy_log), "-o", str(file)]) == 0
-    out = capsys.readouterr().out
+    out, notes = capsys.readouterr()
+    assert "no machine file was given: of the paper's Haulotte" in notes
     assert "plant.FR.K" in out
     assert "plant.FR.grip" in out
     assert run(["config", "check", str(file)]) == 0

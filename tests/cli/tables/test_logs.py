@@ -16,7 +16,7 @@ CLOCK = {
 }  # fmt: skip
 
 
-def printed(*files: dict[str, Any], width: int = 200) -> list[str]:
+def printed(*files: dict[str, Any], width: int = 200, quality: tuple[str, ...] = ()) -> list[str]:
     log = {"files": list(files), "start_ns": 1_760_000_000 * 10**9, "duration_s": 240.0, "driving_s": 230.5}
     report = whole_report(
         {
@@ -24,6 +24,7 @@ def printed(*files: dict[str, Any], width: int = 200) -> list[str]:
             "machine": {"wheels": ["FR"]},
             "verdict": {"status": "ready", "title": "", "text": "", "caveats": [], "actions": []},
             "intervals": [],
+            "quality": [{"check": "mapping", "result": text, "effect": "", "ok": False} for text in quality],
         }
     )
     console = Console(file=io.StringIO(), width=width, markup=False)
@@ -70,3 +71,9 @@ def test_clocks_of_several_logs() -> None:
 
 def test_a_result_without_logs_says_nothing() -> None:
     assert printed() == []
+
+
+def test_channels_whose_names_leave_something_open_are_named() -> None:
+    text = "not used, for their names leave open what they hold: fVentil_Soll_FR [mA] (wheel.FR.u)"
+    lines = printed({"path": "drive.csv"}, quality=(text, "clocks agree"))
+    assert lines[-1] == f"• {text}"

@@ -60,7 +60,7 @@ def test_a_scale_of_no_unit_is_asked_and_nothing_is_written(tmp_path: Path) -> N
 
 def test_speeds_that_no_machine_has_are_asked_and_the_check_of_the_file_stops_at_them(tmp_path: Path) -> None:
     draft = drafted(tmp_path, Robot(scale=60 * RPM, commands=False))
-    assert any("in which unit are the speeds?" in q for q in draft.questions)
+    assert any("in which unit are /joint_states" in q and "as none does" in q for q in draft.questions)
     file = tmp_path / "machine.toml"
     file.write_text(machine_text(draft, "run"), encoding="utf-8")
     machine = load_machine(file)

@@ -259,8 +259,12 @@ def test_small_wheels_of_joints_called_wheels_are_no_motors(tmp_path: Path, monk
 
 def test_a_log_without_a_drive_says_what_to_record(tmp_path: Path) -> None:
     pd.DataFrame({"time": np.arange(50.0), "temperature": 20.0}).to_csv(tmp_path / "run.csv", index=False)
-    with pytest.raises(LogError, match="no wheel speed is in the log"):
+    with pytest.raises(LogError, match=r"no wheel speed is in the log: none of its columns \(temperature\)"):
         draft_machine(read_everything([tmp_path / "run.csv"]))
+    places = {f"drivewheel_{n}": (0.0, y) for n, y in (("port", TRACK / 2), ("starboard", -TRACK / 2))}
+    write_robot(tmp_path / "run.mcap", Robot(wheels=places), 5.0)
+    with pytest.raises(LogError, match=r"none of its joints \(drivewheel_port, drivewheel_starboard\)"):
+        draft_machine(read_everything([tmp_path / "run.mcap"], every=False))
 
 
 @pytest.mark.parametrize("preset", Preset)
@@ -324,6 +328,22 @@ def test_tables_that_begin_or_end_apart_are_not_taken_to_share_a_clock(
     table.iloc[:rows].to_csv(tmp_path / "b.csv", index=False)
     draft = draft_machine(read_everything([tmp_path / "a.csv", tmp_path / "b.csv"]))
     assert [o.clock for o in draft.machine.sources.values() or [SourceOptions()]] == [clock]
+    assert any("stamped by one computer" in q for q in draft.questions)
+
+
+@pytest.mark.parametrize(("rows", "clock"), [(600, ["as recorded"]), (560, [])], ids=["alike", "shorter"])
+def test_tables_that_count_from_their_own_start_share_a_clock_where_they_end_together(
+    tmp_path: Path, rows: int, clock: list[str]
+) -> None:
+    v = np.repeat(np.random.default_rng(1).uniform(-0.5, 0.5, 15), 40)
+    t = np.arange(600) * 0.05
+    wheels = {f"{w} {what}": v for w in ("FR", "FL") for what in ("speed setpoint [m/s]", "speed [m/s]")}
+    pd.DataFrame({"time [s]": t, **wheels}).to_csv(tmp_path / "a.csv", index=False)
+    pd.DataFrame({"time [s]": t, "Temperatur": v, "steer_angle_front [rad]": 0.1}).iloc[:rows].to_csv(
+        tmp_path / "b.csv", index=False
+    )
+    draft = draft_machine(read_everything([tmp_path / "a.csv", tmp_path / "b.csv"]))
+    assert [o.clock for o in draft.machine.sources.values()] == clock
     assert any("stamped by one computer" in q for q in draft.questions)
 
 

@@ -44,6 +44,10 @@ def found(channel: Channel) -> list[tuple[str, str]]:
         ("n VL [1/min]", "wheel.FL.v"),
         ("Vitesse roue AV G (tr/min)", "wheel.FL.v"),
         ("Courant vanne AVG (mA)", None),
+        ("fVentil_Soll_VL [mA]", None),
+        ("Ventil_VL [V]", None),
+        ("cmd_vel_yaw", "cmd.omega"),
+        ("speed_cmd_mm_s", "cmd.v"),
         ("y_Ventil_soll_VR [%]", "wheel.FR.u"),
         ("y_Ventil_ist_VR [%]", "wheel.FR.u_applied"),
         ("Stellgröße_HR (%)", "wheel.RR.u"),
@@ -58,6 +62,7 @@ def found(channel: Channel) -> list[tuple[str, str]]:
         ("vFzgSoll [km/h]", "cmd.v"),
         ("Fahrhebel [km/h]", "cmd.v"),
         ("Fahrhebel [%]", None),
+        ("GVL_HMI.fJoystickFahren [km/h]", "cmd.v"),
         ("Joystick_v [m/s]", "cmd.v"),
         ("Sollwert [m/s]", "cmd.v"),
         ("Sollwert [bar]", None),
@@ -80,6 +85,24 @@ def found(channel: Channel) -> list[tuple[str, str]]:
         ("max. Geschwindigkeit über Grund [km/h]", None),
         ("Sollgeschwindigkeit über Grund [km/h]", None),
         ("Giergeschwindigkeit [°/s]", "imu.yaw_rate"),
+        ("Drehvorgabe [°/s]", "cmd.omega"),
+        ("Drehvorgabe [1/min]", None),
+        ("w_cmd", "cmd.omega"),
+        ("cmd_linear", "cmd.v"),
+        ("omega_ref [rad/s]", "cmd.omega"),
+        ("angular_velocity_setpoint", "cmd.omega"),
+        ("target_yaw_rate [deg/s]", "cmd.omega"),
+        ("omega_cmd [rpm]", None),
+        ("w_pump_cmd", None),
+        ("gyro_z", "imu.yaw_rate"),
+        ("gyro_z_rad_s", "imu.yaw_rate"),
+        ("angular_velocity_z", "imu.yaw_rate"),
+        ("gyro_x", None),
+        ("cmd_gyro_z", None),
+        ("Kran_Drehvorgabe [°/s]", None),
+        ("PropVentil VR Kolbenweg [%]", "wheel.FR.u_applied"),
+        ("Ventilhub_HL [%]", "wheel.RL.u_applied"),
+        ("Zylinder VL Kolbenweg [%]", None),
         ("Lüfter_Geschwindigkeit_soll [m/s]", None),
         ("Diesel_Drehzahl_soll [1/min]", None),
         ("Drehzahlfehler_VR [1/min]", None),
@@ -201,6 +224,8 @@ def test_currents_of_valves_are_known_for_what_they_are() -> None:
     machine = haulotte()
     assert valve_current(column("Drive/FL valve current [mA]"), machine) == "wheel.FL.u"
     assert valve_current(column("Ventilstrom Lenkung hinten [mA]"), machine) == "steer.rear.u"
+    assert valve_current(column("fVentil_Soll_VL [mA]"), machine) == "wheel.FL.u"
+    assert valve_current(column("fVentil_Soll_VL [%]"), machine) is None
     assert valve_current(column("Drive/FL motor current [A]"), machine) is None
 
 
@@ -244,6 +269,7 @@ def test_units_in_names() -> None:
         ("speed_cmd_mps", "cmd.v", "m/s"),
         ("fFahrSollwert [km/h]", "cmd.v", "km/h"),
         ("Fahrzeug [km/h]", None, ""),
+        ("front_left_wheel_speed_mm_s", "wheel.FL.v", "mm/s"),
         ("front_left_wheel_cmd_mps", "wheel.FL.v_ref", "m/s"),
         ("front_left_wheel_speed_rad_per_s", "wheel.FL.v", "rad/s"),
         ("front_left_wheel_setpoint_radps", "wheel.FL.v_ref", "rad/s"),

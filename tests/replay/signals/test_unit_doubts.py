@@ -105,3 +105,11 @@ def test_spikes_are_no_question() -> None:
 def test_a_machine_knows_what_is_the_paper_s(tmp_path: Path, text: str, assumed: tuple[str, ...]) -> None:
     (tmp_path / "m.toml").write_text(text)
     assert load_machine(tmp_path / "m.toml").assumed == assumed
+
+
+@pytest.mark.parametrize(("unit", "size", "line"), [("rad", 10.0, 'unit = "deg"'), ("m", 60.0, 'unit = "mm"')])
+def test_a_position_is_offered_units_of_positions(unit: str, size: float, line: str) -> None:
+    """Its slope is the speed: a unit of speed beside derivative = true would be none of its own."""
+    source = SignalSource(column="x", unit=unit, derivative=True)
+    (question,) = mapped({"x": size * WAVE}, {"wheel.FR.v": source}).questions
+    assert f"{line}, derivative = true" in question

@@ -77,3 +77,12 @@ def test_a_damaged_zip_is_a_zip_all_the_same(tmp_path: Path) -> None:
     path.write_bytes(path.read_bytes()[:-30])
     with pytest.raises(LogError, match="ZIP archive"):
         open_log(path)
+
+
+@pytest.mark.parametrize("text", ["speed\n0.1\n-0.25\n3e-2\n0\n", "time\n0\n1\n2\n3\n", "1\n2\n3\n4\n"])
+def test_a_table_of_one_column(tmp_path: Path, text: str) -> None:
+    (tmp_path / "run.csv").write_text(text, encoding="utf-8")
+    with pytest.raises(
+        LogError, match=r"run\.csv is a table of one column \(first line .*expected a time and at least one signal"
+    ):
+        open_log(tmp_path / "run.csv")

@@ -1,0 +1,47 @@
+"""Signals of a draft whose names leave open what they hold: taken as what they seem, with one question for each kind."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Mapping
+
+from replay.log.raw_log import Channel
+from replay.log.source_options import SignalSource
+from replay.machine.config import Machine
+from replay.setup.draft_notes import Draft
+from replay.signals.signal import Signals
+from replay.signals.unsure_names import Open, Unsure, unsure
+
+_QUESTIONS = {
+    Open.SPEED: "are {names} speeds of the wheels? Their names tell the wheel, but not what; they are taken so.",
+    Open.POSITION: "are {names} positions of the wheels{unit}? They are taken so, and the speeds are their slopes.",
+    Open.SECOND: "are {names} second sensors of what {beside} and the like measure? They are taken so: what both say is believed.",
+}
+
+
+def unsure_signals(
+    draft: Draft, channels: Mapping[str, Channel], machine: Machine, found: Signals
+) -> Mapping[str, SignalSource]:
+    """Sources of such signals, by canonical name; steps of encoders get their scale, and their question, with the lengths.
+
+    Parameters
+    ----------
+    draft : Draft
+        Takes the questions.
+    channels : Mapping[str, Channel]
+        All of the log.
+    machine : Machine
+        Its wheels and axles.
+    found : Signals
+        As found by their names.
+    """
+    kinds: dict[Open, list[Unsure]] = defaultdict(list)
+    for one in unsure(channels, machine):
+        if one.signal not in found.items and one.kind is not Open.CURRENT:  # which have their own question
+            kinds[one.kind].append(one)
+    for kind, ones in kinds.items():
+        if kind in _QUESTIONS:
+            bare = any(one.origin.unit == "rad" for one in ones)
+            names, beside = ", ".join(one.origin.label for one in ones), ones[0].beside
+            draft.ask("signals", _QUESTIONS[kind].format(names=names, beside=beside, unit=" in rad" if bare else ""))
+    return {one.signal: one.origin for ones in kinds.values() for one in ones}

@@ -1,0 +1,206 @@
+"""Columns and symbols whose names tell a wheel or axle, and leave open what exactly they hold: a person must say it.
+
+``left_actual`` beside ``left_target``, ``vl_ref``, ``left_ticks``, ``left_wheel_position``, ``HubSpeedAct2`` beside ``HubSpeedAct``,
+``fVentil_Soll_VL [mA]``. A diagnosis takes none of them by itself and says why; a draft of a machine file takes them with a question.
+"""
+
+from __future__ import annotations
+
+import re
+from collections import defaultdict
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from enum import StrEnum
+
+from replay.log.raw_log import Channel
+from replay.log.source_options import SignalSource
+from replay.machine.config import Machine
+from replay.machine.quantities import UNITS
+from replay.machine.toml_text import signal_line
+from replay.machine.units import known_unit
+from replay.signals.candidate import source_of
+from replay.signals.name_parts import is_place, is_steering, position, side_of, speaks_of_no_wheel, wheel_of
+from replay.signals.name_words import ASKING, MEASURED, english, role, tokens
+from replay.signals.named_units import bare_name, unit_by_end
+from replay.signals.rules import candidates
+from replay.signals.symbol_rules import valve_current
+
+#: Begin of the note that names such channels.
+NOT_USED = "not used, for their names leave open what they hold"
+
+
+class Open(StrEnum):
+    """What a name leaves open."""
+
+    CURRENT = "current"
+    COUNTS = "counts"
+    POSITION = "position"
+    SPEED = "speed"
+    SECOND = "second"
+
+
+@dataclass(frozen=True)
+class Unsure:
+    """A channel that may hold a signal, once somebody says what its name leaves open.
+
+    Attributes
+    ----------
+    signal : str
+        Canonical name.
+    origin : SignalSource
+        The channel, with the conversion that it would have; an empty unit where that is open too.
+    kind : Open
+        What its name leaves open.
+    beside : str
+        Label of the channel that it goes with; may be empty.
+    """
+
+    signal: str
+    origin: SignalSource
+    kind: Open
+    beside: str = ""
+
+    @property
+    def reason(self) -> str:
+        """Why it is not taken, and the line of [signals] to write if it is what it seems."""
+        line = signal_line(self.signal, _as_written(self))
+        return f"{self.origin.label!r} {_REASONS[self.kind].format(beside=self.beside)}, write {line}"
+
+
+_REASONS = {
+    Open.CURRENT: "is a valve's current or voltage, which is no opening by itself; with gain = 1 / the one that opens it fully",
+    Open.COUNTS: "counts an encoder's steps, and how many make a turn is not known; with gain = 6.2832 / the steps of a turn",
+    Open.POSITION: "may be the position of a wheel, whose slope is its speed; if it is, and in rad",
+    Open.SPEED: "has no word for what it holds; if it is a speed, with its unit (m/s, rad/s, rpm, mm/s)",
+    Open.SECOND: "may be a second sensor beside {beside!r}; if it is",
+}
+_LETTERS = frozenset(("v", "w", "n", "omega"))  # that stand for a speed
+_THINGS = frozenset(("wheel", "rad", "motor", "drive", "hub", "side", "track", "joint", "chain", "crawler", "st", "fb"))
+_STEPS = frozenset(
+    (*("encoder", "encoders", "enc", "tick", "ticks", "count", "counts", "pulse", "pulses", "impulse", "impulses", "inkremente"),
+     *("inkr", "geber", "drehgeber", "codeur", "impulsions")),
+)  # fmt: skip
+_PLACES = frozenset(("position", "pos", "positions"))
+_MORE = frozenset(("raw", "total", "abs", "value", "state", "states", "name"))  # that change nothing
+_SIDED = re.compile(
+    r"(?<![A-Za-z])([vwn])([lr])(?![a-z])", re.IGNORECASE
+)  # vl: v of the left one, of a machine with two
+_LAST_NUMBER = re.compile(r"[ _.-]?(\d+)(?=\D*$)")
+
+
+def unsure(channels: Mapping[str, Channel], machine: Machine) -> list[Unsure]:
+    """Channels of tables and PLCs that may hold signals, but whose names leave something open.
+
+    Parameters
+    ----------
+    channels : Mapping[str, Channel]
+        Of one log, by name.
+    machine : Machine
+        Its wheels and axles.
+    """
+    bare = {name: c for name, c in channels.items() if not c.topic}
+    sure: dict[str, set[str]] = defaultdict(set)
+    for c in candidates(bare, machine):
+        sure[c.origin.label].add(c.signal)
+    out = [*_seconds(bare, machine, sure)]
+    others = {name: c for name, c in bare.items() if name not in sure}
+    names = {name: said for name, c in others.items() if (said := _said(c, machine)) is not None}
+    measured = {signal for signals in sure.values() for signal in signals}
+    for name, channel in others.items():
+        current = valve_current(channel, machine)
+        if current is not None:
+            out.append(Unsure(current, source_of(channel, "1"), Open.CURRENT))
+        elif name in names:
+            out += _one(channel, names[name], names, measured)
+    first: dict[str, Unsure] = {}
+    for found in out:
+        first.setdefault(found.signal, found)
+    return [*first.values()]
+
+
+@dataclass(frozen=True)
+class _Said:
+    """Words of a name without its place, the wheel of which it speaks, and whether it asks or measures."""
+
+    words: frozenset[str]
+    wheel: str
+    asked: str
+    unit: str
+
+
+def _said(channel: Channel, machine: Machine) -> _Said | None:
+    """What a name says of a wheel; None where it speaks of none, of steering, or of what is no wheel."""
+    name, stated = bare_name(channel.name)
+    name = _SIDED.sub(r"\1_\2", name) if {side_of(w) for w in machine.wheels} == {"left", "right"} else name
+    wheel = wheel_of(name, machine)
+    if wheel is None or is_steering(name) or speaks_of_no_wheel(name):
+        return None
+    named = {w.lower() for w in machine.wheels}
+    parts = re.split(r"[./]", name)
+    roles = ASKING | MEASURED
+    told = [
+        p for p in parts[:-1] if position(p) != (None, None) or {*tokens(p)} & named or {*english(tokens(p))} <= roles
+    ]
+    told += parts[-1:]
+    words = {w for p in told for w in english(tokens(p)) if not is_place(w) and not w.isdigit()} - {"l", "r"} - named
+    unit = stated or (channel.unit if channel.unit and known_unit(channel.unit) else "")
+    by_end = "" if unit else unit_by_end(name, doubtful=True)
+    return _Said(frozenset(words - {*english(tokens(by_end))}), wheel, role([*words]), unit or by_end)
+
+
+def _one(channel: Channel, said: _Said, names: Mapping[str, _Said], measured: set[str]) -> Iterator[Unsure]:
+    """Yield what a channel of a wheel may be, of which no rule for names is sure."""
+    v, quantity, words = f"wheel.{said.wheel}.v", _quantity(said.unit), said.words - _THINGS - _MORE - MEASURED
+    if words and words <= _STEPS | _PLACES and words & _STEPS and quantity in ("", "angle"):
+        yield Unsure(v, source_of(channel, "", derivative=True), Open.COUNTS)
+    elif words and words <= _PLACES and said.words & _THINGS and quantity in ("", "angle", "length"):
+        signal = f"{v}_position" if v in measured else v
+        yield Unsure(signal, source_of(channel, said.unit or "rad", derivative=True), Open.POSITION)
+    elif said.asked != "both" and words <= _LETTERS | ASKING and quantity in ("", "speed", "rotation"):
+        pair = _pair(said, names)
+        if words & _LETTERS or pair:
+            yield Unsure(f"{v}_ref" if said.asked == "ref" else v, source_of(channel, said.unit), Open.SPEED, pair)
+
+
+def _pair(said: _Said, names: Mapping[str, _Said]) -> str:
+    """Name that says the same of the same wheel, but asks where this one does not; empty where there is none."""
+    plain = said.words - ASKING - MEASURED
+    for name, other in names.items():
+        alike = other.wheel == said.wheel and other.words - ASKING - MEASURED == plain
+        if alike and other.asked != "both" and (other.asked == "ref") != (said.asked == "ref"):
+            return name
+    return ""
+
+
+def _quantity(unit: str) -> str:
+    """Quantity of a unit; empty where none is stated, or as a count is; another word where it is not known."""
+    known = known_unit(unit)
+    return UNITS[known][0] if known is not None else "" if {*tokens(unit)} <= _STEPS and "/" not in unit else "?"
+
+
+def _seconds(channels: Mapping[str, Channel], machine: Machine, sure: Mapping[str, set[str]]) -> Iterator[Unsure]:
+    """Yield columns that are called like a measured speed or angle, but for a number at their end."""
+    alike: dict[str, list[str]] = defaultdict(list)
+    for name in channels:
+        alike[_LAST_NUMBER.sub("", bare_name(name)[0])].append(name)
+    for names in alike.values():
+        of = {
+            name: {s for s in sure.get(name, ()) if re.fullmatch(r"wheel\..*\.v|steer\..*\.phi", s)} for name in names
+        }
+        signals = set().union(*of.values())
+        others = [n for n in names if sure.get(n, set()) - signals]
+        if len(names) == 2 and len(signals) == 1 and not others:
+            (signal,) = signals
+            first = next(n for n in names if of[n])
+            second = next(n for n in names if n != first)
+            yield Unsure(f"{signal}_true", source_of(channels[second], _unit(channels[second])), Open.SECOND, first)
+
+
+def _unit(channel: Channel) -> str:
+    return (channel.unit or "") or bare_name(channel.name)[1] or unit_by_end(channel.name)
+
+
+def _as_written(found: Unsure) -> SignalSource:
+    """The origin with what stands in for what is open."""
+    unit = {Open.COUNTS: "rad", Open.SPEED: found.origin.unit or "…"}.get(found.kind, found.origin.unit)
+    return replace(found.origin, unit=unit)
