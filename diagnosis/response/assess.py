@@ -49,7 +49,7 @@ from diagnosis.response.rivals import (
 from diagnosis.response.sides import sides_of
 from diagnosis.response.sideways import goes_sideways
 from diagnosis.response.spells import spells_of, until_back, where_asked
-from diagnosis.response.turning import turning_of, turns_with, wrong_yaw_rate
+from diagnosis.response.turning import turning_of, turns_with, unasked_turn, wrong_yaw_rate
 from diagnosis.results.assessment import CODE, Assessment, Finding
 from replay.faults import State
 from replay.machine.config import Limits
@@ -62,6 +62,10 @@ _AT_A_JUMP = 0.1, 0.3  # probability that a fault begins, or ends, where the cha
 _OWN, _OTHERS = 4, 2  # holds of a channel that may be faults: of the one in question, and of each other
 _LEAST_S = 1.0
 _PAIR = 2  # wheels, of which each moves one side of the machine
+_TURNED = (
+    "The sides of the machine go apart as where it turns, of which the log has neither a command nor a measurement: log the commanded yaw "
+    "rate (cmd.omega) or a measured one (imu.yaw_rate)."
+)
 
 
 @dataclass(frozen=True)
@@ -130,6 +134,7 @@ def assess_response(
     names = {w: j.data.name for w, j in found.items()}
     beside, by_motion, left_notes = views(names, {w: j.wheel.blocks for w, j in found.items()}, geometry, bodies)
     judged = {w: _judge(j, beside.get(w), dt, width) for w, j in found.items()}
+    turned = {w: [s for s in j.spells if unasked_turn(w, s, judged, geometry, yaw)] for w, j in judged.items()}
     slips = {w: [s for s in j.spells if by_slip(s, w, judged, bodies.yaw)] for w, j in judged.items()}
     kept = {
         w: [
@@ -140,6 +145,7 @@ def assess_response(
             and not consequence(s, w, judged)
             and not wrong_yaw_rate(s, j)
             and s not in slips[w]
+            and s not in turned[w]
             and not by_drag(s, w, judged)
         ]
         for w, j in judged.items()
@@ -177,7 +183,7 @@ def assess_response(
         for w, (sensor, drive) in parts.items()
     }
     astray, lasts = otherwise(judged, width * dt)
-    remarks = (*astray, *left_notes)
+    remarks = (*astray, *left_notes, *((_TURNED,) if any(turned.values()) else ()))
     doubts = {w: j.odd for w, j in judged.items() if j.odd and not any(side.findings for side in parts[w])}
     doubts |= {w: j.joint.unlike for w, j in judged.items() if j.joint is not None and j.joint.unlike}
     for w, text in (doubts | unlike(judged)).items():

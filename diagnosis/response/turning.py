@@ -29,6 +29,9 @@ _SURE = 2.5  # standard errors
 _MIDDLE = 0.5
 _PAIR = 2  # wheels, of which each turns the body alone
 _LIES = -0.5, 1.6  # what a share may be at all
+_OPPOSITE = (
+    0.5  # of the difference of two sides' deviations: a smaller sum is a turn, of one wheel's fault they are alike
+)
 _LEAST_SPELL, _BETTER = 6, 0.5  # blocks; of the misfit of any wheel's gain, that a fault of the yaw rate leaves
 
 
@@ -52,12 +55,57 @@ def turning_of(judged: Mapping[str, Judged], geometry: Geometry | None, yaw: Arr
 
     `yaw` of shape (blocks,) [rad/s].
     """
-    if yaw is None or geometry is None:
+    sides = None if yaw is None else _sides(judged, geometry)
+    return None if yaw is None or sides is None else Turning(yaw, sides)
+
+
+def _sides(judged: Mapping[str, Judged], geometry: Geometry | None) -> dict[str, float] | None:
+    """1 for wheels of the right, -1 for those of the left; None where a side has no wheel, or one is steered."""
+    if geometry is None:
         return None
     fixed = {w: p for w in judged if (p := geometry.wheels.get(w)) is not None and p.axle == "fixed" and p.y != 0.0}
     if len(fixed) < len(judged) or len({p.y > 0.0 for p in fixed.values()}) < 2:
         return None
-    return Turning(yaw, {w: -1.0 if p.y > 0.0 else 1.0 for w, p in fixed.items()})
+    return {w: -1.0 if p.y > 0.0 else 1.0 for w, p in fixed.items()}
+
+
+def unasked_turn(
+    wheel: str, spell: Spell, judged: Mapping[str, Judged], geometry: Geometry | None, yaw: Array | None
+) -> bool:
+    """Whether a deviation is a turn of the machine of which the log has neither a command nor a measurement: the other side makes it, too, the other way.
+
+    Parameters
+    ----------
+    wheel : str
+        The wheel.
+    spell : Spell
+        Of it.
+    judged : Mapping[str, Judged]
+        All wheels.
+    geometry : Geometry or None
+        Says which wheels are on one side.
+    yaw : Array or None
+        Measured yaw rate [rad/s].
+    """
+    if yaw is not None or spell.mode in (FaultMode.STUCK, FaultMode.NOISY) or not _told_no_turn(judged):
+        return False
+    sides = _sides(judged, geometry)
+    if sides is None:
+        return False
+    part = slice(spell.start, spell.stop)
+    off = {w: (j.wheel.blocks.mean - 0.5 * (j.wheel.blocks.low + j.wheel.blocks.high))[part] for w, j in judged.items()}
+    near, far = (
+        np.mean([off[w] for w in sides if (sides[w] == sides[wheel]) is same], axis=0) for same in (True, False)
+    )
+    known = np.isfinite(near) & np.isfinite(far)
+    both, apart = (float(np.sum(x[known] ** 2)) for x in (near + far, near - far))
+    return bool(known.any()) and both < _OPPOSITE**2 * apart
+
+
+def _told_no_turn(judged: Mapping[str, Judged]) -> bool:
+    """Whether all wheels are told the same all the time."""
+    first, *others = (j.data for j in judged.values())
+    return first.commands.shape[1] == 1 and all(np.array_equal(first.asked, d.asked, equal_nan=True) for d in others)
 
 
 def turns_with(wheel: str, spell: Spell, judged: Mapping[str, Judged], turning: Turning | None) -> bool | None:
