@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from diagnosis.decision.severity import MAY_BE_TOTAL, risk_of
 from diagnosis.results.candidates import UNCLEAR, candidates, unclear_words
 from diagnosis.results.document import ActionRow
 from diagnosis.results.fault_rows import mode_words
@@ -65,8 +66,9 @@ def _order(worst: FaultInterval) -> str:
 
 
 def unanswered(fault: FaultInterval) -> bool:
-    """Whether a drive probably does not answer, though that is not certain enough to stop for."""
-    return fault.severity is Severity.MEDIUM and fault.mode.total and fault.side is not Side.SENSOR
+    """Whether a drive may not answer, though that is not certain enough to stop for."""
+    may_be = fault.mode.total or risk_of(fault) >= MAY_BE_TOTAL
+    return fault.severity is Severity.MEDIUM and may_be and fault.side is not Side.SENSOR
 
 
 def _urgency(worst: FaultInterval) -> int:
