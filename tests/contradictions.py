@@ -220,6 +220,15 @@ def _urgency(fault: Mapping[str, Any], report: Mapping[str, Any]) -> Iterator[st
     brief = fault["side"] == "sensor" and fault["stop_s"] - fault["start_s"] <= limits["brief"]
     if high and risk < _AT_RISK:
         yield f"stopped for, although stuck, silent or lost is {risk:.2f} probable"
+    if (
+        report["verdict"]["cleared"]
+        and total >= 1.0 - _AT_RISK
+        and fault["side"] != "sensor"
+        and fault["severity"] == "medium"
+    ):
+        yield f"cleared although it is stuck or silent with {total:.2f}"
+    if "no reason to stop" in fault["advice"] and total >= 1.0 - _AT_RISK:
+        yield f"no reason to stop although it is stuck or silent with {total:.2f}"
     if not high and risk >= _AT_RISK and sure and not brief:
         yield f"stuck, silent or lost is {risk:.2f} probable, and its severity is {fault['severity']}"
 

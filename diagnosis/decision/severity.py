@@ -6,7 +6,8 @@ actuator, or one without control signal, means stop at once. Everything else is 
 Both are about the part that is named, so *high* needs its probability, not that of any fault: the named side must be faulty
 with `limits.min_probability` (as every stated fault is), and be stuck or without signal with odds of three to one. A machine
 that is stopped for the wrong part, or for a row that is no reason to stop, stands without need; the fault that misses these
-bounds is still *medium*, to be checked before the next mission. The risk decides, not the most probable row: a part of which
+bounds is still *medium*, to be checked before the next mission, unless the odds are three to one that it is neither: a row that
+is a little more probable than *stuck* does not make a valve that may be stuck fit to go out. The risk decides, not the most probable row: a part of which
 hardly anything is left (ε̂ ≥ .9) is as good as without signal, whatever its row is called.
 """
 
@@ -16,6 +17,7 @@ from collections.abc import Container
 
 from diagnosis.results.assessment import Finding
 from diagnosis.results.machine_words import MachineWords
+from diagnosis.results.result import FaultInterval
 from diagnosis.results.vocabulary import Kind, Severity, Tier
 from replay.faults import TOTAL, FaultMode, Side
 from replay.machine.config import Limits
@@ -26,7 +28,8 @@ _SHORT_NOISE_S = 1.0
 _CERTAIN = 0.99  # probability of any fault from which on even brief noise is worth a check
 _LOST = 0.9  # ε̂ from which on so little is left that the part is as good as without signal
 _EVEN = 0.5  # that a part delivers nothing usable, from which on that is what is said
-_PROBABLY_TOTAL = 0.75  # that the named side is stuck or without signal, from which on the machine is stopped
+_PROBABLY_TOTAL = 0.75  # that the named side is stuck or without signal, from which on the machine is stopped, ...
+MAY_BE_TOTAL = 0.25  # ... and from which on it is looked at before the machine goes out
 _PARTIAL = (FaultMode.INEFFICIENT, FaultMode.OUTSIDE_TABLE)  # rows of which ε̂ says how much is left
 
 
@@ -41,13 +44,11 @@ def severity_of(
     if brief and (finding.tier is Tier.MODEL or faulty < _CERTAIN):
         by = ", and shown by a model alone" if finding.tier is Tier.MODEL else ", and not certain"
         return Severity.INFO, f"Too short to act on{by}. Compare with the next mission."
-    total = finding.mode.total or _at_risk(finding) >= _PROBABLY_TOTAL
+    total = finding.mode.total or risk_of(finding) >= MAY_BE_TOTAL
     if faulty < limits.min_probability:
         if total and finding.side is not Side.SENSOR:
             what = (
-                "Probably a {valve} that does not answer"
-                if _at_risk(finding) >= _EVEN
-                else "The {valve} may not answer"
+                "Probably a {valve} that does not answer" if risk_of(finding) >= _EVEN else "The {valve} may not answer"
             )
             return Severity.MEDIUM, words.fill(f"{what}: check it before the machine goes out again.")
         return Severity.LOW, "Probable, not certain: check it at the next service, and compare with the next mission."
@@ -65,7 +66,7 @@ def severity_of(
 def _severity_of_total(
     finding: Finding, seconds: float, limits: Limits, words: MachineWords, kind: Kind
 ) -> tuple[Severity, str]:
-    """Severity and advice of a part that is stuck or without signal, with enough probability of a fault."""
+    """Severity and advice of a part that is, or may be, stuck or without signal, with enough probability of a fault."""
     if _of_named_side(finding) < limits.min_probability:
         return (
             Severity.MEDIUM,
@@ -73,12 +74,13 @@ def _severity_of_total(
                 "Faulty, but which part is not certain enough to stop for: check sensor and {valve} before the next mission."
             ),
         )
-    if _at_risk(finding) < _PROBABLY_TOTAL and finding.side is Side.SENSOR and seconds <= limits.brief:
+    if risk_of(finding) < _PROBABLY_TOTAL and finding.side is Side.SENSOR and seconds <= limits.brief:
         return Severity.LOW, "Short, and its kind is not clear: check plug and cable at the next service."
-    if _at_risk(finding) < _PROBABLY_TOTAL:
+    if risk_of(finding) < _PROBABLY_TOTAL:
+        likely = "Probably" if risk_of(finding) >= _EVEN else "It may be"
         return (
             Severity.MEDIUM,
-            "Faulty, but probably neither stuck nor without signal: check it before the next mission.",
+            f"{likely} stuck or without signal, which is not certain enough to stop for: check it before the next mission.",
         )
     if finding.side is Side.ACTUATOR:
         return Severity.HIGH, words.fill(
@@ -99,8 +101,8 @@ def _severity_of_total(
     )
 
 
-def _at_risk(finding: Finding) -> float:
-    """Probability that nothing usable comes from the side that the finding names: stuck, without signal, or nearly all lost."""
+def risk_of(finding: Finding | FaultInterval) -> float:
+    """Probability [1] that nothing usable comes from the side that a fault names: stuck, without signal, or nearly all lost."""
     # a stuck part's ε is 1 by its row; what else it may be says the lower bound, where a second measurement gives it
     size = finding.epsilon
     known = size is not None and (not finding.mode.total or finding.tier is Tier.DIRECT)
@@ -108,7 +110,7 @@ def _at_risk(finding: Finding) -> float:
     return _of_named_side(finding, {*TOTAL, *_PARTIAL} if lost else TOTAL)
 
 
-def _of_named_side(finding: Finding, modes: Container[str] | None = None) -> float:
+def _of_named_side(finding: Finding | FaultInterval, modes: Container[str] | None = None) -> float:
     """Probability that the side that the finding names is faulty, of given modes or any."""
     named = [h for h in finding.hypotheses if h.mode != "healthy" and (modes is None or h.mode in modes)]
     either = finding.side is Side.SENSOR_OR_ACTUATOR

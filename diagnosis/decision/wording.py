@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from diagnosis.decision.severity import MAY_BE_TOTAL, risk_of
 from diagnosis.results.candidates import UNCLEAR, candidates, unclear_words
 from diagnosis.results.document import ActionRow
 from diagnosis.results.fault_rows import mode_words
@@ -65,8 +66,9 @@ def _order(worst: FaultInterval) -> str:
 
 
 def unanswered(fault: FaultInterval) -> bool:
-    """Whether a drive probably does not answer, though that is not certain enough to stop for."""
-    return fault.severity is Severity.MEDIUM and fault.mode.total and fault.side is not Side.SENSOR
+    """Whether a drive may not answer, though that is not certain enough to stop for."""
+    may_be = fault.mode.total or risk_of(fault) >= MAY_BE_TOTAL
+    return fault.severity is Severity.MEDIUM and may_be and fault.side is not Side.SENSOR
 
 
 def _urgency(worst: FaultInterval) -> int:
@@ -137,11 +139,12 @@ def sentence_of(faults: Sequence[FaultInterval], words: MachineWords) -> str:
     """The most urgent three parts in one sentence, in the order of the actions; of a machine to stop those that it is stopped for."""
     parts = _by_part(faults)
     high = [f for f in parts if f[0].severity is Severity.HIGH]
+    which = " to repair" if 0 < len(high) < len(parts) else ""
     parts = high or parts
     said = [f"the {words.part_words(f[0].kind, f[0].component, f[0].side)} was {_summary(f)}" for f in parts[:_NAMED]]
     text = "; ".join(said) if any(len(f) > 1 for f in parts[:_NAMED]) else join_words(said)
     rest = len(parts) - _NAMED
-    more = f"; {count_words(rest, 'more part')} {'is' if rest == 1 else 'are'} listed below" if rest > 0 else ""
+    more = f"; {count_words(rest, 'more part')}{which} {'is' if rest == 1 else 'are'} listed below" if rest > 0 else ""
     return text[0].upper() + text[1:] + more + "."
 
 

@@ -134,7 +134,7 @@ def _cleared(report: ReportDocument) -> list[tuple[str, str]]:
         if f["severity"] != Severity.INFO
         for s in Side(f["side"]).sides
     }
-    named: set[str] = set()
+    named: set[tuple[str, str]] = set()
     for row in verdict["to_clear"]:
         if _OF_A_FAULT.match(row["reason"]):
             continue  # its part is among the faulty ones
@@ -143,10 +143,20 @@ def _cleared(report: ReportDocument) -> list[tuple[str, str]]:
         }
         if not mine:
             return []
-        named |= mine
+        named |= {(c, s) for c in mine for s in _sides_named(row["reason"], c, report)}
     if verdict["status"] == Verdict.NOT_ASSESSED and not named:
         return []
-    return [part for part, s in sides_of(report).items() if s.assessed and part not in faulty and part[0] not in named]
+    return [part for part, s in sides_of(report).items() if s.assessed and part not in faulty and part not in named]
+
+
+def _sides_named(reason: str, component: str, report: ReportDocument) -> tuple[str, ...]:
+    """Sides of a component that an open point is of: one where it begins with that part alone, else both."""
+    head = re.split(r"[(:]", reason.removeprefix("Not judged: "), maxsplit=1)[0]
+    kind = Kind.STEER if component in report["machine"]["axles"] else Kind.WHEEL
+    words = words_of(report["machine"])
+    sides = (Side.SENSOR.value, Side.ACTUATOR.value)
+    mine = tuple(s for s in sides if re.search(rf"\b{re.escape(words.part_name(kind, Side(s)))}\b", head))
+    return mine if mine and " or " not in head else sides
 
 
 def _partly(side: SideCoverage) -> bool:

@@ -53,7 +53,7 @@ const Views = {
         if (kind === "xy") {
           const a = all[0], every = Math.max(1, Math.ceil(a.y.length / Views.MOST)), x = [], y = [];
           for (let k = 0; k < a.y.length; k += every) { x.push(a.y[k]); y.push(d.y[Math.min(d.y.length - 1, Math.max(0, Math.round((a.t + k * a.dt - d.t) / d.dt)))]); }
-          said = every > 1 ? `every ${every}th sample` : "every sample";
+          said = every > 1 ? `1 of ${every} samples` : "every sample";
           traces.push({ ...look, type: "scatter", mode: "markers", marker: { size: 3, color: Figure.colour(s.colour), opacity: 0.6 }, x, y });
         } else {
           const { f, p, segments, length } = Views.welch(d.y, d.dt);

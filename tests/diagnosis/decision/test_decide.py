@@ -57,6 +57,32 @@ def test_verdict_follows_the_worst_fault(part: Finding, expected: str) -> None:
     assert verdict(machine(FR_actuator=assessed(part))).status == expected
 
 
+def test_a_valve_that_is_noisy_or_stuck_does_not_go_out() -> None:
+    rows = (
+        Hypothesis("actuator", "noisy", 0.5),
+        Hypothesis("actuator", "stuck", 0.48),
+        Hypothesis("none", "healthy", 0.02),
+    )
+    shaky = replace(finding(Side.ACTUATOR, FaultMode.NOISY, epsilon=0.4), hypotheses=rows)
+    got = verdict(machine(FR_actuator=assessed(shaky)))
+    assert (got.status, got.cleared, got.not_cleared) == ("watch", False, "the FR drive valve may not answer")
+    assert got.actions[0]["text"].startswith("Before the machine goes out, check the FR drive valve")
+
+
+def test_parts_that_the_sentence_leaves_out_are_those_to_repair_alone() -> None:
+    stuck, weak = (
+        assessed(finding(Side.ACTUATOR, FaultMode.STUCK)),
+        assessed(finding(Side.SENSOR, FaultMode.INEFFICIENT, epsilon=0.2)),
+    )
+    stop = {f"{c}_actuator": stuck for c in ("FR", "FL", "front")}
+    silent = assessed(finding(Side.SENSOR, FaultMode.NO_SIGNAL))
+    all_to_repair = verdict(machine(**stop, FL_sensor=silent))
+    assert all_to_repair.text.endswith("; 1 more part is listed below.")
+    got = verdict(machine(**stop, FL_sensor=silent, FR_sensor=weak))
+    assert got.title == "4 faults to repair, 1 to watch"
+    assert got.text.endswith("; 1 more part to repair is listed below.")
+
+
 def test_a_gain_outside_the_tables_is_told_in_the_sentence() -> None:
     got = verdict(machine(FR_sensor=assessed(finding(Side.SENSOR, FaultMode.OUTSIDE_TABLE, epsilon=-0.9))))
     assert got.text == "The FR speed sensor was outside the tables (1.9 times what it should be) for 8.0 s."

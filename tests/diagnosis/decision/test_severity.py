@@ -124,6 +124,26 @@ def test_the_risk_decides_and_not_the_most_probable_row() -> None:
     assert severity_of(half, 10.0, LIMITS, HYDRAULIC)[0] is Severity.MEDIUM
 
 
+@pytest.mark.parametrize(
+    ("mode", "stuck", "words"),
+    [
+        (FaultMode.INEFFICIENT, 0.44, "It may be stuck or without signal"),
+        (FaultMode.NOISY, 0.48, "It may be stuck or without signal"),
+        (FaultMode.STUCK, 0.6, "Probably stuck or without signal"),
+        (FaultMode.NOISY, 0.1, "This alone is no reason to stop"),
+    ],
+)
+def test_a_valve_that_may_be_stuck_is_never_said_to_be_no_reason_to_stop(
+    mode: FaultMode, stuck: float, words: str
+) -> None:
+    other = FaultMode.INEFFICIENT if mode is FaultMode.STUCK else mode
+    rows = (("actuator", other.value, 0.97 - stuck), ("actuator", "stuck", stuck), ("none", "healthy", 0.03))
+    found = replace(finding(Side.ACTUATOR, mode, epsilon=0.5), hypotheses=tuple(Hypothesis(*row) for row in rows))
+    severity, advice = severity_of(found, 10.0, LIMITS, HYDRAULIC)
+    assert severity is Severity.MEDIUM
+    assert advice.startswith(words)
+
+
 @pytest.mark.parametrize(("p", "seconds", "expected"), [(0.93, 0.4, "info"), (0.995, 0.4, "low"), (0.93, 4.0, "low")])
 def test_brief_noise_that_is_not_certain_is_a_remark(p: float, seconds: float, expected: str) -> None:
     noise = finding(Side.SENSOR, FaultMode.NOISY, p=p, epsilon=0.2)

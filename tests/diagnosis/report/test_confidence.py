@@ -129,6 +129,14 @@ def test_parts_that_were_judged_and_those_that_were_cleared_are_counted_apart() 
     assert judged(samples.report_with(coverage=rows, intervals=[watched], verdict=about)) == (
         "4 of 4 parts judged, 1 cleared"
     )
+    for reason, cleared in (
+        ("Not judged: FL drive valve (its command is not logged).", 2),  # the sensor beside it is not named
+        ("FL speed sensor or drive valve: no single fault explains the residual.", 1),
+    ):
+        about["to_clear"] = [{"reason": reason, "act": "log it"}]
+        assert judged(samples.report_with(coverage=rows, intervals=[watched], verdict=about)) == (
+            f"4 of 4 parts judged, {cleared} cleared"
+        )
     about["to_clear"] = [{"reason": "Several wheels swing together.", "act": "lower the gains"}]
     assert judged(samples.report_with(coverage=rows, intervals=[watched], verdict=about)) == (
         "4 of 4 parts judged, none cleared"

@@ -26,7 +26,7 @@ def level_words(t: TrendRow) -> str:
     """Loss of the last mission, as its report has it, and where the losses go."""
     last = round(t["points"][-1][2], 2) + 0.0  # no negative zero
     far = " far below its limit" if t["direction"] == "rising" and t["forecast"]["state"] == "not_within" else ""
-    return f"ε̂ {last:.2f} in its last mission".replace("-", "−") + (
+    return f"ε̂ {last:.2f} over its whole last mission".replace("-", "−") + (
         f", {t['direction']}{far}" if t["direction"] != "not_known" else ""
     )
 
@@ -63,7 +63,7 @@ def course(t: TrendRow, machines: Sequence[MachineRow], unit: str) -> Context:
         least, most = physical(t)
         level = {k: min(max(line["level"][k], least), most) for k in ("value", "low", "high")}
         notes.append(
-            f"the last mission lost {t['points'][-1][2]:.3f}; the line through all of them is at {level['value']:.3f} now "
+            f"over its whole last mission ε̂ was {t['points'][-1][2]:.3f}; the line through all missions is at {level['value']:.3f} now "
             f"({level['low']:.3f} to {level['high']:.3f}) and changes by {low} to {high} per mission "
             f"({round_to(between)} {unit} apart), 95 %".replace("-", "−")
         )

@@ -136,7 +136,9 @@ def test_a_rise_far_below_its_limit_is_told_as_such_and_the_line_beside_the_last
         )
 
     low = page("low", [0.000, 0.001, 0.002, 0.003, 0.004, 0.006], 0.0005)
-    assert "0.01 in its last mission, rising far below its limit" in low
+    assert "0.01 over its whole last mission, rising far below its limit" in low
     assert "no step, and no limit that comes near" in low
     high = page("high", [0.1, 0.2, 0.3, 0.35, 0.4, 0.45], 0.02)
-    assert re.search(r"The last mission lost 0\.450; the line through all of them is at 0\.\d{3} now", high)
+    assert re.search(
+        r"Over its whole last mission ε̂ was 0\.450; the line through all missions is at 0\.\d{3} now", high
+    )
