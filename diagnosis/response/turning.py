@@ -93,13 +93,20 @@ def unasked_turn(
     if sides is None:
         return False
     part = slice(spell.start, spell.stop)
-    off = {w: (j.wheel.blocks.mean - 0.5 * (j.wheel.blocks.low + j.wheel.blocks.high))[part] for w, j in judged.items()}
+    off = {w: _off(j)[part] for w, j in judged.items()}
     near, far = (
         np.mean([off[w] for w in sides if (sides[w] == sides[wheel]) is same], axis=0) for same in (True, False)
     )
     known = np.isfinite(near) & np.isfinite(far)
     both, apart = (float(np.sum(x[known] ** 2)) for x in (near + far, near - far))
     return bool(known.any()) and both < _OPPOSITE**2 * apart
+
+
+def _off(one: Judged) -> Array:
+    """A wheel's speed less what its command makes of it [m/s], NaN where that says nothing, shape (b,)."""
+    b = one.wheel.blocks
+    known = np.isfinite(b.low) & np.isfinite(b.high)
+    return b.mean - np.where(known, 0.5 * (np.where(known, b.low, 0.0) + np.where(known, b.high, 0.0)), np.nan)
 
 
 def _told_no_turn(judged: Mapping[str, Judged]) -> bool:

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
 from diagnosis.response.assess import assess_response
+from diagnosis.response.kernel import follow
 from diagnosis.results.assessment import Finding
+from replay.faults import FaultMode
 from replay.machine.config import Limits
-from tests.diagnosis.response.robot import DT, TRACK, followers_of, geometry, speeds
+from tests.diagnosis.response.robot import DT, TRACK, WHEELS, commands, followers_of, geometry, speeds
 
 Array = NDArray[np.float64]
 PAIR = ("R", "L")
@@ -52,3 +56,36 @@ def test_a_wheel_that_reads_half_of_its_speed_is_told_beside_the_yaw_rate(wheel:
     measured[wheel] = measured[wheel].copy()
     measured[wheel][SPELL] *= 0.5
     assert {w for w, _ in told(measured, yaw, 3)} == {wheel}
+
+
+def told_without_turns(measured: dict[str, Array], seed: int, wheels: tuple[str, ...]) -> list[tuple[str, Finding]]:
+    """Findings of a log that has the commanded speed alone, neither a commanded nor a measured yaw rate."""
+    _, _, body = speeds(seed, wheels)
+    data = {
+        w: replace(d, commands=d.commands[:, :1], asked=body[:, 0])
+        for w, d in followers_of(measured, dict.fromkeys(wheels, body[:, 0]), body).items()
+    }
+    parts = assess_response(data, geometry(wheels), None, Limits(), DT).parts
+    return [(w, f) for w, sides in parts.items() for side in sides for f in side.findings]
+
+
+def straight(seed: int, wheels: tuple[str, ...]) -> dict[str, Array]:
+    """A robot that goes straight on but for one curve."""
+    rng = np.random.default_rng(seed)
+    v = follow(np.r_[np.zeros(6), commands(seed)[0][:-6]], 0.0, 0.15, 0.08)
+    curve = np.zeros(v.size)
+    curve[SPELL] = 0.2 * np.sin(np.linspace(0.0, np.pi, SPELL.stop - SPELL.start)) * np.sign(v[SPELL])
+    return {w: v + curve * (1.0 if w.endswith("R") else -1.0) + rng.normal(0.0, 0.01, v.size) for w in wheels}
+
+
+@pytest.mark.parametrize("wheels", [PAIR, WHEELS])
+@pytest.mark.parametrize("seed", [3, 8, 11, 12])
+def test_a_curve_that_nothing_in_the_log_tells_is_no_wheels_fault(seed: int, wheels: tuple[str, ...]) -> None:
+    assert told_without_turns(straight(seed, wheels), seed, wheels) == []
+
+
+@pytest.mark.parametrize("seed", [3, 8])
+def test_a_wheel_that_is_dead_is_told_where_turns_are_not(seed: int) -> None:
+    measured = straight(seed, PAIR)
+    measured["R"][SPELL] = 0.0
+    assert {(w, f.mode) for w, f in told_without_turns(measured, seed, PAIR)} == {("R", FaultMode.NO_SIGNAL)}
