@@ -10,8 +10,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.clearing.cells import Array, Cells, Frame
-from diagnosis.clearing.measure import alone, compared, lasts, lowest_passed, off_commands, times, worst
-from diagnosis.clearing.responses import growth, largest_change
+from diagnosis.clearing.measure import alone, compared, lasts, off_commands, times, worst
+from diagnosis.clearing.responses import growth, largest, largest_change
+from diagnosis.clearing.still import (
+    ALIKE,
+    OVERLAP,
+    STILL_S,
+    answered,
+    beyond,
+    commanded_still,
+    dead_bands,
+    rate_of,
+    stands,
+    still_frame,
+)
 from diagnosis.results.clearing import Check, Checked
 from diagnosis.results.vocabulary import Kind
 from replay.faults import Side
@@ -19,25 +31,19 @@ from replay.faults import Side
 Flags = NDArray[np.bool_]
 
 FLOOR_RAD, OPENING = 0.06, 0.03  # deviations are shares of at least this angle and opening
-_STILL_S, _STILL, _ANSWERED = 1.0, 0.015, 0.06  # s, rad/s, and of full opening
-_LAG_S = 0.15  # of a valve and its cylinder: a command that has only just come has moved nothing yet
-#: An axle that creeps: rad/s, of the rate that its opening gives, and of its own rate's size, which noise alone would have.
-_CREEPS, _OBEYS, _STEADY = 0.003, 0.25, 0.5
-_OVERLAP, _ALIKE = 0.18, 1.4  # of full opening: healthy valves open by then; times what another axle needs
-_HYSTERESIS = 0.03  # of full opening: by as much a valve opens later than it closes
-_END, _REACHED = 0.97, 0.5  # of the largest angle: an end stop, where that is as much of the machine's
 _RATE_S = 8.0
-_STEERED = 0.01  # of full opening beyond the dead band: below it, an axle is not steered
 _LEAST_S = 0.5  # of a window, in which it is steered
 _WRONG_WAY = 5.0  # for an axle that turns against its opening
 _UNSURE, _EDGE = 0.02, 0.5  # by how much a dead band is not known: of full opening, and of itself
-_STEPS = 19  # dead bands that are tried
 VALVE = 1.4  # dead band and hysteresis of a healthy valve: its limit, likewise
 #: Limits of the rate in windows and over the mission, as multiples of the loss that counts, by whether angle and opening are measured twice.
 RATE = {False: (2.0, 1.0), True: (3.0, 2.0)}
 _LEAST_WINDOWS = 16  # for a change
 #: Of the loss that counts, and times the other axle's: a change of one axle alone. Dead bands that are not known hide half of one.
 _CHANGED, _ALONE = 0.3, 1.5
+#: Of the loss that counts, and times the other axle's: a deviation of one axle alone in windows. Of 36 healthy tuning missions of nine machines
+#: the axles' largest ones were alike within a factor of 2.6.
+_BRIEF, _BRIEF_ALONE = 0.9, 3.0
 _FEW_S = 2.0  # in which an axle is steered, for its usual rate
 
 
@@ -68,15 +74,14 @@ def axle_checks(cells: Cells, clear_at: float) -> Iterator[Checked]:
         if np.isfinite(command[:, j]).any():
             yield _still(cells, j, limit)
             twice = bool(np.isfinite(second[:, j]).any() and np.isfinite(opening[:, j]).any())
-            brief, long = RATE[twice]
             off = _alone(rates.off, j) if twice else np.abs(rates.off[:, j])
-            deviates = worst(cells, (*about, either, Check.RATE), off[place], brief * share)
+            deviates = worst(cells, (*about, either, Check.RATE), off[place], brief_limit(rates, j, share, twice=twice))
             changed = lasts(cells, (*about, either, Check.RATE), rates.changes[j], changes[j])
             yield deviates if changed.worst is None else max(deviates, changed, key=times)
             if len(cells.machine.axles) > 1:
-                yield lasts(cells, (*about, either, Check.LASTING_RATE), rates.apart[j], long * share)
+                yield lasts(cells, (*about, either, Check.LASTING_RATE), rates.apart[j], RATE[twice][1] * share)
             elif not twice:  # both sides of which are measured twice needs nothing to compare with
-                yield lasts(cells, (*about, either, Check.PLANT_RATE), rates.apart[j], long * share)
+                yield lasts(cells, (*about, either, Check.PLANT_RATE), rates.apart[j], RATE[twice][1] * share)
 
 
 def _alone(off: Array, j: int) -> Array:
@@ -90,27 +95,15 @@ def _alone(off: Array, j: int) -> Array:
     return np.asarray(beside.min(axis=1))
 
 
-def rate_of(angle: Array, dt: float) -> Array:
-    """Steering rates of angles (cells, axles) [rad/s]."""
-    return np.gradient(angle, dt, axis=0) if len(angle) > 1 else np.full(angle.shape, np.nan)
+def brief_limit(rates: Rates, j: int, share: float, *, twice: bool) -> float:
+    """Deviation of an axle's rate in windows that counts [ln]: less of it where the other axle hardly deviates.
 
-
-def answered(cells: Cells) -> float:
-    """Opening from which on an axle must move [1]: more where none does before, for valves overlap and open later than they close.
-
-    What counts is the axle that needs least, by how long it stands still and by what the rates of all show of their overlap.
+    `share` is the loss that counts [ln]; `twice`: both sides of the axle are measured twice.
     """
-    opening = cells.axles("u_applied")
-    used = np.where(np.isfinite(opening), opening, cells.axles("u"))
-    dead = dead_bands(rate_of(cells.axles("phi"), cells.dt), used)
-    least = float(np.nanmin(np.where(np.isfinite(used).any(axis=0), dead, np.nan))) if np.isfinite(used).any() else 0.0
-    return float(min(max(_ANSWERED, _ALIKE * _stands(cells), _ALIKE * least + _HYSTERESIS), _OVERLAP))
-
-
-def _stands(cells: Cells) -> float:
-    """Opening at which even the axle that needs least stands still for a second [1]; 0 where only one is known."""
-    need = [largest for j in range(len(cells.machine.axles)) if np.isfinite(largest := _longest_still(cells, j)[0])]
-    return min(need) if len(need) > 1 else 0.0
+    most = RATE[twice][0] * share
+    if twice:
+        return most
+    return alone([float(x) for x in largest(np.abs(rates.off))], j, most, _BRIEF * share, _BRIEF_ALONE, others=1)
 
 
 def _still(cells: Cells, j: int, limit: float) -> Checked:
@@ -123,54 +116,7 @@ def _still(cells: Cells, j: int, limit: float) -> Checked:
     values = np.where(cells.explained(axle, frame), 0.0, values)
     k = int(np.nanargmax(values))
     start = float(frame.starts[k] * cells.dt)
-    return Checked(*part, float(values[k]), limit, start, start + _STILL_S)
-
-
-def still_frame(cells: Cells) -> Frame:
-    """Windows in which an axle that is commanded must move."""
-    return Frame(cells.size, max(1, round(_STILL_S / cells.dt)), max(1, round(0.3 / cells.dt)))
-
-
-def _longest_still(cells: Cells, j: int) -> tuple[float, float]:
-    """Largest mean command while an axle stands still for a second [1], NaN where nothing is known, and when that begins [s]."""
-    values = commanded_still(cells, j)
-    if not np.isfinite(values).any():
-        return np.nan, 0.0
-    k = int(np.nanargmax(values))
-    return float(values[k]), float(still_frame(cells).starts[k] * cells.dt)
-
-
-def commanded_still(cells: Cells, j: int) -> Array:
-    """Mean command of each window of `still_frame` [1], 0 where the axle moves or is at its end stop, NaN where nothing is known.
-
-    A valve that has closed nearly to its dead band lets an axle creep: that moves, where it goes the way and at least a quarter
-    as fast as such an opening lets it. Shape (windows,).
-    """
-    angle, command, opening = (cells.axles(leaf)[:, j] for leaf in ("phi", "u", "u_applied"))
-    command, frame = np.where(np.isfinite(command), command, opening), still_frame(cells)
-    passed = np.where(np.isfinite(command), lowest_passed(command, cells.dt, _LAG_S), np.nan)
-    mean, at = frame.mean(passed), frame.mean(angle)
-    reached = float(np.max(np.nan_to_num(np.abs(angle)), initial=0.0))
-    stopped = (np.abs(at) >= _END * reached) & (at * mean > 0.0) & (reached >= _REACHED * cells.machine.max_steer)
-    rate = rate_of(angle[:, np.newaxis], cells.dt)[:, 0]
-    size, ahead = frame.rms(rate), frame.mean(rate) * np.sign(mean)
-    creeps = (ahead >= _CREEPS) & (ahead >= _STEADY * size) & (ahead >= _OBEYS * _given(cells, np.abs(mean)))
-    rests = (size < _STILL) & ~stopped & ~creeps
-    return np.asarray(np.where(np.isfinite(mean), np.where(rests, np.abs(mean), 0.0), np.nan))
-
-
-def _given(cells: Cells, opening: Array) -> Array:
-    """Rate that such openings [1] give by the rates of the axle that turns most per opening [rad/s], infinite where none is known."""
-    openings, rate = cells.axles("u_applied"), rate_of(cells.axles("phi"), cells.dt)
-    openings = np.where(np.isfinite(openings), openings, cells.axles("u"))
-    dead = dead_bands(rate, openings)
-    _, ahead, opened = _beyond(rate, openings, np.isfinite(rate) & np.isfinite(openings), dead)
-    power = opened.sum(axis=0)
-    if not power.any():
-        return np.full(opening.shape, np.inf)
-    slope = np.divide(ahead.sum(axis=0), power, out=np.zeros(len(power)), where=power > 0.0)
-    fastest = int(np.argmax(slope))
-    return np.asarray(slope[fastest] * np.maximum(opening - dead[fastest], 0.0))
+    return Checked(*part, float(values[k]), limit, start, start + STILL_S)
 
 
 class Rates(NamedTuple):
@@ -201,29 +147,6 @@ class Rates(NamedTuple):
     changes: list[float | None]
 
 
-def dead_bands(rate: Array, opening: Array) -> Array:
-    """Opening of each axle that moves nothing [1], shape (axles,): of all up to `_OVERLAP` the one whose rates fit best.
-
-    A healthy valve's is like those of the other axles: what one needs more of is a fault's. Rates in rad/s and openings
-    of shape (cells, axles).
-    """
-    tried = np.linspace(0.0, _OVERLAP, _STEPS)
-    found = np.full(rate.shape[1], np.nan)
-    for j, (r, u) in enumerate(zip(rate.T, opening.T, strict=True)):
-        known = np.isfinite(r) & np.isfinite(u) & (u != 0.0)
-        ahead, beyond = r[known] * np.sign(u[known]), np.maximum(np.abs(u[known]) - tried[:, np.newaxis], 0.0)
-        power = (beyond**2).sum(axis=1)
-        if not power.all():
-            continue
-        left = np.abs(ahead - (beyond @ ahead / power)[:, np.newaxis] * beyond).sum(axis=1)
-        found[j] = tried[int(np.argmin(left))]
-    return (
-        np.nan_to_num(np.minimum(found, _ALIKE * np.nanmin(found)))
-        if np.isfinite(found).any()
-        else np.zeros(found.size)
-    )
-
-
 def rates_of(cells: Cells, rate: Array, opening: Array) -> Rates:
     """Steering rates per opening beyond what of it moves nothing, while no fault is stated; arrays (cells, axles)."""
     dead, frame = dead_bands(rate, opening), Frame(cells.size, max(1, round(_RATE_S / cells.dt)), cells.frame.hop)
@@ -231,10 +154,10 @@ def rates_of(cells: Cells, rate: Array, opening: Array) -> Rates:
     for k, axle in enumerate(cells.machine.axles):
         use[:, k] &= np.asarray(~cells.told(axle) | cells.mostly_explained(axle), dtype=np.bool_)
     unsure = np.maximum(_UNSURE, _EDGE * dead)
-    steered, ahead, opened = _beyond(rate, opening, use, dead)
+    steered, ahead, opened = beyond(rate, opening, use, dead)
     # at the edge of a dead band, what of an opening moves something is not known
     enough = frame.sums(opened) >= _EDGE * dead * frame.sums(steered.astype(np.float64))
-    most = np.maximum(dead + unsure, min(_ALIKE * _stands(cells), _OVERLAP))
+    most = np.maximum(dead + unsure, min(ALIKE * stands(cells), OVERLAP))
     off = _nearest([_off(frame, cells.dt, rate, opening, use, tried) for tried in (dead - unsure, dead, most)])
     off = np.where(enough, off, np.nan)
     with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
@@ -267,16 +190,9 @@ def _changes(cells: Cells, frame: Frame, off: Array, j: int) -> float | None:
     )
 
 
-def _beyond(rate: Array, opening: Array, use: Flags, dead: Array) -> tuple[Flags, Array, Array]:
-    """Where axles are steered beyond their dead bands, their rates ahead [rad/s] and the openings beyond [1] there, (cells, axles)."""
-    beyond = np.maximum(np.abs(opening) - np.maximum(dead, 0.0), 0.0)
-    steered = use & (np.nan_to_num(beyond) > _STEERED)
-    return steered, np.where(steered, rate * np.sign(opening), 0.0), np.where(steered, beyond, 0.0)
-
-
 def _off(frame: Frame, dt: float, rate: Array, opening: Array, use: Flags, dead: Array) -> Array:
     """ln of the steering rate per opening beyond such dead bands against its usual one, (windows, axles)."""
-    steered, ahead, opened = _beyond(rate, opening, use, dead)
+    steered, ahead, opened = beyond(rate, opening, use, dead)
     time = frame.sums(steered.astype(np.float64)) * dt
     with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
         log = np.where(time >= _LEAST_S, np.log(np.maximum(frame.sums(ahead) / frame.sums(opened), 1e-3)), np.nan)

@@ -14,6 +14,7 @@ from diagnosis.clearing.alone import Rough, Still, Straight
 from diagnosis.clearing.cells import Array, Cells
 from diagnosis.clearing.measure import as_followed, compared, late
 from diagnosis.clearing.placements import Overlap, Placements, Ratio, Reference
+from diagnosis.clearing.still import answered, rate_of, still_frame
 from diagnosis.results.detectability import Deviation
 from diagnosis.results.vocabulary import Kind
 from replay.faults import Side
@@ -168,10 +169,10 @@ def _wheels(cells: Cells) -> Iterator[Gauges]:
 
 def _axles(cells: Cells) -> Iterator[Gauges]:
     angle, second, command, opening = (cells.axles(leaf) for leaf in ("phi", "phi_true", "u", "u_applied"))
-    clear_at, frame = cells.machine.limits.clear_at, axles.still_frame(cells)
+    clear_at, frame = cells.machine.limits.clear_at, still_frame(cells)
     used, share = np.where(np.isfinite(opening), opening, command), -np.log1p(-clear_at)
     followed = as_followed(cells, opening, command, axles.OPENING)
-    rates, limit = axles.rates_of(cells, axles.rate_of(angle, cells.dt), used), axles.answered(cells)
+    rates, limit = axles.rates_of(cells, rate_of(angle, cells.dt), used), answered(cells)
     path = yaw.off_straight(cells)
     straight = None if path is None else Straight(cells.frame, path, yaw.OFF / yaw.ANSWERED)
     turned = (
@@ -186,7 +187,8 @@ def _axles(cells: Cells) -> Iterator[Gauges]:
         ratio = None
         lasting: dict[Deviation, float] = {}
         if _known(used[:, j]):
-            brief, long = (limit * share for limit in axles.RATE[twice and measured])
+            brief = axles.brief_limit(rates, j, share, twice=twice and measured)
+            long = axles.RATE[twice and measured][1] * share
             off = np.where(cells.explained(name, rates.frame), np.nan, rates.off[:, j])
             ratio = Ratio(
                 rates.frame,

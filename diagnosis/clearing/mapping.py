@@ -10,9 +10,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from diagnosis.clearing.axles import rate_of
 from diagnosis.clearing.cells import Array, Cells
 from diagnosis.clearing.measure import lowest_passed
+from diagnosis.clearing.still import rate_of
 
 _LAG_S = 0.3  # of what follows a command
 _MOVED = 0.3  # of the largest value: less of it says nothing

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from diagnosis.clearing import axles
+from diagnosis.clearing import axles, still
 from diagnosis.clearing.cells import Array, Cells, Frame
 from diagnosis.clearing.measure import compared
 from diagnosis.clearing.responses import responses_of
@@ -92,7 +92,7 @@ _UNTOLD = (
 
 def fault_of_axle(check: Checked, cells: Cells) -> Finding:
     """The fault of an axle that stands still while it is commanded, by that check of a mission."""
-    shown = _Shown(axles.still_frame(cells), axles.commanded_still(cells, cells.machine.axles.index(check.component)))
+    shown = _Shown(still.still_frame(cells), still.commanded_still(cells, cells.machine.axles.index(check.component)))
     start, stop, _, _ = _where(shown, cells)
     assert check.worst is not None
     text = (

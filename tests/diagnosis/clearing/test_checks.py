@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from diagnosis.clearing import yaw
-from diagnosis.clearing.axles import commanded_still, dead_bands
 from diagnosis.clearing.checks import checks_of
 from diagnosis.clearing.measure import off_commands
+from diagnosis.clearing.still import commanded_still, dead_bands
 from diagnosis.clearing.wheels import most_carried, most_creeping
 from diagnosis.results.clearing import Check, Checked
 from diagnosis.results.machine_words import HYDRAULIC
