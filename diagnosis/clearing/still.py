@@ -49,9 +49,9 @@ def dead_bands(rate: Array, opening: Array) -> Array:
 
 def beyond(rate: Array, opening: Array, use: Flags, dead: Array) -> tuple[Flags, Array, Array]:
     """Where axles are steered beyond their dead bands, their rates ahead [rad/s] and the openings beyond [1] there, (cells, axles)."""
-    beyond = np.maximum(np.abs(opening) - np.maximum(dead, 0.0), 0.0)
-    steered = use & (np.nan_to_num(beyond) > _STEERED)
-    return steered, np.where(steered, rate * np.sign(opening), 0.0), np.where(steered, beyond, 0.0)
+    past = np.maximum(np.abs(opening) - np.maximum(dead, 0.0), 0.0)
+    steered = use & (np.nan_to_num(past) > _STEERED)
+    return steered, np.where(steered, rate * np.sign(opening), 0.0), np.where(steered, past, 0.0)
 
 
 def still_frame(cells: Cells) -> Frame:
