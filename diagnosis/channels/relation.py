@@ -28,6 +28,10 @@ _PLAYS = (0.006, 0.012, 0.02, 0.03, 0.045, 0.065)  # of the span
 _BETTER = 0.03  # of the loss, by which a lag or play is believed
 _ROUNDS, _FINE = 5, (0.8, 0.9, 0.95, 1.05, 1.1, 1.25)
 _USUAL, _LARGE = 0.35, 3.0
+_FEW, _OF_FEW = (
+    0.1,
+    4.0,
+)  # quantile of the smallest misfits, and times that: of noise it is a little more than the usual one
 _SIBLINGS, _ALIKE, _SCALES = 3, 0.6, 0.01  # channels of one kind; steps, and share, by which they may differ
 _UNLIKE = 1.6  # times the usual play or lag of valves of one kind
 _LARGEST_SCALE = 0.02  # what differs by more is a loss of effectiveness
@@ -82,10 +86,17 @@ def relations_of_kind(found: Sequence[Relation], dt: float) -> list[Relation]:
     return [r if abs(r.gain - usual) <= _SCALES else r._replace(gain=usual) for r in timed]
 
 
-def valves_of_kind(found: Sequence[Relation]) -> list[Relation]:
-    """Relations of three or more valves of one kind: play and lag that no other has are a fault's, and become the usual ones."""
+def valves_of_kind(found: Sequence[Relation], dt: float) -> list[Relation]:
+    """Relations of three or more valves of one kind: play, lag and scale that no other has are a fault's, and become the usual ones.
+
+    Positions that merely come late are all as late as most of them are. `dt` is a step [s].
+    """
     if len(found) < _SIBLINGS:
         return list(found)
+    if all(r.lag == r.play == 0.0 for r in found):
+        return relations_of_kind(found, dt)
+    scale = float(np.median([r.gain for r in found]))
+    found = [r if abs(r.gain - scale) <= _SCALES else r._replace(gain=scale) for r in found]
     size = np.array([(r.play, r.lag) for r in found])
     usual = np.quantile(size, 0.5, axis=0, method="lower")
     typical = found[int(np.argmin(np.abs(size - usual) @ np.array([1.0, 0.5])))]
@@ -284,9 +295,16 @@ def _gain(places: _Places, relation: Relation, dt: float) -> float:
     x, y, gain = _at(places, relation, dt), places.y, 1.0
     for _ in range(5):
         misfit = np.abs(y - gain * x)
-        good = misfit <= _LARGE * float(np.nanquantile(misfit, _USUAL))
+        good = misfit <= _LARGE * _usual_of(misfit)
         power = float(x[good] @ x[good])
         if power <= 0.0:
             return 1.0
         gain = float(np.clip((x[good] @ y[good]) / power, 1.0 - _LARGEST_SCALE, 1.0 + _LARGEST_SCALE))
     return gain if abs(gain - 1.0) < 0.99 * _LARGEST_SCALE else 1.0
+
+
+def _usual_of(misfit: Array) -> float:
+    """Usual size of a misfit (n,) by its smallest ones: a fault of most places leaves those alone, too."""
+    few = misfit[misfit > 0.0]
+    usual = float(np.nanquantile(misfit, _USUAL))
+    return min(usual, _OF_FEW * float(np.nanquantile(few, _FEW))) if few.size else usual

@@ -75,7 +75,9 @@ def _identified(pairs: dict[Part, Pair], limits: Limits, mission: MissionView) -
         kind = {part: one for part, one in found.items() if part[1] == side}
         usual = usual_of_kind([one.own for one in kind.values()])
         own = [one.relation for one in kind.values()]
-        alike = relations_of_kind(own, mission.timeline.dt) if side == SENSOR else valves_of_kind(own)
+        alike = (
+            relations_of_kind(own, mission.timeline.dt) if side == SENSOR else valves_of_kind(own, mission.timeline.dt)
+        )
         most = most_noise_of_kind([one.model.noise for one in kind.values()])
         for (part, one), relation in zip(kind.items(), alike, strict=True):
             exceeds = usual is not None and one.own.exceeds(usual)

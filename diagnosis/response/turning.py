@@ -84,7 +84,7 @@ def unasked_turn(
         All wheels.
     geometry : Geometry or None
         Says which wheels are on one side.
-    yaw : Array or None
+    yaw : Array or None, shape (n,)
         Measured yaw rate [rad/s].
     """
     if yaw is not None or spell.mode in (FaultMode.STUCK, FaultMode.NOISY) or not _told_no_turn(judged):

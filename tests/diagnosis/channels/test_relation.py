@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from diagnosis.channels.relation import Relation, _loss, relation_of, relations_of_kind
+from diagnosis.channels.relation import Relation, _loss, relation_of, relations_of_kind, valves_of_kind
 
 DT, N = 0.001, 60_000
 Array = np.ndarray
@@ -97,3 +97,21 @@ def test_large_pilot_stages_lag_by_more(lag: float) -> None:
     x = command()
     relation = found(noisy(Relation(lag=lag).expected(x, DT)), x, 1.0)
     assert relation.lag + relation.delay * DT == pytest.approx(lag, rel=0.15)
+
+
+def test_a_loss_for_most_of_a_mission_gives_no_scale() -> None:
+    x = command()
+    y = x.copy()
+    y[x.size // 6 : 5 * x.size // 6] *= 0.64
+    assert found(noisy(y), x, 0.0).gain == pytest.approx(1.0, abs=0.005)
+
+
+def test_what_no_other_valve_has_of_scale_and_delay_is_a_faults() -> None:
+    plain = [Relation(1.0, 0.0, 0.0, gain) for gain in (1.0, 0.998, 1.001)]
+    lost = Relation(0.0, 0.0, 0.0, 0.985)
+    assert valves_of_kind([*plain, lost], DT) == [*plain, Relation(1.0, 0.0, 0.0, 0.999)]
+    slow = [
+        Relation(1.0, lag, 0.02, gain) for lag, gain in ((0.03, 1.0), (0.034, 1.001), (0.026, 0.999), (0.03, 0.985))
+    ]
+    assert valves_of_kind(slow, DT) == [*slow[:3], slow[3]._replace(gain=0.9995)]
+    assert valves_of_kind([lost, plain[0]], DT) == [lost, plain[0]]
