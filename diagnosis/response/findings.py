@@ -117,9 +117,10 @@ def _silent(spell: Spell, wheel: Wheel, first: int, last: int, speed: Array | No
         sensor = min(sensor, 0.5)
         texts.append("Its readings, small as they are, still change: a dead sensor's do not.")
     if 1.0 - EITHER <= sensor <= EITHER:
+        without = "a sharp jump" if wheel.compared else "a sharp jump or another view of this {wheel}"
         texts.append(
-            "Without a sharp jump or another view of this {wheel}, one that stands still and a dead sensor cannot be distinguished; readings "
-            "100 times a second, the position of its joint, or {or_view}the drive's effort would tell them apart."
+            f"Without {without}, a {{wheel}} that stands still and a dead sensor cannot be distinguished; readings 100 times a second, the "
+            f"position of its joint, or {'' if wheel.compared else '{or_view}'}the drive's effort would tell them apart."
         )
     sat = Sat(0.0, 0.0, 0.0, 0.0, "m/s")
     return sensor_finding(

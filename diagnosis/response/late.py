@@ -132,8 +132,8 @@ def _finding(one: Judged, start: int, stop: int, said: tuple[float, float], bloc
     texts = [f"{one.data.name} follows {beside} about {delay:.2g} s late for {(stop - start) * block_s:.1f} s."]
     if not own:
         texts.append(
-            "Readings that are held up and a drive that answers late cannot be distinguished; stamps by the encoder itself, "
-            "{or_view}the drive's effort would tell them apart."
+            "Readings that are held up and a drive that answers late cannot be distinguished; stamps by the encoder itself, or "
+            f"{'' if one.wheel.compared else '{or_view}'}the drive's effort would tell them apart."
         )
     share = _OWN if own else 1.0
     rest = (Hypothesis(Side.ACTUATOR.value, FaultMode.OUTSIDE_TABLE.value, p * (1.0 - share)),) if own else ()
