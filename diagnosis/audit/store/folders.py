@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import atexit
 import ctypes
 import errno
 import os
@@ -26,6 +27,8 @@ _MARK = ".key"
 _TRIES = 100
 _LONG_S = 3600.0  # nobody takes so long from making a folder to locking it
 _AT_FDCWD, _RENAME_EXCHANGE = -100, 2
+#: This process's folders for temporary files that are not removed yet.
+_MADE: set[Path] = set()
 
 
 @dataclass(frozen=True)
@@ -109,6 +112,7 @@ def swept_folder() -> Iterator[Path]:
     """Make a temporary folder that the next audit removes where this process is ended by force."""
     with ExitStack() as ending:
         folder = Path(tempfile.gettempdir()) / f"{_TEMPORARY}{secrets.token_hex(8)}"
+        _MADE.add(folder)
         ending.callback(_remove, folder)  # first: a signal may end this process as soon as the folder is made
         folder.mkdir(0o700)
         held = FileLock(folder / _HELD)
@@ -126,6 +130,15 @@ def _remove(folder: Path) -> None:
             elif path.name != _HELD:
                 _unlink(path)
     shutil.rmtree(folder, ignore_errors=True)
+    if not folder.exists():
+        _MADE.discard(folder)
+
+
+@atexit.register
+def _remove_left() -> None:
+    """Remove what is left because a signal came while it was being removed, or a thread that had not ended wrote once more."""
+    for folder in tuple(_MADE):
+        _remove(folder)
 
 
 def _unlink(path: Path) -> None:

@@ -2,6 +2,8 @@ from __future__ import annotations
 
 import errno
 import os
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -91,3 +93,19 @@ def test_a_file_system_without_locks_is_said_at_once(
             act(tmp_path)
     assert not list((tmp_path / WORKING).glob("*.lock"))
     sweep(tmp_path)
+
+
+def test_a_folder_is_removed_although_a_signal_comes_while_it_is(tmp_path: Path) -> None:
+    call = (
+        "import shutil, sys, threading, time; from diagnosis.audit.store import folders; remove = shutil.rmtree; calls = []\n"
+        "def ended(*args, **kwargs):\n"
+        "    if not calls:\n"
+        "        calls.append(1); sys.exit(3)\n"
+        "    remove(*args, **kwargs)\n"
+        "folders.shutil.rmtree = ended\n"
+        "with folders.swept_folder() as folder:\n"
+        "    (folder / 'log').write_text('')"
+    )
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join(p for p in sys.path if p), "TMPDIR": str(tmp_path)}
+    assert subprocess.run([sys.executable, "-c", call], env=environment, check=False).returncode == 3
+    assert list(tmp_path.iterdir()) == []
