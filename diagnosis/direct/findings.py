@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 import math
-import re
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from diagnosis.channels.sample_status import BLIND, PAIR
 from diagnosis.direct.fault_runs import fault_runs
 from diagnosis.direct.identification import IdentifiedPair
 from diagnosis.direct.isolation import Isolated, estimate_run, isolate
 from diagnosis.direct.onset import refine
-from diagnosis.direct.sentences import BOUNDS, OF_SAT, alike_sentence, sentences
+from diagnosis.direct.same_share import as_beside, as_excess_beside
+from diagnosis.direct.sentences import alike_sentence, sentences
+from diagnosis.direct.stated_mode import least_constant, mode_of
 from diagnosis.direct.timing import timing_explains
 from diagnosis.estimation.fault_models import HEALTHY, INEFFICIENT, STUCK, TOTAL_ROWS, VARYING_ROWS
 from diagnosis.estimation.one_cause import with_one_cause
@@ -30,26 +29,13 @@ from diagnosis.results.vocabulary import Tier
 from replay.faults import FaultMode, Side
 from replay.machine.config import Limits
 
-Flags = NDArray[np.bool_]
-
 _SHORTEST_S = 0.01
 _HOLD_S = 0.1
 _LEAD_S, _TAIL_S, _CHAIN_S = 0.3, 0.1, 0.05
 _SETTLED_LAGS = 5.0  # after a fault a channel returns with its lag
-_CLEAR = 3.0  # times the noise
-_LEFT_S = (
-    0.03  # for which a command must leave the opening of a valve that is said to be stuck there, beside the valve's lag
-)
-_AS_TRUE = 0.03  # of what a sensor measures: as far off may a healthy one be
-_LOST = 0.03  # of the span: as far from its command a healthy valve rests within its dead band
 _HYSTERESIS, _RESTS_S = 0.025, 10.0  # of the span, off a healthy valve's command, for no longer than this
 _MIDDLE, _MOSTLY = 0.04, 0.98  # of the span: about its middle a valve opens nothing; of the time
-_ZERO = 0.01  # of the span: as far apart may two healthy instruments have their zero
-_ALIKE_P = 0.3  # probability of each of two rows that a constant cannot tell
-_ONE_GAIN, _SAME_P = 0.05, 0.95  # of a gain; that a share which is lost elsewhere too is one
 _OPEN_S, _DOUBT, _FAR_OFF = 0.5, 0.05, 0.2  # s; probability of a healthy channel; of the span
-_SLOW = 0.1  # of its mean, by which a reference changes that hardly moves
-_SAME_SHARE = "The same share is lost in another fault of this part that shows it better; the bounds are of both."
 _GROWTH_S = 0.1  # a shorter time of growth is not worth a sentence
 
 
@@ -112,14 +98,16 @@ def find_faults(path: ModePath, found: IdentifiedPair, limits: Limits) -> Faults
                 run.row,
             )
             findings.append(_widened(finding, run, whole, dt, _detected(path, whole, dt, shortest, found.lag)))
-    beside = [_as_beside(f, findings, found) for f in findings]
+    beside = [as_excess_beside(as_beside(f, findings, found), findings, found) for f in findings]
     measured = _measured(found, limits)
     return FaultsFound(with_one_cause(with_spikes(beside, measured), measured), timing, below)
 
 
 def _left_open(run: Run, found: IdentifiedPair, limits: Limits) -> bool:
     """Whether a run that is no finding is nothing healthy either: it lasts, is far off its reference, and is by no means a healthy channel."""
-    if (run.stop - run.start) * found.pair.dt < _OPEN_S or (seen := isolate(run, found, _least(found, limits))) is None:
+    if (run.stop - run.start) * found.pair.dt < _OPEN_S or (
+        seen := isolate(run, found, least_constant(found, limits))
+    ) is None:
         return False
     return float(seen.p[HEALTHY]) < _DOUBT and seen.seen.deviation > _FAR_OFF * found.pair.span
 
@@ -128,20 +116,17 @@ def _measured(found: IdentifiedPair, limits: Limits) -> Measured:
     """The pair as one cause is looked for in it."""
     pair, (y, x, status, *_) = found.pair, found.samples
     use = np.isin(status, (PAIR, BLIND))
-    return Measured(y, x, use, pair.dt, (pair.y_name, pair.x_name), pair.unit, found.model.noise, _least(found, limits))
-
-
-def _least(found: IdentifiedPair, limits: Limits) -> float:
-    """Smallest constant that counts [unit of y]."""
-    return limits.min_sat if found.pair.side is Side.SENSOR else limits.min_opening * found.pair.span
+    return Measured(
+        y, x, use, pair.dt, (pair.y_name, pair.x_name), pair.unit, found.model.noise, least_constant(found, limits)
+    )
 
 
 def finding_of(run: Run, found: IdentifiedPair, limits: Limits) -> Finding | None:
     """A run as a finding; None where it lies below the limits or the evidence is thin."""
-    isolated = isolate(run, found, _least(found, limits))
+    isolated = isolate(run, found, least_constant(found, limits))
     if isolated is None:
         return None
-    mode = _mode_of(isolated, found, limits)
+    mode = mode_of(isolated, found, limits)
     if mode is None:
         return None
     pair, run, p = found.pair, isolated.run, isolated.p
@@ -150,6 +135,10 @@ def finding_of(run: Run, found: IdentifiedPair, limits: Limits) -> Finding | Non
     ahead = [r for r in codes_of(pair.side) if r != HEALTHY and p[r] >= p[run.row]]
     p[ahead] = p[ahead].mean()  # what other rows explain as well is called by none of them more surely
     epsilon, sat, _ = isolated.estimate
+    outside = run.row in VARYING_ROWS and mode is FaultMode.OUTSIDE_TABLE
+    within = (
+        1.0 - epsilon.exceeds_table(limits.min_epsilon) if epsilon is not None and outside else 0.0
+    )  # a noisy one whose gain no row has
     if epsilon is not None and mode is not FaultMode.OUTSIDE_TABLE:
         epsilon = epsilon.as_share()
     lines = sentences(isolated, found, mode, epsilon)
@@ -163,9 +152,11 @@ def finding_of(run: Run, found: IdentifiedPair, limits: Limits) -> Finding | Non
         lines += (alike_sentence(found),)
     shift = max(0, round(found.lag)) if pair.side is Side.ACTUATOR else 0
     named = {run.row: mode.value}  # a gain beyond the table has the probability of the row that it was found by
+    noisy = [Hypothesis(pair.side.value, ROWS[run.row].value, within * float(p[run.row]))] if outside else []
+    p[run.row] *= 1.0 - within
     hypotheses = [
         Hypothesis(pair.side.value, named.get(row, ROWS[row].value), float(p[row])) for row in codes_of(pair.side)
-    ]
+    ] + noisy
     return Finding(
         start=max(0, run.start - shift),
         stop=max(1, run.stop - shift),
@@ -191,108 +182,12 @@ def _hysteresis(isolated: Isolated, found: IdentifiedPair) -> bool:
     return rests or (brief and seen.deviation < _HYSTERESIS * pair.span)
 
 
-def _as_beside(finding: Finding, all_of_them: Sequence[Finding], found: IdentifiedPair) -> Finding:
-    """A share of a constant, or one of which little else is left, as what it is where the channel moved: the same loss of gain.
-
-    A part that sticks does not stick at just that share of its command, and noise does not leave it.
-    """
-    p = {h.mode: h.p for h in finding.hypotheses}
-    size, likely = finding.epsilon, p.get(FaultMode.INEFFICIENT, 0.0)
-    if size is None:
-        return finding
-    lost = size.low if finding.mode is FaultMode.STUCK else size.value
-    still = (
-        finding.mode in (FaultMode.STUCK, FaultMode.INEFFICIENT)
-        and likely == p.get(FaultMode.STUCK, 0.0)
-        and likely >= _ALIKE_P
-    )
-    calm = finding.mode.varying and finding.sat is not None and finding.sat.rms * lost <= _LOST * found.pair.span
-    share = _share_of_slow(finding, found) if finding.mode is FaultMode.STUCK and not still else None
-    lost = lost if share is None else 1.0 - share
-    beside = (f.epsilon for f in all_of_them if f.mode is FaultMode.INEFFICIENT and f.probability > 2 * _ALIKE_P)
-    if not (still or calm or share is not None) or not any(
-        e is not None and abs(e.value - lost) <= _ONE_GAIN for e in beside
-    ):
-        return finding
-    both = 2 * likely if still else likely + p[finding.mode]
-    p |= {FaultMode.STUCK if still else finding.mode: (1.0 - _SAME_P) * both, FaultMode.INEFFICIENT: _SAME_P * both}
-    bounds = f"(95 %: {1 - lost - _ONE_GAIN:.3f} to {1 - lost + _ONE_GAIN:.3f})"
-    said = (e for e in finding.evidence if OF_SAT not in e)
-    return replace(
-        finding,
-        mode=FaultMode.INEFFICIENT,
-        probability=p[FaultMode.INEFFICIENT],
-        hypotheses=tuple(sorted((replace(h, p=p[h.mode]) for h in finding.hypotheses), key=lambda h: -h.p)),
-        epsilon=Epsilon(lost, lost - _ONE_GAIN, lost + _ONE_GAIN),
-        sat=None,
-        evidence=(*(re.sub(BOUNDS, bounds, e) for e in said), _SAME_SHARE),
-    )
-
-
-def _share_of_slow(finding: Finding, found: IdentifiedPair) -> float | None:
-    """What a value is of a reference that moves by little meanwhile [1]; None where it is no share of it."""
-    y, x, status, *_ = found.samples.part(finding.start, finding.stop)
-    y, x = y[status == PAIR], x[status == PAIR]
-    middle = float(np.mean(x)) if x.size else 0.0
-    if middle == 0.0 or float(np.std(x)) > _SLOW * abs(middle):
-        return None
-    share = float(np.mean(y)) / middle
-    return share if 0.0 < share < 1.0 else None
-
-
 def _left_share(isolated: Isolated) -> float | None:
     """What a constant value is of a reference that hardly moves [1]; None where it is no share of it."""
     seen = isolated.seen
     x, y = (float(np.mean(c[seen.use])) if seen.use.any() else 0.0 for c in (seen.x, seen.y))
     share = y / x if x != 0.0 else np.inf
     return share if 0.0 <= share <= 1.0 else None
-
-
-def _mode_of(isolated: Isolated, found: IdentifiedPair, limits: Limits) -> FaultMode | None:
-    """Mode of an isolated run; None where it lies below the limits or may be noise."""
-    seen, noise = isolated.seen, isolated.seen.noise
-    mode = FaultMode(ROWS[isolated.run.row])
-    if mode.scaled:
-        return _mode_of_gain(isolated, noise, found, limits)
-    if mode.varying:
-        counts = limits.min_sat / 2 if found.pair.side is Side.SENSOR else _least(found, limits)
-        least = max(2.5 * found.model.noise, 1.5 * noise, counts)
-        return None if seen.deviation < least else mode
-    # a reference that hardly moves is as constant
-    away = np.count_nonzero(np.abs(seen.y - seen.x)[seen.use] > _CLEAR * noise) * found.pair.dt
-    if found.pair.side is Side.ACTUATOR:
-        relation = found.relation
-        returns = _LEFT_S + 2.0 * (relation.lag + max(0.0, relation.delay * found.pair.dt))
-        # a relation found in the mission is no truer than half a saturation term
-        least = max(_CLEAR * noise, _LOST * found.pair.span, limits.min_sat / 2)
-        return None if seen.deviation < least or away < returns else mode
-    # what leaves its place for a sample now and then, as a noisy reference does at rest, moves nothing
-    lasts = _longest(np.abs(seen.y - seen.x)[seen.use] > _CLEAR * noise) * found.pair.dt
-    if np.isfinite(seen.y).any() and lasts < min(_LEFT_S, 0.5 * isolated.run.size * found.pair.dt):
-        return None
-    known = seen.x[seen.use]
-    if seen.deviation < _AS_TRUE * (float(np.sqrt(np.mean(known**2))) if known.size else 0.0):
-        return None
-    at_rest = known.size and max(seen.deviation, float(np.max(np.abs(known)))) < limits.min_sat / 2
-    return None if at_rest else mode  # it repeats what it had, which is true
-
-
-def _longest(there: Flags) -> int:
-    """Length of the longest stretch."""
-    edge = np.flatnonzero(np.diff(np.r_[False, there, False].astype(np.int8)))
-    return int(np.max(edge[1::2] - edge[::2], initial=0))
-
-
-def _mode_of_gain(isolated: Isolated, noise: float, found: IdentifiedPair, limits: Limits) -> FaultMode | None:
-    """Inefficient, or outside the table where the gain is; None where ε is too small or nothing moves."""
-    epsilon, _, delta = isolated.estimate
-    outside = delta > 1.0 + limits.min_epsilon or delta < -limits.min_epsilon
-    if not outside and epsilon is not None and epsilon.value < limits.min_epsilon:
-        return None
-    reference = isolated.seen.x[isolated.seen.use]
-    if abs(1.0 - delta) * math.sqrt(float((reference**2).mean())) < max(0.5 * noise, _ZERO * found.pair.span):
-        return None  # what is lost of hardly anything is the reference's own noise, or where both have their zero
-    return FaultMode.OUTSIDE_TABLE if outside else FaultMode.INEFFICIENT
 
 
 def _refined(run: Run, found: IdentifiedPair, between: tuple[int, int]) -> Run:

@@ -106,7 +106,7 @@ def _held(t: Array, y: Array) -> float:
 def _jumps(t: Array, y: Array, quickest: float) -> Jumps:
     usual, held = float(np.median(np.diff(t))), _held(t, y)
     apart = READINGS if usual <= _FINE_S else _COARSE_READINGS
-    if y.size < apart + 4 or held > max(_FINE_S, _BEYOND * usual):
+    if y.size < apart + 4 or held > max(_COARSE_S, _BEYOND * usual):
         return Jumps(np.zeros(0), np.zeros(0), np.zeros(0))
     a, b, c = y[:-2], y[1:-1], y[2:]
     middle = np.maximum(np.minimum(a, b), np.minimum(np.maximum(a, b), c))

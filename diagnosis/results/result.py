@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from itertools import pairwise
@@ -39,6 +40,13 @@ class Epsilon:
             self.value,
             self.value - float(np.hypot(self.value - self.low, more)),
             self.value + float(np.hypot(self.high - self.value, more)),
+        )
+
+    def exceeds_table(self, least: float) -> float:
+        """Probability that a gain is more than 1 by more than `least` [1], which no row of the tables has."""
+        std = (self.high - self.low) / (2.0 * _TWO_SIDED)
+        return (
+            0.5 * math.erfc((self.value + least) / (math.sqrt(2.0) * std)) if std > 0.0 else float(self.value < -least)
         )
 
     def row(self) -> EpsilonRow:

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from diagnosis.direct.findings import _as_beside
+from diagnosis.direct.same_share import as_beside
 from diagnosis.results.assessment import Finding
 from diagnosis.results.result import Epsilon, Hypothesis, Sat
 from diagnosis.results.vocabulary import Tier
@@ -41,10 +41,10 @@ def loss(mode: FaultMode, epsilon: Epsilon, p: float, other: float = 0.0) -> Fin
 def test_the_sentence_states_the_bounds_of_the_table() -> None:
     vague = loss(FaultMode.NOISY, Epsilon(0.45, 0.15, 0.75), 0.6, 0.3)
     sharp = loss(FaultMode.INEFFICIENT, Epsilon(0.46, 0.45, 0.47), 0.95)
-    found = _as_beside(vague, [vague, sharp], PAIR)
+    found = as_beside(vague, [vague, sharp], PAIR)
     assert found.mode is FaultMode.INEFFICIENT
     assert found.epsilon is not None
     assert (found.epsilon.low, found.epsilon.high) == pytest.approx((0.40, 0.50))
     assert found.evidence[0] == "y followed 0.550 × u (95 %: 0.500 to 0.600) over 4 s."
     assert not any("ε̂ × sat" in e for e in found.evidence)
-    assert _as_beside(replace(vague, epsilon=Epsilon(0.8, 0.7, 0.9)), [vague, sharp], PAIR).mode is FaultMode.NOISY
+    assert as_beside(replace(vague, epsilon=Epsilon(0.8, 0.7, 0.9)), [vague, sharp], PAIR).mode is FaultMode.NOISY

@@ -1,0 +1,79 @@
+"""The mode that an isolated run is stated with, or none: what lies below the limits, or what no row of the tables has."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from diagnosis.direct.identification import IdentifiedPair
+from diagnosis.direct.isolation import Isolated
+from diagnosis.results.fault_rows import ROWS
+from replay.faults import FaultMode, Side
+from replay.machine.config import Limits
+
+Flags = NDArray[np.bool_]
+
+_CLEAR = 3.0  # times the noise
+_LEFT_S = (
+    0.03  # for which a command must leave the opening of a valve that is said to be stuck there, beside the valve's lag
+)
+_AS_TRUE = 0.03  # of what a sensor measures: as far off may a healthy one be
+_LOST = 0.03  # of the span: as far from its command a healthy valve rests within its dead band
+_ZERO = 0.01  # of the span: as far apart may two healthy instruments have their zero
+_MOST_PROBABLY = 0.75  # that a gain is more than any row has
+
+
+def mode_of(isolated: Isolated, found: IdentifiedPair, limits: Limits) -> FaultMode | None:
+    """Mode of an isolated run; None where it lies below the limits or may be noise."""
+    seen, noise = isolated.seen, isolated.seen.noise
+    mode = FaultMode(ROWS[isolated.run.row])
+    if mode.scaled:
+        return _mode_of_gain(isolated, noise, found, limits)
+    if mode.varying:
+        counts = limits.min_sat / 2 if found.pair.side is Side.SENSOR else least_constant(found, limits)
+        least = max(2.5 * found.model.noise, 1.5 * noise, counts)
+        epsilon = isolated.estimate[0]
+        outside = epsilon is not None and epsilon.exceeds_table(limits.min_epsilon) > _MOST_PROBABLY
+        return None if seen.deviation < least else FaultMode.OUTSIDE_TABLE if outside else mode
+    # a reference that hardly moves is as constant
+    away = np.count_nonzero(np.abs(seen.y - seen.x)[seen.use] > _CLEAR * noise) * found.pair.dt
+    if found.pair.side is Side.ACTUATOR:
+        relation = found.relation
+        returns = _LEFT_S + 2.0 * (relation.lag + max(0.0, relation.delay * found.pair.dt))
+        # a relation found in the mission is no truer than half a saturation term
+        least = max(_CLEAR * noise, _LOST * found.pair.span, limits.min_sat / 2)
+        return None if seen.deviation < least or away < returns else mode
+    # what leaves its place for a sample now and then, as a noisy reference does at rest, moves nothing
+    lasts = _longest(np.abs(seen.y - seen.x)[seen.use] > _CLEAR * noise) * found.pair.dt
+    if np.isfinite(seen.y).any() and lasts < min(_LEFT_S, 0.5 * isolated.run.size * found.pair.dt):
+        return None
+    known = seen.x[seen.use]
+    if seen.deviation < _AS_TRUE * (float(np.sqrt(np.mean(known**2))) if known.size else 0.0):
+        return None
+    at_rest = known.size and max(seen.deviation, float(np.max(np.abs(known)))) < limits.min_sat / 2
+    return None if at_rest else mode  # it repeats what it had, which is true
+
+
+def least_constant(found: IdentifiedPair, limits: Limits) -> float:
+    """Smallest constant that counts [unit of y]."""
+    return limits.min_sat if found.pair.side is Side.SENSOR else limits.min_opening * found.pair.span
+
+
+def _mode_of_gain(isolated: Isolated, noise: float, found: IdentifiedPair, limits: Limits) -> FaultMode | None:
+    """Inefficient, or outside the table where the gain is; None where ε is too small or nothing moves."""
+    epsilon, _, delta = isolated.estimate
+    outside = delta > 1.0 + limits.min_epsilon or delta < -limits.min_epsilon
+    if not outside and epsilon is not None and epsilon.value < limits.min_epsilon:
+        return None
+    reference = isolated.seen.x[isolated.seen.use]
+    if abs(1.0 - delta) * math.sqrt(float((reference**2).mean())) < max(0.5 * noise, _ZERO * found.pair.span):
+        return None  # what is lost of hardly anything is the reference's own noise, or where both have their zero
+    return FaultMode.OUTSIDE_TABLE if outside else FaultMode.INEFFICIENT
+
+
+def _longest(there: Flags) -> int:
+    """Length of the longest stretch."""
+    edge = np.flatnonzero(np.diff(np.r_[False, there, False].astype(np.int8)))
+    return int(np.max(edge[1::2] - edge[::2], initial=0))
