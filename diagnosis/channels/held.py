@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from diagnosis.channels.habit import Habit
 from diagnosis.channels.sample_status import PAIR, SKIP
+from replay.arrays.numeric import bridged
 
 Array = NDArray[np.float64]
 
@@ -33,7 +34,7 @@ class Held(NamedTuple):
 
 
 def held_reference(x: Array, habit: Habit, dt: float) -> Held:
-    """A reference as a channel of some habit sees it; without one it is the reference itself.
+    """A reference as a channel of some habit sees it; without one it is the reference itself. A gap of it is bridged.
 
     Parameters
     ----------
@@ -47,13 +48,12 @@ def held_reference(x: Array, habit: Habit, dt: float) -> Held:
     out = Held(np.empty(x.size), np.empty(x.size))
     if not habit.stepwise:
         return Held(x, np.zeros(x.size))
-    known = np.isfinite(x)
-    filled = np.where(known, x, 0.0)
+    filled = bridged(x)
     total = np.concatenate(([0.0], np.cumsum(filled)))
     travel = np.concatenate(([0.0], np.cumsum(np.abs(filled) * dt)))
     window, timeout = (max(1, round(s / dt)) for s in (habit.window, habit.timeout))
     _scan(filled, total, travel, habit.travel, window, timeout, out)
-    out.mean[~known] = np.nan
+    out.mean[~np.isfinite(x)] = np.nan
     return out
 
 

@@ -15,6 +15,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from diagnosis.channels.noise import shifted
+from replay.arrays.numeric import bridged
 
 Array = NDArray[np.float64]
 
@@ -104,20 +105,18 @@ def valves_of_kind(found: Sequence[Relation], dt: float) -> list[Relation]:
 
 
 class _Filled(NamedTuple):
-    """A reference with 0 where it is not known."""
+    """A reference whose gaps are bridged, so that nothing settles after one."""
 
     x: Array
-    known: NDArray[np.bool_]
     unknown: NDArray[np.bool_]
 
     @classmethod
     def of(cls, x: Array) -> _Filled:
-        known = np.isfinite(x)
-        return cls(np.where(known, x, 0.0), known, ~known)
+        return cls(bridged(x), ~np.isfinite(x))
 
     def followed(self, play: float, lag: float, dt: float) -> Array:
         out = np.empty(self.x.size)
-        _follow(self.x, self.known, 0.5 * play, float(np.exp(-dt / lag)) if lag > 0.0 else 0.0, out)
+        _follow(self.x, 0.5 * play, float(np.exp(-dt / lag)) if lag > 0.0 else 0.0, out)
         out[self.unknown] = np.nan
         return out
 
@@ -127,17 +126,13 @@ def _followed(x: Array, play: float, lag: float, dt: float) -> Array:
 
 
 @njit(cache=True, nogil=True)
-def _follow(x, known, half, keep, out):  # type: ignore[no-untyped-def]
-    """Play of ± half, then a lag that keeps a share of the last value; held where x is not known."""
-    first = 0
-    while first < x.size - 1 and not known[first]:
-        first += 1
-    held = x[first] if x.size else 0.0
+def _follow(x, half, keep, out):  # type: ignore[no-untyped-def]
+    """Play of ± half, then a lag that keeps a share of the last value."""
+    held = x[0] if x.size else 0.0
     y = held
     for k in range(x.size):
-        if known[k]:
-            held = min(max(held, x[k] - half), x[k] + half)
-            y = keep * y + (1.0 - keep) * held
+        held = min(max(held, x[k] - half), x[k] + half)
+        y = keep * y + (1.0 - keep) * held
         out[k] = y
 
 

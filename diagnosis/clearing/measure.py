@@ -23,9 +23,9 @@ _LOSSES = (Check.RESPONSE, Check.LASTING_RESPONSE, Check.CHANGE, Check.RATE, Che
 
 
 def lowest_passed(x: Array, dt: float, lag_s: float) -> Array:
-    """Columns behind a lag of first order, shape as x; gaps count as 0. In the unit of x; `dt` and `lag_s` in s."""
+    """Columns behind a lag of first order, shape as x; gaps are bridged. In the unit of x; `dt` and `lag_s` in s."""
     columns = x[:, np.newaxis] if x.ndim == 1 else x
-    passed = [low_passed(np.append(np.nan_to_num(column), 0.0), lag_s, dt)[1:] for column in columns.T]
+    passed = [low_passed(np.append(column, 0.0), lag_s, dt)[1:] for column in columns.T]
     return np.column_stack(passed).reshape(x.shape)
 
 

@@ -6,13 +6,13 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from replay.arrays.numeric import without_nan
+from replay.arrays.numeric import bridged
 
 Array = NDArray[np.float64]
 
 
 def low_passed(u: Array, tau: float, dt: float) -> Array:
-    """Response of a first-order lag of tau [s], 0 for none, to u held over each step; NaN counts as 0.
+    """Response of a first-order lag of tau [s], 0 for none, to u held over each step; gaps are bridged.
 
     Both of shape (n,).
     """
@@ -25,7 +25,7 @@ def low_passed_on(u: Array, tau: float, dt: float, state: float | None) -> tuple
     Both of shape (k,), in the unit of u; times in s.
     """
     a = np.exp(-dt / tau) if tau > 0 else 0.0
-    filled = without_nan(u)
+    filled = bridged(u)
     out = np.empty(u.size)
     last = _scan_lag(filled, a, float(filled[0]) if state is None else state, out)
     return out, float(last)

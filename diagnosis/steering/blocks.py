@@ -15,7 +15,7 @@ from diagnosis.steering.filter_state import Redundancy
 from replay.arrays.blocks import blocks as cut
 from replay.arrays.blocks import release
 from replay.arrays.column_store import ColumnStore
-from replay.arrays.numeric import without_nan
+from replay.arrays.numeric import bridged
 from replay.machine.config import Noise
 
 Array = NDArray[np.float64]
@@ -162,7 +162,7 @@ def blocks_of(
         unknown = np.add.reduceat((~np.isfinite(u[part])).astype(np.float64), starts)
         blind = unknown > 0.5 * np.diff(np.append(starts, near.size))
         parts.append((mean, np.add.reduceat(power, starts) / np.maximum(count, 1.0), count, status, blind))
-        opening.append(without_nan(u[part]))
+        opening.append(bridged(u[part]))
         release(y, u)
     mean, power, count, status, blind = (np.concatenate(x) for x in zip(*parts, strict=True))
     raw_u, redundancy = opening.finish(), Redundancy.nothing(mean.size)

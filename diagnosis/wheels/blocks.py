@@ -17,7 +17,7 @@ from diagnosis.channels.sample_status import PAIR, SILENT, SKIP
 from diagnosis.wheels.valve_map import effective
 from replay.arrays.blocks import block_means, framed, release
 from replay.arrays.column_store import ColumnStore
-from replay.arrays.numeric import without_nan
+from replay.arrays.numeric import bridged
 from replay.machine.config import WheelPlant
 
 Array = NDArray[np.float64]
@@ -220,7 +220,7 @@ def _effective(
     opening, more, held = np.zeros(u.shape), np.zeros(u.shape), list(spools)
     for i, plant in enumerate(plants):
         if plant is None:
-            opening[:, i] = without_nan(u[:, i])
+            opening[:, i] = bridged(u[:, i])
         else:
             opening[:, i], more[:, i], held[i] = effective(u[:, i], plant, held[i])
             opening[:, i] += more[:, i]

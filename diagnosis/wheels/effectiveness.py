@@ -57,7 +57,7 @@ def relative_losses(
         return [None] * wheels
     width = max(1, round(_STEP_S / dt))
     y, u, ratio, use = (_means(x, width) for x in (y, u, ratio, usable[:, None].astype(np.float64)))
-    fed = np.column_stack([low_passed(np.nan_to_num(x), tau, dt * width) for x in u.T])
+    fed = np.column_stack([low_passed(x, tau, dt * width) for x in u.T])
     good = (use[:, 0] == 1.0) & np.isfinite(y).all(axis=1) & (np.abs(np.nan_to_num(u, nan=1.0)) < _OPEN).all(axis=1)
     good &= (np.abs(y) > least).all(axis=1) & (np.abs(np.sign(y).sum(axis=1)) == wheels)
     length = max(1, round(_WINDOW_S / (dt * width)))

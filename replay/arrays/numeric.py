@@ -42,3 +42,15 @@ def uncounted(_: Any, value: Any) -> Any:
         return bare(context, builder, signature.return_type, arguments[0])
 
     return value(value), generate
+
+
+def bridged(x: NDArray[np.float64]) -> NDArray[np.float64]:
+    """x with what is not known put between its neighbours, and as the nearest one at both ends; 0 where nothing is known.
+
+    Both of shape (n,), in one unit.
+    """
+    known = np.isfinite(x)
+    if known.all():
+        return x
+    at = np.flatnonzero(known)
+    return np.interp(np.arange(x.size), at, x[at]) if at.size else np.zeros(x.size)
