@@ -44,6 +44,7 @@ _MARKED, _MOSTLY = 0.5, 0.9
 _RESTLESS = 5.0
 _STEADILY, _EVEN = 1.6, 1.8  # ... and where they add little: root mean square, times what is usual
 _BEYOND = 3.0  # times the noise: a deviation that a cause is looked for
+_OWN = 1.5  # times the noise: less than that nobody sees
 
 
 def with_one_cause(findings: Sequence[Finding], measured: Measured) -> list[Finding]:
@@ -104,6 +105,12 @@ def _cause_of(near: Sequence[Finding], measured: Measured) -> Cause | None:
     part = slice(big[0], big[-1] + 1) if big.size else slice(0, 0)
     cause = _explanation(y, x, at, measured)
     if cause is not None and (cause.alone or all(f.mode.varying for f in near)):
+        k = _lasting(big, at, measured)
+        early = (at[k] - at[0]) * measured.dt >= _EARLY_S
+        if early and cause.epsilon is not None and _nothing_asked(cause, x[:k], measured):
+            shown = _explanation(y[k:], x[k:], at[k:], measured)  # what rests before it speaks for no loss
+            same = shown is None or (shown.alone and shown.mode is cause.mode)
+            return cause if same or shown is None else replace(shown, start=int(at[k]))
         return _from_where_it_shows(cause, y - x, x, at, int(big[0]) if big.size else 0, measured)
     if not least <= at[part].size < _MOSTLY * at.size:
         return None
@@ -116,6 +123,20 @@ def _rests(y: Array, piece: NDArray[np.intp], measured: Measured) -> bool:
     number = np.maximum(np.bincount(piece), 1)
     mean = np.bincount(piece, weights=y) / number
     return every_power(y - mean[piece], measured) <= measured.noise**2
+
+
+def _nothing_asked(cause: Cause, x: Array, measured: Measured) -> bool:
+    """Whether a loss would not have shown beside a reference, for want of motion."""
+    assert cause.epsilon is not None
+    return x.size > 0 and float(np.median(np.abs(cause.epsilon.value * x))) <= _OWN * measured.noise
+
+
+def _lasting(big: NDArray[np.intp], at: NDArray[np.intp], measured: Measured) -> int:
+    """Place of the first of the large deviations that no move of a moment makes; 0 without one."""
+    ahead = np.searchsorted(at[big], at[big] + _EARLY_S / measured.dt) - np.arange(big.size)
+    there = np.searchsorted(at, at[big] + _EARLY_S / measured.dt) - big
+    lasts = big[2 * ahead > there]
+    return int(lasts[0]) if lasts.size else 0
 
 
 def _from_where_it_shows(cause: Cause, off: Array, x: Array, at: NDArray[np.intp], k: int, measured: Measured) -> Cause:

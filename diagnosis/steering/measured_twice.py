@@ -19,7 +19,8 @@ from replay.machine.quantities import OPENING
 
 Array = NDArray[np.float64]
 
-_NORMAL = 1.4826  # standard deviations per median of what is off
+# lower quarter of what is off, which a fault that grows before it is found leaves alone, and standard deviations per that
+_LOWER, _NORMAL = 0.25, 3.138
 _AT_REST = 0.5  # probability that a valve does not answer a command which stays
 _STEADY = 0.25  # of its mean, by which such a command varies
 _CONSTANT = "The command hardly moved meanwhile: a {valve} that is off by a constant would look the same."
@@ -48,7 +49,7 @@ def of_one_cause(side: Side, found: SideFindings, inputs: AxleInputs, min_sat: f
     sound = use.copy()
     for f in found.findings:
         sound[f.start : f.stop] = False
-    usual = float(np.median(np.abs(y - x)[sound])) if sound.any() else 0.0
+    usual = float(np.quantile(np.abs(y - x)[sound], _LOWER)) if sound.any() else 0.0
     names = (inputs.channel(leaves[0]), inputs.channel(leaves[1]))
     unit = "rad" if sensor else OPENING
     noise = min(_NORMAL * usual, MOST_APART)

@@ -122,3 +122,13 @@ def test_poles_that_come_faster_than_the_samples_show_where_the_wheel_is_slow(ev
 def test_a_sampled_sensor_has_no_poles_at_any_rate(every: int) -> None:
     y = np.round((speed() + 0.003 * np.random.default_rng(0).normal(size=N))[::every] / 0.0015) * 0.0015
     assert not identify_habit(y, np.ones(y.size, dtype=np.bool_), every * DT).stepwise
+
+
+def test_a_gap_of_the_reference_is_no_standstill() -> None:
+    x = speed() + 1.0
+    known = x.copy()
+    known[4000:4020] = np.nan
+    window = Habit(0.01, 0.0, 0.01, stepwise=True)
+    whole, held = held_reference(x, window, DT).mean, held_reference(known, window, DT).mean
+    assert np.isnan(held[4000:4020]).all()
+    assert held[4020:4040] == pytest.approx(whole[4020:4040], abs=0.02)

@@ -116,3 +116,13 @@ def test_what_no_other_valve_has_of_scale_and_delay_is_a_faults() -> None:
     ]
     assert valves_of_kind(slow, DT) == [*slow[:3], slow[3]._replace(gain=0.9995)]
     assert valves_of_kind([lost, plain[0]], DT) == [lost, plain[0]]
+
+
+def test_nothing_settles_after_a_gap_of_the_reference() -> None:
+    x = 1.0 + 0.1 * np.sin(np.arange(2000) * 0.005)
+    known = x.copy()
+    known[1000:1030] = np.nan
+    follows = Relation(delay=2.0, lag=0.04, play=0.0, gain=1.0)
+    whole, seen = follows.expected(x, 0.01), follows.expected(known, 0.01)
+    assert np.isnan(seen[1002:1032]).all()
+    assert seen[1032:] == pytest.approx(whole[1032:], abs=2e-3)

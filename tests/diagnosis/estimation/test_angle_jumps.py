@@ -98,3 +98,12 @@ def test_blocks_do_not_hide_a_jump(monkeypatch: pytest.MonkeyPatch) -> None:
     whole = found(angle)
     monkeypatch.setattr("replay.arrays.blocks.BLOCK", 1500)
     assert {round(t, 2) for t in found(angle).at_s} == {round(t, 2) for t in whole.at_s}
+
+
+def test_readings_that_repeat_now_and_then_show_a_jump() -> None:
+    angle = turned(noise=0.0)[::2]
+    angle[1700:2300] += 0.15
+    late = np.random.default_rng(3).random(angle.size) < 0.15
+    at = np.maximum.accumulate(np.where(late, 0, np.arange(angle.size)))
+    jumps = found(np.round(angle[at], 3), np.ones(angle.size, np.bool_), 2 * DT)
+    assert {round(t) for t in jumps.at_s} == {34, 46}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -187,3 +188,18 @@ def test_a_gain_that_does_not_change_does_not_fade() -> None:
     """Where the gain that may change is the same at both ends, to the last digit, no cause changes."""
     seen, steady = measured(lambda x: 0.6 * x), Cause(FaultMode.INEFFICIENT, 0.0, 0.0, "", Epsilon(0.4, 0.3, 0.5))
     assert _fading(seen.y, seen.x, [steady, steady], 1.0, seen) is None
+
+
+def test_an_offset_behind_a_rest_is_no_loss() -> None:
+    x = np.where(T < 14.0, 0.0, 0.8 + 0.05 * np.sin(0.9 * T))
+    y = x - 0.12 * (T >= 14.0) + NOISE * RNG.standard_normal(SIZE)
+    off = Measured(y, x, np.ones(SIZE, np.bool_), DT, ("a", "b"), "m/s", NOISE, 0.02)
+    (found,) = with_one_cause(pieces([(1000, 2400, FaultMode.INEFFICIENT)]), off)
+    assert found.start == pytest.approx(1400, abs=3)
+    assert FaultMode.OUTSIDE_TABLE in {h.mode for h in found.hypotheses}
+    lost = replace(
+        off, y=np.where(T >= 14.0, 0.85, 1.0) * np.where(T < 14.0, 0.0, 0.4 + X) + NOISE * RNG.standard_normal(SIZE)
+    )
+    lost = replace(lost, x=np.where(T < 14.0, 0.0, 0.4 + X))
+    (found,) = with_one_cause(pieces([(1000, 2400, FaultMode.INEFFICIENT)]), lost)
+    assert found.mode is FaultMode.INEFFICIENT
