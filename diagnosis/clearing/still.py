@@ -18,6 +18,8 @@ OVERLAP, ALIKE = 0.18, 1.4  # of full opening: healthy valves open by then; time
 _HYSTERESIS = 0.03  # of full opening: by as much a valve opens later than it closes
 _END, _REACHED = 0.97, 0.5  # of the largest angle: an end stop, where that is as much of the machine's
 _STEERED = 0.01  # of full opening beyond the dead band: below it, an axle is not steered
+#: Windows of rest, share of windows in which an axle turns, by how much its rests differ in command (of it) and angle (of the largest).
+_RESTS, _TURNS, _SPREAD, _APART, _MOSTLY = 6, 0.1, 0.35, 0.1, 0.75
 _STEPS = 19  # dead bands that are tried
 
 
@@ -90,6 +92,33 @@ def _given(cells: Cells, opening: Array) -> Array:
     slope = np.divide(ahead.sum(axis=0), power, out=np.zeros(len(power)), where=power > 0.0)
     fastest = int(np.argmax(slope))
     return np.asarray(slope[fastest] * np.maximum(opening - dead[fastest], 0.0))
+
+
+def rests_at(cells: Cells, j: int, span: tuple[int, int]) -> float | None:
+    """The one command at which an axle rests wherever it is, as behind a valve that is off by as much [1]; None where it is none.
+
+    Parameters
+    ----------
+    cells : Cells
+        The mission.
+    j : int
+        Axle.
+    span : tuple[int, int]
+        Samples within which it stands still now and then.
+    """
+    size, frame = commanded_still(cells, j), still_frame(cells)
+    angle, command = cells.axles("phi")[:, j], cells.axles("u")[:, j]
+    inside = (frame.starts * cells.width >= span[0]) & (frame.starts * cells.width < span[1])
+    rests = inside & (size > _ANSWERED)
+    at, where = frame.mean(command)[rests], frame.mean(angle)[rests]
+    turns = inside & (frame.rms(rate_of(angle[:, np.newaxis], cells.dt)[:, 0]) > 2.0 * _STILL)
+    if at.size < _RESTS or not np.isfinite(at).all() or np.count_nonzero(turns) < _TURNS * np.count_nonzero(inside):
+        return None
+    middle = float(np.median(at))
+    alike = np.abs(at - middle) < _SPREAD * abs(middle)
+    if np.mean(alike) <= _MOSTLY:
+        return None
+    return middle if float(np.ptp(where[alike])) > _APART * cells.machine.max_steer else None
 
 
 def longest_still(cells: Cells, j: int) -> tuple[float, float]:

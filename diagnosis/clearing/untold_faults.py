@@ -36,6 +36,12 @@ _ROWS = {
     },
     FaultMode.OUTSIDE_TABLE: {FaultMode.OUTSIDE_TABLE: 1.0},
 }
+_BIASED = {
+    FaultMode.OUTSIDE_TABLE: 0.7,
+    FaultMode.INEFFICIENT: 0.15,
+    FaultMode.NO_SIGNAL: 0.1,
+    FaultMode.STUCK: 0.05,
+}  # set by hand
 _ALL = 0.9  # of the speed per opening, that is lost where nothing is left
 _HALF, _LARGEST = 0.5, 0.8  # of the largest deviations, by this quantile: where a fault lasts
 
@@ -92,13 +98,19 @@ _UNTOLD = (
 
 def fault_of_axle(check: Checked, cells: Cells) -> Finding:
     """The fault of an axle that stands still while it is commanded, by that check of a mission."""
-    shown = _Shown(still.still_frame(cells), still.commanded_still(cells, cells.machine.axles.index(check.component)))
+    j = cells.machine.axles.index(check.component)
+    shown = _Shown(still.still_frame(cells), still.commanded_still(cells, j))
     start, stop, _, _ = _where(shown, cells)
     assert check.worst is not None
-    text = (
-        f"The {check.component} axle stands still while its {{valve}} is commanded to {100 * check.worst:.0f}{{percent}}; a healthy one "
-        f"moves from {100 * check.limit:.0f}{{percent}} on."
-    )
+    moves = f"a healthy one moves from {100 * check.limit:.0f}{{percent}} on."
+    bias = still.rests_at(cells, j, (start, stop))
+    if bias is not None:
+        text = (
+            f"The {check.component} axle rests again and again while its {{valve}} is commanded to {100 * bias:+.0f}{{percent}}, wherever "
+            f"it is, and turns otherwise; {moves} So the {{valve}} seems to be off by as much."
+        )
+        return finding_of((start, stop), FaultMode.OUTSIDE_TABLE, None, (text,), Side.ACTUATOR, _BIASED)
+    text = f"The {check.component} axle stands still while its {{valve}} is commanded to {100 * check.worst:.0f}{{percent}}; {moves}"
     least = max(0.0, 1.0 - check.limit / check.worst)  # what is left of the command moves no axle
     return finding_of((start, stop), FaultMode.NO_SIGNAL, Epsilon(1.0, least, 1.0), (text, _UNTOLD))
 

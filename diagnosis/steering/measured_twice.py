@@ -1,7 +1,8 @@
-"""Findings on what is measured twice of a steering axle: pieces of one cause, and valves that may be off instead of dead."""
+"""Findings on a steering axle, measured twice: pieces of one cause; and on its valve: one that may be off instead of dead."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -22,7 +23,7 @@ Array = NDArray[np.float64]
 # lower quarter of what is off, which a fault that grows before it is found leaves alone, and standard deviations per that
 _LOWER, _NORMAL = 0.25, 3.138
 _AT_REST = 0.5  # probability that a valve does not answer a command which stays
-_STEADY = 0.25  # of its mean, by which such a command varies
+_STEADY, _HARDLY = 0.25, 0.05  # of its mean, and of full opening, by which such a command varies
 _CONSTANT = "The command hardly moved meanwhile: a {valve} that is off by a constant would look the same."
 
 
@@ -42,7 +43,7 @@ def of_one_cause(side: Side, found: SideFindings, inputs: AxleInputs, min_sat: f
     """
     sensor = side is Side.SENSOR
     if not found.findings or not (inputs.angle_redundant if sensor else inputs.valve_redundant):
-        return found
+        return found if sensor else found._replace(findings=_or_all_off(found.findings, inputs.command))
     leaves = ("phi", "phi_true") if sensor else ("u_applied", "u")
     y, x = (inputs.values(leaf) for leaf in leaves)
     use = inputs.timeline.fresh[inputs.channel(leaves[0])] & np.isfinite(y) & np.isfinite(x)
@@ -55,9 +56,12 @@ def of_one_cause(side: Side, found: SideFindings, inputs: AxleInputs, min_sat: f
     noise = min(_NORMAL * usual, MOST_APART)
     measured = Measured(y, x, use, inputs.timeline.dt, names, unit, noise, min_sat)
     joined = with_one_cause(found.findings, measured)
-    if not sensor:
-        joined = [_or_off(f) if f.mode.total and _rests(x[f.start : f.stop]) else f for f in joined]
-    return found._replace(findings=tuple(joined))
+    return found._replace(findings=tuple(joined) if sensor else _or_all_off(joined, x))
+
+
+def _or_all_off(findings: Sequence[Finding], command: Array) -> tuple[Finding, ...]:
+    """A valve's findings, those beside a command [fraction], shape (n,), that stays where it is as `_or_off` has them."""
+    return tuple(_or_off(f) if f.mode.total and _rests(command[f.start : f.stop]) else f for f in findings)
 
 
 def _or_off(finding: Finding) -> Finding:
@@ -73,4 +77,4 @@ def _rests(command: Array) -> bool:
     """Whether a command stays where it is but for the beginning: the loop then rests behind a valve that is off by as much."""
     known = command[np.isfinite(command)]
     known = known[known.size // 4 :]
-    return bool(known.size and np.std(known) < _STEADY * abs(float(np.mean(known))))
+    return bool(known.size and np.std(known) < max(_STEADY * abs(float(np.mean(known))), _HARDLY))

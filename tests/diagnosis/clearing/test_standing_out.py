@@ -98,6 +98,17 @@ def test_an_axle_that_stands_still_is_named_and_explains_its_wheels() -> None:
     assert after.states[fault.stop] == CODE[State.NOT_EXCITED]
 
 
+def test_an_axle_that_rests_at_one_command_wherever_it_is_has_a_valve_that_is_off() -> None:
+    (fault,) = _found(
+        FaultSpec(
+            "front", Side.ACTUATOR, FaultMode.OUTSIDE_TABLE, *WHOLE, epsilon=0.02, sat=7.5
+        )  # 0.15 of full opening
+    ).values()
+    assert (fault.side, fault.mode) == (Side.ACTUATOR, FaultMode.OUTSIDE_TABLE)
+    assert "rests again and again" in fault.evidence[0]
+    assert sum(h.p for h in fault.hypotheses) == pytest.approx(1.0)
+
+
 def test_a_wheel_model_that_does_not_fit_explains_no_axle() -> None:
     fault = next(iter(_found(FaultSpec("front", Side.ACTUATOR, FaultMode.NO_SIGNAL, *WHOLE)).values()))
     found, axles = {"front": fault, "RR": fault}, ("front", "rear")
