@@ -14,6 +14,7 @@ from diagnosis.results.machine_words import part_token
 from diagnosis.results.result import Epsilon, Hypothesis
 from diagnosis.results.sizes import amount, times_as_probable
 from diagnosis.results.vocabulary import Kind, Tier
+from diagnosis.steering.dead_readings import LEAST_ASKED_S, at_rest, lapse
 from diagnosis.steering.excitation import asked
 from diagnosis.steering.fault_size import estimate_size, level_of
 from diagnosis.steering.filter_state import SteeringPath
@@ -33,11 +34,8 @@ Span = tuple[int, int]
 _TEMPER = 0.35
 _MOST = 0.6  # of a mission: the longest fault of a valve whose opening nobody measures
 _BRIEF_S = 0.9  # a shorter stretch is rather what the model leaves out
-_FEW_READINGS, _LAPSE_S = 3, 0.1  # readings that agree, seconds without any: no more may be chance, or a message lost
 _FRAGMENT_S = 2.0  # a row that holds for less beside another one is rather its end
 _BELIEVED_S = 4.0  # for how long before and after a motion that did not come a valve's fault is believed
-_LEAST_ASKED_S = 0.35  # for how long a motion must be asked for, to see that it does not come
-_STEP = 0.01  # of the full angle: what a sensor that dies leaps by is more
 _LEAST_NAMED, _LEAST_LISTED = 0.005, 5e-4  # probabilities from which on another explanation is named in words, listed
 _NO_FAULT: Fault = (None, None)
 
@@ -187,11 +185,13 @@ def _judge(run: _Run) -> Judged:
     start, stop = run.start, run.stop
     if choice.needs_motion and not run.axle.model.opening_measured:
         first, last, seconds = asked(run.axle, start, stop)
-        if seconds < _LEAST_ASKED_S:
+        if seconds < LEAST_ASKED_S:
             return Judged(run.start, run.stop, None)
         pad = round(_BELIEVED_S / run.axle.blocks.dt)
         start, stop = max(start, first - pad), min(stop, last + pad)
-    if not _may_be_stated(choice, epsilon, run) or (choice.dead_sensor and _at_rest(run)):
+    if not _may_be_stated(choice, epsilon, run) or (
+        choice.dead_sensor and at_rest(run.axle, run.start, run.stop, command_logged=run.command_logged)
+    ):
         return Judged(run.start, run.stop, None)
     finding = Finding(
         start=start * length,
@@ -259,31 +259,8 @@ def _may_be_stated(choice: _Choice, epsilon: Epsilon | None, run: _Run) -> bool:
     modelled = choice.side is Side.ACTUATOR and not run.axle.model.opening_measured
     too_long = modelled and run.stop - run.start > _MOST * run.path.model.size
     small = choice.mode is FaultMode.INEFFICIENT and epsilon is not None and epsilon.value < limits.min_epsilon
-    flicker = _lapse(run) if choice.dead_sensor else run.seconds < _BRIEF_S
+    flicker = lapse(run.axle, run.start, run.stop) if choice.dead_sensor else run.seconds < _BRIEF_S
     return not (choice.probability < limits.min_probability or too_long or small or flicker or elsewhere)
-
-
-def _lapse(run: _Run) -> bool:
-    """Whether a sensor that seems dead may have lost no more than a message or two, or repeats a value by chance."""
-    count = level_of(run.start, run.stop, run.axle)[2]
-    return count < _FEW_READINGS if count else run.seconds < _LAPSE_S
-
-
-def _at_rest(run: _Run) -> bool:
-    """Whether an angle merely stays where nobody asks it to leave: an angle without noise, as servos report it, does that in health.
-
-    Where the valve's command is not logged, nothing else tells a dead sensor from an axle that is told to stay.
-    """
-    blocks = run.axle.blocks
-    if run.command_logged or asked(run.axle, run.start, run.stop)[2] >= _LEAST_ASKED_S:
-        return False
-    known = np.flatnonzero(blocks.count > 0)
-    inside = known[(known >= run.start) & (known < run.stop)]
-    if not inside.size:
-        return False
-    beside = np.r_[known[known < run.start][-1:], known[known >= run.stop][:1]]
-    level = float(np.median(blocks.mean[inside]))
-    return bool(np.all(np.abs(blocks.mean[beside] - level) < _STEP * run.axle.model.stop))
 
 
 def _sentences(choice: _Choice, gain: float, ranked: Sequence[tuple[Fault, float]], run: _Run) -> tuple[str, ...]:
