@@ -30,6 +30,8 @@ _OPENED, _MOVED = 0.1, 0.05  # of full opening, of the largest speed: something 
 _STEPS = 4.0  # of the reading, by which others move at least
 _INSIDE = 0.5  # of a finding's time
 _CHANGING, _CERTAIN, _TREMBLING = 0.1, 0.9, 0.45  # of the readings; a finding as sure stays, others are no surer
+_FOLLOWS_S, _AS_OTHERS = 0.3, 0.02  # behind its valve a wheel is; of a speed, by which healthy wheels differ
+_ALL_STAY = "Nothing else moves meanwhile, and the others read the same: a speed that stays is what a healthy sensor shows, too."
 _TREMBLES = "Its last digits go on changing, which those of a stuck sensor rarely do."
 _P, _VALVE = 0.96, 0.02  # that the sensor is frozen, and that its valve is; set by hand, not calibrated
 _FAR, _P_NEAR = (
@@ -121,7 +123,11 @@ def with_frozen(data: WheelsData, found: Mapping[int, WheelFindings]) -> dict[in
     out = {}
     for i, wheel in found.items():
         own = [r for r in held[i] if _moves_on(data, i, r) and not _all_held(held, i, r)]
-        kept = [_alive(f, data.y[:, i]) for f in wheel.findings if _stuck(f) or not any(_inside(f, r) for r in own)]
+        kept = [
+            _with_company(data, i, _alive(f, data.y[:, i]))
+            for f in wheel.findings
+            if _stuck(f) or not any(_inside(f, r) for r in own)
+        ]
         told = {r: [f for f in kept if _says_so(f, r)] for r in own}
         same = [f for fs in told.values() for f in fs]
         findings = [f for f in kept if not any(f is g for g in same)]
@@ -168,6 +174,21 @@ def _alive(f: Finding, y: Array) -> Finding:
     known = y[f.start : f.stop]
     changes = np.diff(known[np.isfinite(known)]) != 0.0
     return limited(f, _TREMBLING, _TREMBLES) if changes.size and float(np.mean(changes)) > _CHANGING else f
+
+
+def _with_company(data: WheelsData, i: int, f: Finding) -> Finding:
+    """A stuck sensor is less sure where nothing else moves either, and it reads what the others do."""
+    part = slice(f.start, max(f.start + 1, f.stop - round(_FOLLOWS_S / data.dt)))
+    others = np.delete(data.y[part], i, axis=1)
+    own = data.y[part, i]
+    if not _stuck(f) or not np.isfinite(own).any() or not np.isfinite(others).any():
+        return f
+    level = float(np.nanmedian(own))
+    if _moves_on(data, i, Frozen(part.start, part.stop, level, 0.0)):
+        return f
+    step = _least_step(data.y[:, i])
+    near = max(_STEPS * step if np.isfinite(step) else 0.0, _AS_OTHERS * abs(level))
+    return limited(f, _TREMBLING, _ALL_STAY) if abs(level - float(np.nanmedian(others))) <= near else f
 
 
 def _stuck(f: Finding) -> bool:
