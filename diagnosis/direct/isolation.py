@@ -44,6 +44,7 @@ _OF_PLAY = 0.3  # of its width per rms opening: standard deviation of the gain t
 _CALM_P = 0.95  # that a steady row which leaves hardly anything is the fault's
 _CLEARLY = 2.0  # times as probable as the path's row, from which on another one is stated
 _MAJORITY = 0.5  # of the probability: a fault is called by it
+ZERO = 0.01  # of the span: as far apart may two healthy instruments have their zero
 _NOTHING = 0.05  # of the span, root mean square: a channel that shows more is not silent, however rough its usual noise
 
 
@@ -183,7 +184,7 @@ def isolate(run: Run, found: IdentifiedPair, min_sat: float) -> Isolated | None:
         p[INEFFICIENT], p[run.row] = p[run.row], p[INEFFICIENT]
         run = replace(run, row=INEFFICIENT)
         estimate = _of_gain(delta, estimate_run(run, found)) or estimate
-    if run.row in VARYING_ROWS and (calm := _calm_row_of(seen, min_sat)) is not None:
+    if run.row in VARYING_ROWS and (calm := _calm_row_of(seen, min_sat, ZERO * found.pair.span)) is not None:
         other = estimate_run(replace(run, row=calm), found)
         if other is not None:
             both = p[run.row] + p[calm]
@@ -229,8 +230,8 @@ def _wild(seen: RunSamples, dt: float) -> bool:
     return seen.deviation > max(_WILD * seen.noise, slope * max(_WILD_S, _WILD_SAMPLES * dt))
 
 
-def _calm_row_of(seen: RunSamples, min_sat: float) -> int | None:
-    return None if seen.still else calm_row(seen.y[seen.use], seen.x[seen.use], min_sat)
+def _calm_row_of(seen: RunSamples, min_sat: float, zero: float) -> int | None:
+    return None if seen.still else calm_row(seen.y[seen.use], seen.x[seen.use], min_sat, zero)
 
 
 def _changes(seen: RunSamples) -> float:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.direct.identification import IdentifiedPair
-from diagnosis.direct.isolation import Isolated
+from diagnosis.direct.isolation import ZERO, Isolated
 from diagnosis.results.fault_rows import ROWS
 from replay.faults import FaultMode, Side
 from replay.machine.config import Limits
@@ -21,7 +21,6 @@ _LEFT_S = (
 )
 _AS_TRUE = 0.03  # of what a sensor measures: as far off may a healthy one be
 _LOST = 0.03  # of the span: as far from its command a healthy valve rests within its dead band
-_ZERO = 0.01  # of the span: as far apart may two healthy instruments have their zero
 _MOST_PROBABLY = 0.75  # that a gain is more than any row has
 
 
@@ -68,7 +67,7 @@ def _mode_of_gain(isolated: Isolated, noise: float, found: IdentifiedPair, limit
     if not outside and epsilon is not None and epsilon.value < limits.min_epsilon:
         return None
     reference = isolated.seen.x[isolated.seen.use]
-    if abs(1.0 - delta) * math.sqrt(float((reference**2).mean())) < max(0.5 * noise, _ZERO * found.pair.span):
+    if abs(1.0 - delta) * math.sqrt(float((reference**2).mean())) < max(0.5 * noise, ZERO * found.pair.span):
         return None  # what is lost of hardly anything is the reference's own noise, or where both have their zero
     return FaultMode.OUTSIDE_TABLE if outside else FaultMode.INEFFICIENT
 

@@ -6,13 +6,11 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from replay.arrays.numeric import bridged
-
 Array = NDArray[np.float64]
 
 
 def low_passed(u: Array, tau: float, dt: float) -> Array:
-    """Response of a first-order lag of tau [s], 0 for none, to u held over each step; gaps are bridged.
+    """Response of a first-order lag of tau [s], 0 for none, to u held over each step; it stays where u is NaN.
 
     Both of shape (n,).
     """
@@ -25,16 +23,17 @@ def low_passed_on(u: Array, tau: float, dt: float, state: float | None) -> tuple
     Both of shape (k,), in the unit of u; times in s.
     """
     a = np.exp(-dt / tau) if tau > 0 else 0.0
-    filled = bridged(u)
     out = np.empty(u.size)
-    last = _scan_lag(filled, a, float(filled[0]) if state is None else state, out)
+    first = float(next(iter(u[np.isfinite(u)]), 0.0)) if state is None else state
+    last = _scan_lag(np.ascontiguousarray(u), a, first, out)
     return out, float(last)
 
 
 @njit(cache=True)
 def _scan_lag(u, a, x, out):  # type: ignore[no-untyped-def]
-    """Write x and carry on with x ← a·x + (1 − a)·u."""
+    """Write x and carry on with x ← a·x + (1 − a)·u; x stays where u is not known."""
     for k in range(u.size):
         out[k] = x
-        x = a * x + (1.0 - a) * u[k]
+        if u[k] == u[k]:
+            x = a * x + (1.0 - a) * u[k]
     return x

@@ -15,7 +15,7 @@ from diagnosis.steering.filter_state import Redundancy
 from replay.arrays.blocks import blocks as cut
 from replay.arrays.blocks import release
 from replay.arrays.column_store import ColumnStore
-from replay.arrays.numeric import bridged
+from replay.arrays.numeric import carried
 from replay.machine.config import Noise
 
 Array = NDArray[np.float64]
@@ -145,6 +145,7 @@ def blocks_of(
     store = store or ColumnStore()
     length = length or block_length([fresh], dt)
     opening, parts = store.column(np.float64), []
+    last = np.zeros(1)
     before = np.zeros(0)  # the last two new samples of the part before
     for part in store.blocks(y.size, length):
         near, missing = y[part], ~np.isfinite(y[part])
@@ -162,7 +163,8 @@ def blocks_of(
         unknown = np.add.reduceat((~np.isfinite(u[part])).astype(np.float64), starts)
         blind = unknown > 0.5 * np.diff(np.append(starts, near.size))
         parts.append((mean, np.add.reduceat(power, starts) / np.maximum(count, 1.0), count, status, blind))
-        opening.append(bridged(u[part]))
+        given, last = carried(u[part][:, np.newaxis], last)
+        opening.append(given[:, 0])
         release(y, u)
     mean, power, count, status, blind = (np.concatenate(x) for x in zip(*parts, strict=True))
     raw_u, redundancy = opening.finish(), Redundancy.nothing(mean.size)

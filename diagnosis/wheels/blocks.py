@@ -17,7 +17,7 @@ from diagnosis.channels.sample_status import PAIR, SILENT, SKIP
 from diagnosis.wheels.valve_map import effective
 from replay.arrays.blocks import block_means, framed, release
 from replay.arrays.column_store import ColumnStore
-from replay.arrays.numeric import bridged
+from replay.arrays.numeric import carried
 from replay.machine.config import WheelPlant
 
 Array = NDArray[np.float64]
@@ -182,8 +182,10 @@ def blocks_of(
     opening, parts = store.column(np.float64, (wheels,)), []
     ends = [_Ends(_usual_gap(status[:, i])) for i in range(wheels)]
     spools: list[float | None] = [None] * wheels
+    last = np.zeros(wheels)
     for cut in store.blocks(size, width):
-        driving, more, spools = _effective(u[cut], plants, spools)
+        given, last = carried(u[cut], last)
+        driving, more, spools = _effective(given, plants, spools)
         beyond = framed(driving, width)
         opening.append(beyond.reshape(-1, wheels))
         mean, count, jitter, state = _samples(y[cut], status[cut], width, len(beyond), ends)
@@ -220,7 +222,7 @@ def _effective(
     opening, more, held = np.zeros(u.shape), np.zeros(u.shape), list(spools)
     for i, plant in enumerate(plants):
         if plant is None:
-            opening[:, i] = bridged(u[:, i])
+            opening[:, i] = u[:, i]
         else:
             opening[:, i], more[:, i], held[i] = effective(u[:, i], plant, held[i])
             opening[:, i] += more[:, i]

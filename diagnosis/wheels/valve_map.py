@@ -11,7 +11,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from replay.arrays.copying import put
-from replay.arrays.numeric import bridged
+from replay.arrays.numeric import without_nan
 from replay.machine.config import WheelPlant
 
 Array = NDArray[np.float64]
@@ -36,11 +36,11 @@ def played(u: Array, hysteresis: float, held: float | None = None) -> tuple[Arra
     Parameters
     ----------
     u : Array, shape (n,)
-        Commanded opening [fraction]; gaps are bridged.
+        Commanded opening [fraction]; NaN counts as 0.
     hysteresis : float
         Width of the play [fraction].
     """
-    filled = np.ascontiguousarray(bridged(u), np.float64)
+    filled = np.ascontiguousarray(without_nan(u), np.float64)
     start = (float(filled[0]) if filled.size else 0.0) if held is None else held
     if hysteresis <= 0:
         return filled, float(filled[-1]) if filled.size else start
@@ -77,7 +77,7 @@ def effective(u: Array, plant: WheelPlant, held: float | None = None) -> tuple[A
     Parameters
     ----------
     u : Array, shape (n,)
-        Commanded opening [fraction]; gaps are bridged.
+        Commanded opening [fraction]; NaN counts as 0.
     plant : WheelPlant
         The wheel; one without a map has a dead zone alone.
     held : float or None
@@ -91,7 +91,7 @@ def effective(u: Array, plant: WheelPlant, held: float | None = None) -> tuple[A
         Where the spool stands at the end.
     """
     if not plant.openings:
-        filled = bridged(u)
+        filled = without_nan(u)
         opening = np.sign(filled) * np.maximum(np.abs(filled) - plant.dead, 0.0)
         return opening, np.zeros(opening.size), 0.0
     spool, held = played(u, plant.hysteresis, held)

@@ -54,3 +54,21 @@ def bridged(x: NDArray[np.float64]) -> NDArray[np.float64]:
         return x
     at = np.flatnonzero(known)
     return np.interp(np.arange(x.size), at, x[at]) if at.size else np.zeros(x.size)
+
+
+def carried(x: NDArray[np.float64], last: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """x with the value before in the place of what is not known, and what its last row holds for the next part.
+
+    Parameters
+    ----------
+    x : NDArray[np.float64], shape (n, k)
+        One part; NaN where unknown.
+    last : NDArray[np.float64], shape (k,)
+        What the part before held.
+    """
+    known = np.isfinite(x)
+    if not known.all():
+        x = np.vstack([last, x])
+        at = np.maximum.accumulate(np.where(np.vstack([np.ones_like(known[:1]), known]), np.arange(len(x))[:, None], 0))
+        x = np.take_along_axis(x, at, axis=0)[1:]
+    return x, np.asarray(x[-1] if len(x) else last)

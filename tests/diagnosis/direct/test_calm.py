@@ -20,10 +20,11 @@ X = 0.8 * np.sin(0.7 * T)
         (0.6 * X + 0.15 * np.cos(40.0 * T), None),
         (X + 0.1, None),
         (1.4 * X, None),
+        (0.5 * X - 0.008 + 0.08 * (np.abs(np.sin(3.0 * T)) < 0.05), INEFFICIENT),
     ],
 )
 def test_the_steady_row_that_leaves_hardly_anything(y: np.ndarray, row: int | None) -> None:
-    assert calm_row(y, X, 0.02) == row
+    assert calm_row(y, X, 0.02, 0.01) == row
 
 
 def test_a_reference_that_is_nothing_tells_nothing() -> None:

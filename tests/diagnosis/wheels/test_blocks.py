@@ -45,6 +45,14 @@ def cut(
     return blocks_of(y, u, status, quiet, ratio, turn, plants or [WheelPlant(1.0, 0.1, dead=0.01)] * WHEELS, dt)
 
 
+def held(u: Array) -> Array:
+    """An opening [fraction], shape (n,), with the last known one where it is not known."""
+    out = [0.0]
+    for x in u:
+        out.append(out[-1] if np.isnan(x) else float(x))
+    return np.array(out[1:])
+
+
 def naive(y: Array, u: Array, status: Array, width: int, i: int) -> list[tuple[Any, ...]]:
     """Mean, count, mean squared step, status and unsteadiness of every block of wheel i."""
     places = [k for k in range(y.shape[0]) if status[k, i] == PAIR]
@@ -56,7 +64,8 @@ def naive(y: Array, u: Array, status: Array, width: int, i: int) -> list[tuple[A
         new = [k for k in block if status[k, i] == PAIR]
         steps = [(y[k, i] - y[before[k], i]) ** 2 for k in new if k in before and k - before[k] <= 1.5 * usual]
         silent = sum(status[k, i] == SILENT for k in block) > 0.5 * width
-        x = [0.0 if np.isnan(u[k, i]) else np.sign(u[k, i]) * max(abs(u[k, i]) - 0.01, 0.0) for k in block]
+        given = held(u[:, i])
+        x = [np.sign(given[k]) * max(abs(given[k]) - 0.01, 0.0) for k in block]
         x += [x[-1]] * (width - len(x))
         out.append(
             (
@@ -99,9 +108,10 @@ def test_places_without_a_sample_say_nothing() -> None:
         assert np.isfinite(x).all()
     assert_array_equal(got.y[got.count == 0], 0.0)
     assert_array_equal(got.jitter[got.count == 0], 0.0)
-    # an opening that is not known counts as none, one within the dead zone too; the rest of the last block is held
-    beyond = np.sign(u) * np.maximum(np.abs(u) - 0.01, 0.0)
-    assert_allclose(got.u[:403], np.nan_to_num(beyond))
+    # an opening that is not known is the last known one, one within the dead zone none; the rest of the last block is held
+    given = np.column_stack([held(column) for column in u.T])
+    beyond = np.sign(given) * np.maximum(np.abs(given) - 0.01, 0.0)
+    assert_allclose(got.u[:403], beyond)
     assert_allclose(got.u[403:], np.repeat(got.u[402:403], 7, axis=0))
     # quiet is a block that is so throughout
     assert_array_equal(np.flatnonzero(got.quiet[:, 0]), [2, 3])
@@ -179,7 +189,7 @@ def test_openings_are_what_the_valves_make_of_them() -> None:
     got = cut(y, u, status, quiet, 0.001, [MAPPED, None, MAPPED])
     for i in (0, 2):
         spool, opening, unseen = u[0, i], [], []
-        for x in np.nan_to_num(u[:, i]):
+        for x in held(u[:, i]):
             spool = min(max(spool, x - 0.01), x + 0.01)
             opening.append(np.interp(spool, MAPPED.openings, MAPPED.speeds) / 2.0)
             unseen.append(np.interp(spool, MAPPED.openings, MAPPED.unseen) / 2.0)
@@ -191,7 +201,7 @@ def test_openings_are_what_the_valves_make_of_them() -> None:
         ended = got.ending()
         assert ended.ended
         assert_allclose(ended.u[:, i], got.u[:, i] - np.repeat(blockwise, 10), atol=1e-13)
-    assert_allclose(got.u[:403, 1], np.nan_to_num(u[:, 1]))
+    assert_allclose(got.u[:403, 1], held(u[:, 1]))
     assert_array_equal(got.unseen[:, 1], 0.0)
     assert not got.ended
     assert ended.part(3, 9).ended

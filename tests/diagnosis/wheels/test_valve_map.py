@@ -134,3 +134,8 @@ def test_a_map_without_unseen_is_known_throughout() -> None:
     opening, unseen, _ = effective(np.array([-0.4, 0.7]), known)
     assert_allclose(opening, [-0.4, 0.7])
     assert_array_equal(unseen, 0.0)
+
+
+def test_a_lag_stays_where_its_command_is_not_known() -> None:
+    u = np.r_[np.nan, np.full(400, 0.5), np.full(60, np.nan), np.full(100, 0.5)]
+    assert_allclose(low_passed(u, 0.1, 0.01), 0.5)
