@@ -62,8 +62,14 @@ def with_one_cause(findings: Sequence[Finding], measured: Measured) -> list[Find
     common = _cause_of([f for near in clusters for f in near], measured) if len(clusters) > 1 else None
     if common is not None and (not common.alone or (common.changes and not common.late)):
         common = None  # what changed between two pieces may have changed anyhow
-    for near in clusters:
+    for pieces in clusters:
+        near = pieces
         cause = replace(common, start=None) if common is not None else _cause_of(near, measured)
+        lost = all(f.mode is FaultMode.INEFFICIENT for f in near)
+        wide = _as_far_as_it_shows(near, out[-1].stop if out else 0, measured) if lost else near
+        offset = _cause_of(wide, measured) if wide != near else None
+        if offset is not None and offset.alone and offset.epsilon is None and not offset.changes:
+            near, cause = wide, offset  # what a loss, say, explains of a part is an offset's by the rest
         told = cause is None or (cause.alone and all(f.mode == cause.mode for f in near))
         out += near if told or cause is None else [_joined(near, cause)]
     return out
@@ -78,6 +84,23 @@ def _clusters(findings: Sequence[Finding], gap: int) -> Iterator[list[Finding]]:
         near.append(f)
     if near:
         yield near
+
+
+def _as_far_as_it_shows(near: list[Finding], least: int, measured: Measured) -> list[Finding]:
+    """Pieces with the time before, from step `least` on, and behind them in which the channel is off its reference all the time."""
+    first, last = near[0].start, max(f.stop for f in near)
+    reach = round(_GAP_S / measured.dt)
+    low, high = max(min(least, first), first - reach), min(measured.y.size, last + reach)
+    off = np.abs(measured.y[low:high] - measured.x[low:high])
+    known = np.flatnonzero(measured.use[low:high] & np.isfinite(off))
+    healthy = low + known[off[known] <= _BEYOND * measured.noise]
+    before, behind = healthy[healthy < first], healthy[healthy >= last]
+    start = int(before[-1]) + 1 if before.size else low
+    stop = int(behind[0]) if behind.size else high
+    if max(first - start, stop - last) * measured.dt < _EARLY_S:
+        return near
+    ends = [replace(near[0], start=start), *near[1:]]
+    return [*ends[:-1], replace(ends[-1], stop=max(ends[-1].stop, stop))]
 
 
 def _cause_of(near: Sequence[Finding], measured: Measured) -> Cause | None:

@@ -203,3 +203,11 @@ def test_an_offset_behind_a_rest_is_no_loss() -> None:
     lost = replace(lost, x=np.where(T < 14.0, 0.0, 0.4 + X))
     (found,) = with_one_cause(pieces([(1000, 2400, FaultMode.INEFFICIENT)]), lost)
     assert found.mode is FaultMode.INEFFICIENT
+
+
+def test_an_offset_beside_a_command_that_stays_is_told_by_what_follows() -> None:
+    x = np.where(T < 18.0, 0.8 + 0.02 * np.sin(0.9 * T), 0.05)
+    y = x - 0.12 * ((T >= 14.0) & (T < 22.0)) + NOISE * RNG.standard_normal(SIZE)
+    off = Measured(y, x, np.ones(SIZE, np.bool_), DT, ("a", "b"), "m/s", NOISE, 0.02)
+    (found,) = with_one_cause(pieces([(1400, 1800, FaultMode.INEFFICIENT)]), off)
+    assert (found.mode, found.start, found.stop) == (FaultMode.OUTSIDE_TABLE, 1400, pytest.approx(2100, abs=2))
