@@ -14,9 +14,9 @@ Array = NDArray[np.float64]
 
 _IDLE = 0.003  # of full opening: a command that asks for nothing
 _SETTLES_S, _LEAST_S = 0.3, 0.2  # after a command came to rest; of a rest beyond that
-_RESTS = 2
-_MOST, _LEAST = 0.035, 0.004  # of full opening: how far off a healthy sensor is set; what is worth taking out
-_ALIKE = 0.3  # of the zero, by which the middle half of the rests may differ: a spool that friction holds rests on either side
+_RESTS = 3
+_MOST, _LEAST = 0.035, 0.006  # of full opening: how far off a healthy sensor is set; what is worth taking out
+_ALIKE = 0.3  # of the zero, by which the middle half of the rests may differ
 
 
 def with_zeroed_positions(timeline: Timeline, machine: Machine) -> Timeline:
@@ -53,12 +53,18 @@ def zero_of(position: Array, command: Array, fresh: NDArray[np.bool_], dt: float
     """
     idle = np.abs(command) < _IDLE * span  # NaN is none
     edge = np.flatnonzero(np.diff(np.r_[False, idle, False].astype(np.int8)))
-    first, stop = np.where(edge[::2] > 0, edge[::2] + round(_SETTLES_S / dt), 0), edge[1::2]
+    begin, stop = edge[::2], edge[1::2]
+    settled = np.where(begin > 0, begin + round(_SETTLES_S / dt), 0)
     use = fresh & np.isfinite(position)
-    rests = [position[a:b][use[a:b]] for a, b in zip(first, stop, strict=True) if (b - a) * dt >= _LEAST_S]
-    values = np.array([np.median(r) for r in rests if r.size])
-    if values.size < _RESTS:
+    values, sides = [], []
+    for start, first, last in zip(begin, settled, stop, strict=True):
+        seen = position[first:last][use[first:last]]
+        if seen.size and (last - first) * dt >= _LEAST_S:
+            values.append(float(np.median(seen)))
+            sides.append(np.sign(np.nan_to_num(command[start - 1])) if start else 0.0)
+    if len(values) < _RESTS:
         return 0.0
-    low, zero, high = np.quantile(values, (0.25, 0.5, 0.75))
+    low, zero, high = (float(q) for q in np.quantile(values, (0.25, 0.5, 0.75)))
     agree = high - low <= _ALIKE * abs(zero)
-    return float(zero) if agree and _LEAST * span <= abs(zero) <= _MOST * span else 0.0
+    held = -np.sign(zero) not in sides  # friction leaves a spool on the side that it comes from
+    return 0.0 if held or not agree or not _LEAST * span <= abs(zero) <= _MOST * span else zero

@@ -15,9 +15,9 @@ NEW = np.ones(N, np.bool_)
 
 
 def command() -> np.ndarray:
-    """Forty seconds: four of driving, four of rest, in turn."""
+    """Forty seconds: four of driving, ahead and back, four of rest, in turn."""
     t = np.arange(N) * DT
-    return np.where((t // 4) % 2 == 0, 0.3, 0.0)
+    return np.where((t // 4) % 2 == 0, np.where((t // 8) % 2 == 0, 0.3, -0.3), 0.0)
 
 
 def timeline(position: np.ndarray) -> Timeline:
@@ -47,6 +47,12 @@ def test_rests_that_do_not_agree_are_friction() -> None:
     side = np.where((np.arange(N) * DT // 8) % 2 == 0, 0.012, -0.012)
     assert zero_of(command() + side, command(), NEW, DT, 1.0) == 0.0
     assert zero_of(command() + 0.02 + 0.1 * side, command(), NEW, DT, 1.0) == pytest.approx(0.02, abs=2e-3)
+
+
+def test_friction_leaves_a_spool_where_it_comes_from() -> None:
+    ahead = np.abs(command())
+    assert zero_of(ahead + 0.02, ahead, NEW, DT, 1.0) == 0.0
+    assert zero_of(ahead - 0.02, ahead, NEW, DT, 1.0) == pytest.approx(-0.02)
 
 
 def test_a_valve_that_never_rests_shows_no_zero() -> None:
