@@ -16,6 +16,8 @@ _IDLE = 0.003  # of full opening: a command that asks for nothing
 _SETTLES_S, _LEAST_S = 0.3, 0.2  # after a command came to rest; of a rest beyond that
 _RESTS = 3
 _MOST, _LEAST = 0.035, 0.006  # of full opening: how far off a healthy sensor is set; what is worth taking out
+_OPENS, _SAMPLE_S, _FEW, _ROUNDS = 0.04, 0.02, 50, 8  # of full opening; between what is looked at; samples; of a fit
+_SAME = 0.4  # of the zero, by which it may differ where the valve opens: a spool that friction holds has none there
 _ALIKE = 0.3  # of the zero, by which the middle half of the rests may differ
 
 
@@ -67,4 +69,23 @@ def zero_of(position: Array, command: Array, fresh: NDArray[np.bool_], dt: float
     low, zero, high = (float(q) for q in np.quantile(values, (0.25, 0.5, 0.75)))
     agree = high - low <= _ALIKE * abs(zero)
     held = -np.sign(zero) not in sides  # friction leaves a spool on the side that it comes from
-    return 0.0 if held or not agree or not _LEAST * span <= abs(zero) <= _MOST * span else zero
+    if held or not agree or not _LEAST * span <= abs(zero) <= _MOST * span:
+        return 0.0
+    every = max(1, round(_SAMPLE_S / dt))
+    moving = use[::every] & (np.abs(command[::every]) > _OPENS * span)
+    opens = _offset(position[::every][moving], command[::every][moving])
+    return zero if abs(opens - zero) <= _SAME * abs(zero) else 0.0
+
+
+def _offset(y: Array, x: Array) -> float:
+    """Offset of y = gain·x + offset, of what most samples agree on; NaN where x is on one side alone."""
+    if min(np.count_nonzero(x > 0.0), np.count_nonzero(x < 0.0)) < _FEW:
+        return float("nan")
+    design, weight = np.column_stack([x, np.ones(x.size)]), np.ones(x.size)
+    gain, offset = 1.0, 0.0
+    for _ in range(_ROUNDS):
+        weighted = design * weight[:, np.newaxis]
+        gain, offset = (float(c) for c in np.linalg.solve(weighted.T @ design, weighted.T @ y))
+        misfit = np.abs(y - gain * x - offset)
+        weight = 1.0 / np.maximum(misfit, max(float(np.median(misfit)), 1e-9))
+    return offset

@@ -52,7 +52,11 @@ def test_rests_that_do_not_agree_are_friction() -> None:
 def test_friction_leaves_a_spool_where_it_comes_from() -> None:
     ahead = np.abs(command())
     assert zero_of(ahead + 0.02, ahead, NEW, DT, 1.0) == 0.0
-    assert zero_of(ahead - 0.02, ahead, NEW, DT, 1.0) == pytest.approx(-0.02)
+
+
+def test_what_is_there_at_rest_alone_is_no_zero() -> None:
+    rests = np.where(command() == 0.0, 0.02, 0.0)
+    assert zero_of(command() + rests, command(), NEW, DT, 1.0) == 0.0
 
 
 def test_a_valve_that_never_rests_shows_no_zero() -> None:
