@@ -17,7 +17,7 @@ _OPENS = 0.1  # of full opening
 _VALVES, _WINDOWS = 3, 3  # that must agree; that must show it
 _ALIKE = 0.05  # by which gains of valves that agree differ at most
 _LEAST, _MOST = 0.04, 0.18  # of the gain lost: what is worth it; what is more is a fault, of however many valves
-_ABOVE, _STEP = 0.03, 0.04  # a valve that seems to open more, or whose gain jumps, follows otherwise than by a gain
+_ABOVE, _STEP = 0.03, 0.07  # a valve that seems to open more, or whose gain jumps, follows otherwise than by a gain
 
 
 def without_shared_gain(timeline: Timeline, machine: Machine) -> Timeline:
