@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 from diagnosis.assess import ComponentResult, assess_components
 from diagnosis.channels.copied_rows import without_copied_rows
 from diagnosis.channels.recording_gaps import recording_gaps, without_gaps
+from diagnosis.channels.resting_position import with_zeroed_positions
+from diagnosis.channels.shared_gain import without_shared_gain
 from diagnosis.clearing.backwards import without_claims
 from diagnosis.clearing.beside import (
     less_sure_beside_dead_sensors,
@@ -152,7 +154,8 @@ def _walk(
     progress: Subscriber,
 ) -> MissionResult:
     """Replay → assess → decide → document; long columns leave memory at every stage until they are read again."""
-    timeline = without_copied_rows(mission.timeline)
+    timeline = with_zeroed_positions(without_copied_rows(mission.timeline), machine)
+    timeline = without_shared_gain(timeline, machine)
     mission = replace(mission, timeline=timeline)
 
     def publish(stage: Progress) -> None:

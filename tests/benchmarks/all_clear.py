@@ -30,6 +30,7 @@ from types import ModuleType
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 import closed_circuit
+import dumper
 import electric
 import electrohydraulic
 import flow_sharing
@@ -57,7 +58,7 @@ FIRST = {"tuning": 0, "reporting": 2000}
 DEFAULT = "default"
 OTHERS = {
     m.NAME: m
-    for m in (hydrostatic, electrohydraulic, electric, flow_sharing, closed_circuit, geared_circuit, forwarder)
+    for m in (hydrostatic, electrohydraulic, electric, flow_sharing, closed_circuit, geared_circuit, forwarder, dumper)
 }
 _DRIVEN, _STEERED = 0.06, 0.02  # m/s, rad/s
 _DRIVEN_S, _STEERED_S = 3.0, 1.0
@@ -235,7 +236,7 @@ def main() -> None:
         "--machine",
         nargs="+",
         default=None,
-        help="default, structures, foreign, hydrostatic, electrohydraulic, electric, flow_sharing, closed_circuit, geared_circuit, forwarder",
+        help="default, structures, foreign, hydrostatic, electrohydraulic, electric, flow_sharing, closed_circuit, geared_circuit, forwarder, dumper",
     )
     parser.add_argument("--duration", type=float, default=75.0, help="length of a mission [s]")
     parser.add_argument("--every", type=int, default=1, help="one of so many kinds of trouble")

@@ -1,0 +1,76 @@
+"""Whether the dumper of `all_clear.py` and its faults do what they say."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+import pytest
+
+from replay.faults import FaultMode, FaultSpec, Side
+
+BENCHMARKS = Path(__file__).parent / "benchmarks"
+SEEDS, LENGTH = (1, 4, 5), 40.0
+_A, _B = 8.0, 36.0
+_SPAN = slice(9_000, 36_000)
+
+
+@pytest.fixture(scope="module")
+def machine() -> Iterator[ModuleType]:
+    sys.path.insert(0, str(BENCHMARKS))
+    import dumper
+
+    yield dumper
+    sys.path.remove(str(BENCHMARKS))
+
+
+def fault(part: str, side: Side, mode: FaultMode, epsilon: float = 1.0, sat: float = 0.0) -> FaultSpec:
+    return FaultSpec(part, side, mode, _A, _B, epsilon, sat, 0.0, 0.0, 0.0)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_healthy_dumper_follows_its_commands_and_its_coils_warm(machine: ModuleType, seed: int) -> None:
+    ref, true, read, given, done, _, source = machine.driven(seed, (), LENGTH)
+    made = machine.build(seed)[0]
+    assert np.abs(ref[:, :4]).max() > 0.3 * made.top
+    assert np.abs(true[:, :4] - ref[:, :4]).mean() < 0.06 * made.top
+    assert np.abs(true[:, :4] - read[:, :4]).mean() < 0.02 * made.top
+    assert np.abs(true[:, 4:] - ref[:, 4:]).mean() < 0.02
+    assert np.abs(given - done).mean() < 0.06
+    assert 0.4 < source[:, 0].min() <= source[:, 0].max() < 1.1
+    assert source[-1, 2] > source[0, 2]
+
+
+@pytest.mark.parametrize(
+    ("mode", "epsilon", "sat", "share", "own"),
+    [
+        (FaultMode.NO_SIGNAL, 1.0, 0.0, 0.0, 0.0),
+        (FaultMode.STUCK, 1.0, 0.3, 0.0, 0.3),
+        (FaultMode.INEFFICIENT, 0.5, 0.0, 0.5, 0.0),
+    ],
+)
+def test_a_valve_that_fails_opens_as_its_fault_says(
+    machine: ModuleType, mode: FaultMode, epsilon: float, sat: float, share: float, own: float
+) -> None:
+    given, done = (machine.driven(4, (fault("FR", Side.ACTUATOR, mode, epsilon, sat),), LENGTH)[k] for k in (3, 4))
+    assert np.abs(done[_SPAN, 0] - share * given[_SPAN, 0] - own).mean() < 0.06
+    assert np.array_equal(done[:7_900], machine.driven(4, (), LENGTH)[4][:7_900])
+
+
+def test_a_speed_sensor_that_fails_reads_what_its_fault_says_and_the_wheel_turns_on(machine: ModuleType) -> None:
+    _, true, read, *_ = machine.driven(4, (fault("FL", Side.SENSOR, FaultMode.NO_SIGNAL),), LENGTH)
+    assert not read[_SPAN, 1].any()
+    assert np.abs(true[_SPAN, 1]).max() > 0.3
+
+
+def test_a_recorder_has_what_its_level_of_evidence_says(machine: ModuleType) -> None:
+    base, spool, direct = (machine.signals(1, (), LENGTH, tier).items for tier in ("base", "spool", "direct"))
+    assert not any(name.endswith(("u_applied", "_true")) for name in base)
+    assert "wheel.FR.u_applied" in spool
+    assert {"wheel.FR.v_true", "steer.rear.phi_true"} <= direct.keys()
+    stamps = direct["wheel.FR.v"].stamps
+    assert (np.diff(stamps) > 0).all()
+    assert 9.5e6 < np.median(np.diff(stamps)) < 10.5e6
