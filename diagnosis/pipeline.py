@@ -154,8 +154,8 @@ def _walk(
     progress: Subscriber,
 ) -> MissionResult:
     """Replay → assess → decide → document; long columns leave memory at every stage until they are read again."""
-    timeline = with_zeroed_positions(without_copied_rows(mission.timeline), machine)
-    timeline = without_shared_gain(timeline, machine)
+    shown = without_copied_rows(mission.timeline)
+    timeline = without_shared_gain(with_zeroed_positions(shown, machine), machine)
     mission = replace(mission, timeline=timeline)
 
     def publish(stage: Progress) -> None:
@@ -172,11 +172,11 @@ def _walk(
     found = judged.found
     report = report_of_mission(judged, identity)
     timeline.store.release()
-    windows = closeups_of(timeline, replay, machine, found.assessments, judged.intervals)
+    windows = closeups_of(shown, replay, machine, found.assessments, judged.intervals)
     if windows is not None:
         near = known_probability(report, windows.step * timeline.dt, timeline.dt, windows.columns)
         windows = replace(windows, columns={**windows.columns, **near})
-    return MissionResult(report, _columns(judged, report), windows)
+    return MissionResult(report, _columns(judged, report, shown), windows)
 
 
 def _outside_gaps(found: ComponentResult, timeline: Timeline) -> ComponentResult:
@@ -253,9 +253,8 @@ def _without_modes(parts: frozenset[tuple[str, str]], columns: Mapping[str, Arra
     return frozenset(p for p in parts if f"evidence.{p[0]}.{p[1]}.p_{State.HEALTHY}" not in columns)
 
 
-def _columns(judged: Judged, report: ReportDocument) -> dict[str, Array]:
-    """Signals, replayed loop, evidence and path under their names."""
-    timeline = judged.mission.timeline
+def _columns(judged: Judged, report: ReportDocument, timeline: Timeline) -> dict[str, Array]:
+    """Signals as recorded, replayed loop, evidence and path under their names."""
     columns: dict[str, Array] = dict(replay_columns(timeline, judged.replay, judged.machine))
     for (component, side), assessment in judged.found.assessments.items():
         columns.update({f"evidence.{component}.{side}.{leaf}": x for leaf, x in assessment.columns.items()})
