@@ -37,7 +37,7 @@ from diagnosis.response.models import (
     Blocks,
     scores,
 )
-from diagnosis.response.power import powers_of
+from diagnosis.response.power import powers_of, unshown
 from diagnosis.response.rivals import (
     by_each_other,
     held_back_together,
@@ -61,6 +61,7 @@ Flags = NDArray[np.bool_]
 _AT_A_JUMP = 0.1, 0.3  # probability that a fault begins, or ends, where the channel jumps
 _OWN, _OTHERS = 4, 2  # holds of a channel that may be faults: of the one in question, and of each other
 _LEAST_S = 1.0
+_HIDES = "the speed varies so much beside what its command, or other channels, make likely that half of it would not show for ten seconds"
 _PAIR = 2  # wheels, of which each moves one side of the machine
 _TURNED = (
     "The sides of the machine go apart as where it turns, of which the log has neither a command nor a measurement: log the commanded yaw "
@@ -192,6 +193,7 @@ def assess_response(
     for w, (sensor, drive) in parts.items():
         j, about = judged[w], asked[w]
         powers = powers_of(j.wheel.blocks, j.driving, about, width * dt, beside.get(w), limits.clear_at, lasting[w])
+        sensor = _unproved(sensor, np.repeat(unshown(powers, j.driving.size, width * dt), width)[: j.data.y.size])
         delay, told = smallest_delay(j, width * dt)
         powers = powers._replace(rows=(*powers.rows, delay))
         parts[w] = replace(sensor, powers=powers, notes=(*sensor.notes, told, *remarks)), drive
@@ -207,13 +209,21 @@ def _turned_by(wheel: str, found: Mapping[str, Judged]) -> bool:
     return any(turns_by_wheels(means[wheel], means[o]) for o in means if o != wheel)
 
 
-def _doubted(sensor: Assessment, where: Sequence[slice], why: str = "") -> Assessment:
+def _doubted(sensor: Assessment, where: Sequence[slice | Flags], why: str = "") -> Assessment:
     """A sensor of which nothing healthy can be said in some steps, and why, where that is another reason than before."""
     states = sensor.states.copy()
     for part in where:
-        states[part][states[part] == CODE[State.HEALTHY]] = CODE[State.NOT_ASSESSED]
+        states[part] = np.where(states[part] == CODE[State.HEALTHY], CODE[State.NOT_ASSESSED], states[part])
     reasons = {**sensor.reasons, State.NOT_ASSESSED: why} if why else sensor.reasons
     return replace(sensor, states=states, reasons=reasons)
+
+
+def _unproved(sensor: Assessment, where: Flags) -> Assessment:
+    """A sensor of which nothing healthy is said in steps in which a gross fault would not have shown."""
+    if not (where & (sensor.states == CODE[State.HEALTHY])).any():
+        return sensor
+    doubted = bool((sensor.states == CODE[State.NOT_ASSESSED]).any())
+    return _doubted(sensor, [where], f"{sensor.reasons[State.NOT_ASSESSED]}; or {_HIDES}" if doubted else _HIDES)
 
 
 def _judge(one: Judged, beside: Beside | None, dt: float, width: int) -> Judged:

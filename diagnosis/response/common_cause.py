@@ -79,7 +79,9 @@ def consequence(spell: Spell, wheel: str, judged: Mapping[str, Judged]) -> bool:
 
 
 def stands_with_all(spell: Spell, wheel: str, judged: Mapping[str, Judged], asked: Mapping[str, Flags]) -> bool:
-    """Whether a speed is silent while all others stand still, too, although they are to move: then the machine stands.
+    """Whether a speed is silent while all others stand still, too, although they are to move, or read one value all the time.
+
+    Then the machine stands: a sensor that is held tells nothing of motion.
 
     Parameters
     ----------
@@ -96,8 +98,20 @@ def stands_with_all(spell: Spell, wheel: str, judged: Mapping[str, Judged], aske
     if spell.mode is not FaultMode.NO_SIGNAL or spell.own or not others:
         return False
     part = slice(spell.start, spell.stop)
-    still = [(j.wheel.blocks.zero == j.wheel.blocks.readings)[part] & asked[w][part] for w, j in judged.items()]
+    still = [
+        ((j.wheel.blocks.zero == j.wheel.blocks.readings)[part] & asked[w][part]) | _stuck(j)[part]
+        for w, j in judged.items()
+    ]
     return bool(np.mean(np.logical_and.reduce(still)) > _OVERLAP)
+
+
+def _stuck(one: Judged) -> Flags:
+    """Blocks in which a wheel's reading is held, shape (b,)."""
+    out = np.zeros(one.driving.size, np.bool_)
+    for s in one.spells:
+        if s.mode is FaultMode.STUCK:
+            out[s.start : s.stop] = True
+    return out
 
 
 def less_sure(spell: Spell, wheel: str, judged: Mapping[str, Judged], block_s: float) -> Spell:

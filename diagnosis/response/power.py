@@ -33,6 +33,7 @@ _SURE = 0.95
 _LEAST_S = 1.0  # of expected motion in a place
 _APART_S = 1.0
 _BARE_S = 5.0  # beside its command alone
+_HALF = 0.5  # loss of `_TRACED_S` that must have shown where a reading is called healthy
 
 
 def powers_of(
@@ -97,6 +98,30 @@ def powers_of(
             trace = tuple(float(x) if np.isfinite(x) else None for x in losses)
     told = Side.SENSOR if beside is not None else Side.SENSOR_OR_ACTUATOR
     return Powers(tuple(rows), told, starts, trace)
+
+
+def unshown(powers: Powers, size: int, block_s: float) -> Flags:
+    """Blocks around which a speed lower by half would mostly not have shown for ten seconds: that nothing is seen there says nothing.
+
+    Parameters
+    ----------
+    powers : Powers
+        What would have shown.
+    size : int
+        Blocks of the mission.
+    block_s : float
+        Length of a block [s].
+
+    Returns
+    -------
+    Flags, shape (size,)
+    """
+    number = max(1, round(_TRACED_S / block_s))
+    shown = np.zeros(size)
+    for start, loss in zip(powers.start_s, powers.loss, strict=True):
+        first = round(start / block_s)
+        shown[first : first + number] += 1.0 if loss is not None and loss <= _HALF else -1.0
+    return np.asarray(shown <= 0.0)
 
 
 def _gain(blocks: Blocks, driving: Flags, block_s: float, beside: Beside | None, size: float) -> Array:

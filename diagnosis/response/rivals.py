@@ -184,9 +184,11 @@ def jumped(one: Judged, spell: Spell) -> bool:
 
 def _off_a_share(one: Judged, spell: Spell) -> float:
     """Misfit of a wheel's readings beside one gain of its speed by other channels, by their size [1]; 1 where nothing is known."""
+    if one.speed is None:
+        return 1.0
     part = slice(spell.start, spell.stop)
-    y, x = one.wheel.blocks.mean[part], np.full(1, np.nan) if one.speed is None else one.speed[part]
-    known = np.isfinite(y) & np.isfinite(x) if x.size == y.size else np.zeros(y.size, np.bool_)
+    y, x = one.wheel.blocks.mean[part], one.speed[part]
+    known = np.isfinite(y) & np.isfinite(x)
     if not np.any(x[known] != 0.0):
         return 1.0
     made = x[known] * float(x[known] @ y[known]) / float(x[known] @ x[known])

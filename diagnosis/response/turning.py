@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from diagnosis.response.identification import beyond
 from diagnosis.response.jumps import falls_dead
 from diagnosis.response.machine import Judged
 from diagnosis.response.spells import Spell
@@ -32,6 +33,7 @@ _LIES = -0.5, 1.6  # what a share may be at all
 _OPPOSITE = (
     0.5  # of the difference of two sides' deviations: a smaller sum is a turn, of one wheel's fault they are alike
 )
+_TOO = 0.5  # of the deviation beside the yaw rate that a wheel has beside its command: then both say that it is wrong
 _LEAST_SPELL, _BETTER = 6, 0.5  # blocks; of the misfit of any wheel's gain, that a fault of the yaw rate leaves
 
 
@@ -198,7 +200,8 @@ def wrong_yaw_rate(spell: Spell, one: Judged) -> bool:
     """Whether a deviation beside the other side and the yaw rate is the yaw rate's fault rather than a wheel's.
 
     A wheel that reads a share of its speed is off by a share of what it reads, whether the machine turns or not. A yaw rate that is dead,
-    frozen, scaled or shifted puts the wheel off by a share of the difference of the sides and by a constant: a·(y − x) + b.
+    frozen, scaled or shifted puts the wheel off by a share of the difference of the sides and by a constant: a·(y − x) + b. So does a reading
+    that is shifted, but that one is off its command, too.
 
     Parameters
     ----------
@@ -220,6 +223,10 @@ def wrong_yaw_rate(spell: Spell, one: Judged) -> bool:
     if np.count_nonzero(known) < _LEAST_SPELL:
         return False
     y, x, off = y[known], x[known], (y - view)[known]
+    b = one.wheel.blocks
+    beside_command = np.nan_to_num(beyond(b.mean, b.low, b.high)[part][known])
+    if float(np.sum(beside_command**2)) > _TOO**2 * float(np.sum(off**2)):
+        return False
     by_wheel = min(_rest(off, y[:, np.newaxis]), _rest(off, x[:, np.newaxis]))
     return bool(_rest(off, np.column_stack([y - x, np.ones(y.size)])) < _BETTER * by_wheel)
 

@@ -9,8 +9,11 @@ from collections.abc import Mapping, Sequence
 
 from replay.log.raw_log import Channel
 from replay.machine.config import Machine
+from replay.machine.quantities import SI_UNITS
+from replay.machine.signal_table import quantity_of
 from replay.signals.name_parts import wheel_of
 from replay.signals.name_words import english, role, tokens
+from replay.signals.unsure_names import Open, Unsure, unsure
 
 
 def asked_columns(channels: Mapping[str, Channel], machine: Machine, used: Sequence[str]) -> dict[str, str]:
@@ -33,7 +36,20 @@ def asked_columns(channels: Mapping[str, Channel], machine: Machine, used: Seque
     return out
 
 
-def where_commands_are(only: str, columns: Mapping[str, str]) -> str:
+def motions_of_body(channels: Mapping[str, Channel], machine: Machine) -> list[Unsure]:
+    """Columns that may be the machine's commands, or what it does: ``linear_x``, ``angular_z``.
+
+    Parameters
+    ----------
+    channels : Mapping[str, Channel]
+        Of the log, by name.
+    machine : Machine
+        Its wheels.
+    """
+    return [one for one in unsure(channels, machine) if one.kind is Open.MOTION]
+
+
+def where_commands_are(only: str, columns: Mapping[str, str], motions: Sequence[Unsure] = ()) -> str:
     """The question where the commands are, with columns that may hold them.
 
     Parameters
@@ -42,7 +58,18 @@ def where_commands_are(only: str, columns: Mapping[str, str]) -> str:
         What can be judged without commands, in words.
     columns : Mapping[str, str]
         Of `asked_columns`.
+    motions : Sequence[Unsure]
+        Of `motions_of_body`.
     """
+    if motions:
+        lines = " and ".join(
+            f'"{one.signal}" = {{ column = "{one.origin.label}", unit = "{one.origin.unit or SI_UNITS[quantity_of(one.signal)]}" }}'
+            for one in motions
+        )
+        return (
+            f"where are the commands? None is known by its name, so {only}. {', '.join(one.origin.label for one in motions)} may be what "
+            f"the machine is told to do, or what it does: if they are its commands, write {lines}; the measured speed of the machine is odom.v."
+        )
     if not columns:
         return f"where are the commands? None is in the log, so {only}; record /cmd_vel, or name its topic."
     wheel, name = next(iter(columns.items()))

@@ -14,7 +14,7 @@ from replay.log.raw_log import Channel, RawLog
 from replay.log.source_options import SignalSource
 from replay.machine.config import Control, Machine, haulotte
 from replay.machine.geometry import Geometry
-from replay.setup.asked_columns import asked_columns, where_commands_are
+from replay.setup.asked_columns import asked_columns, motions_of_body, where_commands_are
 from replay.setup.by_the_body import radius_by_body
 from replay.setup.contradictions import in_turn_with_commands, units_by_positions
 from replay.setup.draft_notes import Draft
@@ -260,7 +260,8 @@ def _ask_for_what_is_missing(draft: Draft, found: Signals, channels: Mapping[str
             "wheels can only be compared with each other" if len(draft.machine.wheels) > 1 else "nothing can be judged"
         )
         used = [signal.origin.label for signal in found.items.values()]
-        draft.ask("signals", where_commands_are(only, asked_columns(channels, draft.machine, used)))
+        asked, motions = asked_columns(channels, draft.machine, used), motions_of_body(channels, draft.machine)
+        draft.ask("signals", where_commands_are(only, asked, motions))
 
 
 def _in_one_direction(

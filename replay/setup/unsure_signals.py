@@ -37,7 +37,10 @@ def unsure_signals(
     """
     kinds: dict[Open, list[Unsure]] = defaultdict(list)
     for one in unsure(channels, machine):
-        if one.signal not in found.items and one.kind is not Open.CURRENT:  # which have their own question
+        if one.signal not in found.items and one.kind not in (
+            Open.CURRENT,
+            Open.MOTION,
+        ):  # which have their own questions
             kinds[one.kind].append(one)
     for kind, ones in kinds.items():
         if kind in _QUESTIONS:

@@ -17,6 +17,7 @@ from replay.machine.config import Machine
 from replay.machine.quantities import SI_UNITS
 from replay.machine.signal_table import quantity_of
 from replay.machine.units import known_unit, si_factor
+from replay.signals.restarts import continued
 
 LARGEST = 1e30
 _WIDE = 1.5
@@ -82,7 +83,7 @@ def convert(
     machine: Machine,
     store: ColumnStore,
 ) -> Converted:
-    """Order stamps, differentiate where asked, and convert: (recorded · gain + offset) · factor.
+    """Order stamps, continue positions over their restarts and differentiate where asked, convert: (recorded · gain + offset) · factor.
 
     Numbers beyond `LARGEST` are damage, not readings: their squares and sums would overflow. They become missing.
 
@@ -108,6 +109,9 @@ def convert(
     stamps, recorded, notes = _ordered(*data)
     if origin.derivative and recorded.dtype.kind in "iu" and len(recorded):
         recorded = recorded.astype(np.int64) - np.int64(recorded[0])  # exact before they become floats
+    if origin.derivative:
+        recorded, restarts = continued(recorded, origin)
+        notes = (*notes, *((restarts,) if restarts else ()))
     beyond = 0
 
     def in_si(x: NDArray[Any]) -> NDArray[np.float64]:

@@ -37,6 +37,7 @@ class Open(StrEnum):
     POSITION = "position"
     SPEED = "speed"
     SECOND = "second"
+    MOTION = "motion"
 
 
 @dataclass(frozen=True)
@@ -72,6 +73,7 @@ _REASONS = {
     Open.COUNTS: "counts an encoder's steps, and how many make a turn is not known; with gain = 6.2832 / the steps of a turn",
     Open.POSITION: "may be the position of a wheel, whose slope is its speed; if it is, and in rad",
     Open.SPEED: "has no word for what it holds; if it is a speed, with its unit (m/s, rad/s, rpm, mm/s)",
+    Open.MOTION: "may be what the machine is told to do, or what it does (odom.v is its measured speed); if it is the command",
     Open.SECOND: "may be a second sensor beside {beside!r}; if it is",
 }
 _LETTERS = frozenset(("v", "w", "n", "omega"))  # that stand for a speed
@@ -82,6 +84,12 @@ _STEPS = frozenset(
 )  # fmt: skip
 _PLACES = frozenset(("position", "pos", "positions"))
 _MORE = frozenset(("raw", "total", "abs", "value", "state", "states", "name"))  # that change nothing
+#: Words of the two motions of a machine, of which each name needs one of the first and may have those of the second.
+_MOTIONS = {
+    "cmd.v": (frozenset(("linear", "lin")), frozenset(("x", "v", "speed", "velocity", "vel"))),
+    "cmd.omega": (frozenset(("angular",)), frozenset(("z", "w", "omega", "speed", "velocity", "vel", "rate"))),
+}
+_OF_BODY = frozenset(("twist", "base", "robot"))
 _SIDED = re.compile(
     r"(?<![A-Za-z])([vwn])([lr])(?![a-z])", re.IGNORECASE
 )  # vl: v of the left one, of a machine with two
@@ -112,6 +120,8 @@ def unsure(channels: Mapping[str, Channel], machine: Machine) -> list[Unsure]:
             out.append(Unsure(current, source_of(channel, "1"), Open.CURRENT))
         elif name in names:
             out += _one(channel, names[name], names, measured)
+        else:
+            out += _motion(channel, measured)
     first: dict[str, Unsure] = {}
     for found in out:
         first.setdefault(found.signal, found)
@@ -160,6 +170,17 @@ def _one(channel: Channel, said: _Said, names: Mapping[str, _Said], measured: se
         pair = _pair(said, names)
         if words & _LETTERS or pair:
             yield Unsure(f"{v}_ref" if said.asked == "ref" else v, source_of(channel, said.unit), Open.SPEED, pair)
+
+
+def _motion(channel: Channel, sure: set[str]) -> Iterator[Unsure]:
+    """Yield the command that a column of the whole machine may be, where no other one is one: ``linear_x``, ``angular_z``."""
+    name, stated = bare_name(channel.name)
+    unit = stated or unit_by_end(name)
+    words = {*english(tokens(name))} - {*english(tokens(unit_by_end(name)))} - _OF_BODY
+    for signal, (named, more) in _MOTIONS.items():
+        fits = _quantity(unit) in ("", "speed" if signal == "cmd.v" else "rotation")
+        if signal not in sure and fits and words & named and words <= named | more:
+            yield Unsure(signal, source_of(channel, unit), Open.MOTION)
 
 
 def _pair(said: _Said, names: Mapping[str, _Said]) -> str:

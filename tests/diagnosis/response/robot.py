@@ -28,7 +28,13 @@ def commands(seed: int) -> tuple[Array, Array]:
 
 def speeds(seed: int, wheels: tuple[str, ...] = WHEELS) -> tuple[dict[str, Array], dict[str, Array], Array]:
     """Speeds that the wheels of a healthy robot report, what each is asked for [m/s], and the commands of the body, (n, 2)."""
-    v, turn = commands(seed)
+    return robot_of(*commands(seed), seed, wheels)
+
+
+def robot_of(
+    v: Array, turn: Array, seed: int, wheels: tuple[str, ...] = WHEELS
+) -> tuple[dict[str, Array], dict[str, Array], Array]:
+    """What `speeds` returns, of a speed [m/s] and a yaw rate [rad/s] that are asked for, shape (n,)."""
     rng = np.random.default_rng(seed + 1000)
     measured, asked = {}, {}
     for w in wheels:
@@ -42,7 +48,7 @@ def speeds(seed: int, wheels: tuple[str, ...] = WHEELS) -> tuple[dict[str, Array
 def followers_of(measured: dict[str, Array], asked: dict[str, Array], body: Array) -> dict[str, FollowerData]:
     """What the family is given."""
     width = cell_of(DT)
-    columns = np.column_stack([cells(body[:, k], width) for k in range(2)])
+    columns = np.column_stack([cells(body[:, k], width) for k in range(body.shape[1])])
     return {
         w: FollowerData(y.copy(), np.ones(y.size, np.bool_), columns, asked[w], f"wheel.{w}.v")
         for w, y in measured.items()

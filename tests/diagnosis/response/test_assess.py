@@ -13,7 +13,7 @@ from diagnosis.results.assessment import CODE, Finding
 from diagnosis.results.detectability import Deviation, Powers
 from replay.faults import FaultMode, Side, State
 from replay.machine.config import Limits
-from tests.diagnosis.response.robot import DT, TRACK, WHEELS, followers_of, geometry, speeds
+from tests.diagnosis.response.robot import DT, TRACK, WHEELS, commands, followers_of, geometry, robot_of, speeds
 
 Array = NDArray[np.float64]
 
@@ -123,6 +123,19 @@ def test_a_scale_over_the_whole_mission_is_not_called_healthy(scale: float) -> N
     assert share(j, "FL", State.HEALTHY) == 0.0
     assert "what the other {wheels} make of the same command" in j.parts["FL"][0].reasons[State.NOT_ASSESSED]
     assert share(j, "FR", State.HEALTHY) > 0.9
+
+
+@pytest.mark.parametrize("seed", [1, 3])
+def test_half_a_speed_that_turns_of_which_nothing_is_logged_would_hide_is_not_called_healthy(seed: int) -> None:
+    v, turn = commands(seed)
+    measured, asked, _ = robot_of(v, 2.0 * turn, seed, ("FR", "FL"))
+    half = slice(PART.start, PART.start + round(20 / DT))
+    measured["FL"][half] *= 0.5
+    j = judged(measured, dict.fromkeys(asked, v), v[:, np.newaxis])
+    sensor, _ = j.parts["FL"]
+    assert findings(j) == []
+    assert CODE[State.HEALTHY] not in sensor.states[half]
+    assert "half of it would not show" in sensor.reasons[State.NOT_ASSESSED]
 
 
 def test_without_commands_wheels_of_a_side_judge_each_other() -> None:

@@ -45,6 +45,18 @@ def test_a_stop_of_the_machine_in_the_middle_of_a_sensors_fault_blames_no_other_
     assert any(f.mode is FaultMode(kind) for _, _, f in told)
 
 
+@pytest.mark.parametrize("seed", [21, 24])
+def test_of_two_wheels_the_one_that_stands_with_the_machine_is_not_blamed_for_a_shift_of_the_other(seed: int) -> None:
+    measured, asked, body = speeds(seed, ("FR", "FL"))
+    fault, stop = span(60, 85), span(66, 73)
+    for w, c in asked.items():
+        body[stop], c[stop] = (1.0, 0.0), 1.0
+        measured[w][stop] = 0.0
+    yaw = (measured["FR"] - measured["FL"]) / TRACK + np.random.default_rng(seed).normal(0.0, 0.01, body.shape[0])
+    measured["FL"][fault] += 0.2
+    assert {w for w, _, f in found(measured, asked, body, yaw) if f.mode is FaultMode.NO_SIGNAL} == set()
+
+
 def test_wheels_that_a_runaway_neighbour_holds_back_are_no_faults_of_their_own() -> None:
     """A frozen encoder lets its loop run away; two others stand for a while, as it pushes against them."""
     measured, asked, body = speeds(22)

@@ -58,6 +58,18 @@ def test_a_wheel_that_reads_half_of_its_speed_is_told_beside_the_yaw_rate(wheel:
     assert {w for w, _ in told(measured, yaw, 3)} == {wheel}
 
 
+@pytest.mark.parametrize("shift", [0.3, -0.3])
+@pytest.mark.parametrize("seed", [3, 11])
+def test_a_shifted_wheel_that_its_command_contradicts_too_is_not_the_gyros_fault(shift: float, seed: int) -> None:
+    measured, asked, body = speeds(seed, PAIR)
+    yaw = yaw_of(measured, seed)
+    measured["L"] = measured["L"].copy()
+    measured["L"][SPELL] += shift
+    found = assess_response(followers_of(measured, asked, body), geometry(PAIR), yaw, Limits(), DT)
+    assert found.gyro == ()
+    assert {w for w, sides in found.parts.items() for side in sides for _ in side.findings} == {"L"}
+
+
 def told_without_turns(measured: dict[str, Array], seed: int, wheels: tuple[str, ...]) -> list[tuple[str, Finding]]:
     """Findings of a log that has the commanded speed alone, neither a commanded nor a measured yaw rate."""
     _, _, body = speeds(seed, wheels)

@@ -50,6 +50,14 @@ def test_positions_of_joints(tmp_path: Path) -> None:
     assert any("positions of the wheels in rad?" in q for q in draft.questions)
 
 
+def test_motions_of_the_body_that_may_be_commands_are_asked_for_and_not_taken(tmp_path: Path) -> None:
+    speeds = {f"{s}_wheel_vel": x / RADIUS for s, x in SIDES.items()}
+    draft = drafted(tmp_path, {"linear_x": V, "angular_z": W, **speeds})
+    assert "cmd.v" not in draft.machine.signals
+    (question,) = (q for q in draft.questions if "where are the commands?" in q)
+    assert '"cmd.omega" = { column = "angular_z", unit = "rad/s" }' in question
+
+
 def test_steps_of_encoders_get_the_scale_that_fits_the_command(tmp_path: Path) -> None:
     steps = 500
     columns = {f"{s}_ticks": np.round(turned(s) * steps / (2 * np.pi)) for s in SIDES}

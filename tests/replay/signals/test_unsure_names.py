@@ -47,6 +47,18 @@ def test_pairs_and_letters_of_two_wheels(names: tuple[str, ...], found: dict[str
     assert {u.kind for u in some} == {Open.SPEED}
 
 
+@pytest.mark.parametrize(
+    "names", [("linear_x", "angular_z"), ("twist.linear.x", "twist.angular.z"), ("lin_vel", "angular_vel"), ("linear [m/s]", "angular [deg/s]")]
+)  # fmt: skip
+def test_motions_of_the_body_that_may_be_commands_are_named(names: tuple[str, str]) -> None:
+    some = unsure(columns(*names, "left_vel", "right_vel"), TWO)
+    assert {u.signal: u.origin.label for u in some} == {"cmd.v": names[0], "cmd.omega": names[1]}
+    assert {u.kind for u in some} == {Open.MOTION}
+    beside = columns(*names, "cmd_linear_x", "cmd_angular_z")
+    assert unsure(beside, TWO) == []
+    assert unsure(columns("linear_acceleration_x", "angular_y", "linear_y", "x", "linear_x [m]"), TWO) == []
+
+
 @pytest.mark.parametrize("pattern", ["{}_VL", "VL_{}", "Rad_VL.{}", "MAIN.fbRad_VL.{}"])
 def test_pairs_of_four_wheels_in_any_order(pattern: str) -> None:
     names = [pattern.format(w) for w in ("soll", "ist")]
