@@ -33,7 +33,7 @@ def asked_columns(channels: Mapping[str, Channel], machine: Machine, used: Seque
     return out
 
 
-def where_commands_are(only: str, columns: Mapping[str, str]) -> str:
+def where_commands_are(only: str, columns: Mapping[str, str], commands: Mapping[str, tuple[str, str]]) -> str:
     """The question where the commands are, with columns that may hold them.
 
     Parameters
@@ -42,7 +42,13 @@ def where_commands_are(only: str, columns: Mapping[str, str]) -> str:
         What can be judged without commands, in words.
     columns : Mapping[str, str]
         Of `asked_columns`.
+    commands : Mapping[str, tuple[str, str]]
+        Of `possible_commands`.
     """
+    if commands:
+        topic, lines = next(iter(commands.items()))
+        may = f"{topic} may hold them" if len(commands) == 1 else f"one of {', '.join(commands)} may hold them"
+        return f"where are the commands? None is known by its name, so {only}. {may}; if {topic} does, write {' and '.join(lines)}."
     if not columns:
         return f"where are the commands? None is in the log, so {only}; record /cmd_vel, or name its topic."
     wheel, name = next(iter(columns.items()))

@@ -31,6 +31,7 @@ from replay.setup.unstated_units import usual_units, valve_currents
 from replay.setup.unsure_signals import unsure_signals
 from replay.signals.file_names import named_channels
 from replay.signals.mapping import by_number, map_signals
+from replay.signals.possible_commands import possible_commands
 from replay.signals.signal import Signals
 from replay.signals.unfilled import unfilled, unfilled_note
 
@@ -260,7 +261,8 @@ def _ask_for_what_is_missing(draft: Draft, found: Signals, channels: Mapping[str
             "wheels can only be compared with each other" if len(draft.machine.wheels) > 1 else "nothing can be judged"
         )
         used = [signal.origin.label for signal in found.items.values()]
-        draft.ask("signals", where_commands_are(only, asked_columns(channels, draft.machine, used)))
+        commands = possible_commands((c.topic, c.type_name) for c in channels.values())
+        draft.ask("signals", where_commands_are(only, asked_columns(channels, draft.machine, used), commands))
 
 
 def _in_one_direction(
