@@ -47,6 +47,8 @@ class Robot:
         Recorded speeds by rad/s [1].
     positions : bool
         Whether positions of the joints are recorded.
+    command_topic : str
+        Where the commands are recorded.
     """
 
     wheels: Mapping[str, tuple[float, float]] = field(default_factory=lambda: WHEELS)
@@ -58,6 +60,7 @@ class Robot:
     turns: float = 1.0
     scale: float = 1.0
     positions: bool = False
+    command_topic: str = "/cmd_vel"
 
 
 def urdf(wheels: Mapping[str, tuple[float, float]] = WHEELS, mirrored: tuple[str, ...] = ()) -> str:
@@ -115,7 +118,9 @@ def write_robot(path: Path, robot: Robot, seconds: float = 60.0, seed: int = 3) 
             at = START_NS + k * STEP_NS
             if robot.commands:
                 turn = robot.turns * omega[k]
-                writer.write("/cmd_vel", "geometry_msgs/msg/Twist", at, linear=(v[k], 0, 0), angular=(0, 0, turn))
+                writer.write(
+                    robot.command_topic, "geometry_msgs/msg/Twist", at, linear=(v[k], 0, 0), angular=(0, 0, turn)
+                )
             values = np.array([robot.scale * s[k] for s in speeds.values()])
             rolled = np.array([a[k] for a in angles.values()]) if robot.positions else np.empty(0)
             writer.joints("/joint_states", at, list(speeds), values, rolled)

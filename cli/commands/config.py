@@ -133,7 +133,7 @@ def show(context: typer.Context, machine: MachineFile = None, quiet: Quiet = Fal
     from replay.machine.toml_text import dump_machine
 
     the_machine, source = machine_of(machine)
-    terminal_of(context).show_text(f"# {source}\n{dump_machine(the_machine)}")
+    terminal_of(context).show_file(f"# {source}\n{dump_machine(the_machine)}")
 
 
 for _function, _example in (

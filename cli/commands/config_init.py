@@ -74,7 +74,7 @@ def _give(terminal: Terminal, name: Path | None, text: str) -> None:
     from replay.machine.toml_file import load_machine
 
     if name is None:
-        terminal.show_text(text)
+        terminal.show_file(text)
         return
     with atomic_path(name) as temporary:
         temporary.write_text(text, encoding="utf-8")

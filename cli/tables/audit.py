@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -19,6 +19,7 @@ from diagnosis.results.vocabulary import Verdict
 
 if TYPE_CHECKING:
     from diagnosis.audit.discovery.discover import Discovery
+    from diagnosis.audit.endings import Ending
     from diagnosis.audit.fleet.listed import ListedMachine
     from diagnosis.audit.plan import Planned
     from diagnosis.audit.session import Audited
@@ -76,6 +77,7 @@ def summary_parts(audited: Audited, found: Discovery, output: Path) -> list[Rend
         rest = len(damaged) - _NAMED
         more = f" and {rest} more" if rest > 0 else ""
         parts.append(text(f"damaged, or in part not judged: {', '.join(damaged[:_NAMED])}{more}", "dim"))
+    parts += [text(f"copies of one log, which count once: {', '.join(same)}", "dim") for same in _copies(ends)[:_NAMED]]
     if audited.gone:
         was = "mission that is" if audited.gone == 1 else "missions that are"
         parts.append(text(f"the fleet page also counts {audited.gone} {was} no longer there", "dim"))
@@ -83,6 +85,15 @@ def summary_parts(audited: Audited, found: Discovery, output: Path) -> list[Rend
     if audited.failed:
         files.append(("failures", output / "failures.txt"))
     return [*parts, "", key_values(files)]
+
+
+def _copies(ends: Sequence[Ending]) -> list[list[str]]:
+    """Names of missions that have one report, for they are one log."""
+    names: dict[str, list[str]] = defaultdict(list)
+    for end in ends:
+        if end.report is not None:
+            names[end.report].append(end.name)
+    return [same for same in names.values() if len(same) > 1]
 
 
 def leave_parts(machines: Sequence[ListedMachine]) -> list[RenderableType]:

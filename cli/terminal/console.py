@@ -52,6 +52,10 @@ class Terminal:
         if not self.quiet:
             _write(sys.stdout, text)
 
+    def show_file(self, text: str) -> None:
+        """Print a file that is asked for on stdout, also when quiet."""
+        _write(sys.stdout, text)
+
     def show_json(self, document: object) -> None:
         """Print the one JSON document of a run, as UTF-8."""
         # A lone surrogate of a file name becomes its JSON escape.

@@ -131,6 +131,11 @@ def utc(start_ns: Any) -> str:
     return moment.isoformat(" ")[:19]
 
 
+def utc_moment(ns: int) -> str:
+    """Nanoseconds since 1970 to the minute, with their zone: ``2026-10-05 12:30 UTC``."""
+    return f"{utc(ns)[:16]} UTC"
+
+
 def utc_mark(start_ns: Any, length: int = 19, *, both: bool = False) -> Markup:
     """The same as an element, to which the page's script adds the reader's local time: as a hint, or also beside it.
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 
 from diagnosis.comparison.coverage import SideCoverage, sides_of
-from diagnosis.results.document import IntervalRow, ReportDocument
+from diagnosis.results.document import IntervalRow, ReportDocument, VerdictRow
 from diagnosis.results.fault_rows import state_label
 from diagnosis.results.machine_words import words_of
 from diagnosis.results.vocabulary import Kind, Severity, Tier, Verdict
@@ -188,15 +188,29 @@ def headline(report: ReportDocument) -> tuple[str, str]:
     """Verdict in a word or two, and whether the machine may go out; the latter empty where the former says it.
 
     Faults to watch give leave only where every wheel part was judged long enough and nothing of the log is lost; see
-    `diagnosis.decision.decide`.
+    `diagnosis.decision.decide`. No leave is given while an audit holds a fault of an earlier mission open.
     """
     verdict = report["verdict"]
     status = Verdict(verdict["status"])
+    if holds_open(report) and may_go_out(verdict):
+        label = "Faults to watch" if status is Verdict.WATCH else "No fault in this mission"
+        return label, "but one of an earlier mission is open: the fleet page says whether it may go out"
     if status is not Verdict.WATCH:
         return status.label, _ANSWERS[status]
     if not verdict["cleared"]:
         return status.label, f"not cleared: {verdict['not_cleared']}"
     return "Ready, with faults to watch", "may go out"
+
+
+def may_go_out(verdict: VerdictRow) -> bool:
+    """Whether a verdict gives leave, by its own mission alone."""
+    status = Verdict(verdict["status"])
+    return status is Verdict.READY or (status is Verdict.WATCH and verdict["cleared"])
+
+
+def holds_open(report: ReportDocument) -> bool:
+    """Whether an audit has written into a report that a severe fault of an earlier mission is open."""
+    return "previous" in report and bool(report["previous"].get("open_faults"))
 
 
 def _share(x: float) -> str:

@@ -9,7 +9,16 @@ from typing import Any
 from markupsafe import Markup
 
 from diagnosis.pages.labels import UNDATED_NS, clock, mode_legend, number, sat_text, utc, utc_mark
-from diagnosis.report.confidence import headline, judged, judged_means, percent, sure_of, sure_of_verdict
+from diagnosis.report.confidence import (
+    headline,
+    holds_open,
+    judged,
+    judged_means,
+    may_go_out,
+    percent,
+    sure_of,
+    sure_of_verdict,
+)
 from diagnosis.report.data_tables import (
     check_rows,
     coverage_rows,
@@ -101,9 +110,10 @@ def context(report: ReportDocument, duration: float) -> Context:
 def _verdict(report: ReportDocument) -> Context:
     verdict = report["verdict"]
     words, answer = headline(report)
+    blocked = holds_open(report) and may_go_out(verdict)
     faults = {f["id"]: f for f in report["intervals"]}
     return {
-        "state": Verdict(verdict["status"]).symbol,
+        "state": (Verdict.NOT_ASSESSED if blocked else Verdict(verdict["status"])).symbol,
         "words": words,
         "steered": bool(report["machine"]["axles"]),
         "answer": answer,

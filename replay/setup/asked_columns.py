@@ -49,7 +49,12 @@ def motions_of_body(channels: Mapping[str, Channel], machine: Machine) -> list[U
     return [one for one in unsure(channels, machine) if one.kind is Open.MOTION]
 
 
-def where_commands_are(only: str, columns: Mapping[str, str], motions: Sequence[Unsure] = ()) -> str:
+def where_commands_are(
+    only: str,
+    columns: Mapping[str, str],
+    commands: Mapping[str, tuple[str, str]],
+    motions: Sequence[Unsure],
+) -> str:
     """The question where the commands are, with columns that may hold them.
 
     Parameters
@@ -58,17 +63,23 @@ def where_commands_are(only: str, columns: Mapping[str, str], motions: Sequence[
         What can be judged without commands, in words.
     columns : Mapping[str, str]
         Of `asked_columns`.
+    commands : Mapping[str, tuple[str, str]]
+        Of `possible_commands`.
     motions : Sequence[Unsure]
         Of `motions_of_body`.
     """
+    if commands:
+        topic, lines = next(iter(commands.items()))
+        may = f"{topic} may hold them" if len(commands) == 1 else f"one of {', '.join(commands)} may hold them"
+        return f"where are the commands? None is known by its name, so {only}. {may}; if {topic} does, write {' and '.join(lines)}."
     if motions:
-        lines = " and ".join(
+        written = " and ".join(
             f'"{one.signal}" = {{ column = "{one.origin.label}", unit = "{one.origin.unit or SI_UNITS[quantity_of(one.signal)]}" }}'
             for one in motions
         )
         return (
             f"where are the commands? None is known by its name, so {only}. {', '.join(one.origin.label for one in motions)} may be what "
-            f"the machine is told to do, or what it does: if they are its commands, write {lines}; the measured speed of the machine is odom.v."
+            f"the machine is told to do, or what it does: if they are its commands, write {written}; the measured speed of the machine is odom.v."
         )
     if not columns:
         return f"where are the commands? None is in the log, so {only}; record /cmd_vel, or name its topic."

@@ -31,6 +31,7 @@ from replay.setup.unstated_units import usual_units, valve_currents
 from replay.setup.unsure_signals import unsure_signals
 from replay.signals.file_names import named_channels
 from replay.signals.mapping import by_number, map_signals
+from replay.signals.possible_commands import possible_commands
 from replay.signals.signal import Signals
 from replay.signals.unfilled import unfilled, unfilled_note
 
@@ -261,7 +262,8 @@ def _ask_for_what_is_missing(draft: Draft, found: Signals, channels: Mapping[str
         )
         used = [signal.origin.label for signal in found.items.values()]
         asked, motions = asked_columns(channels, draft.machine, used), motions_of_body(channels, draft.machine)
-        draft.ask("signals", where_commands_are(only, asked, motions))
+        commands = possible_commands((c.topic, c.type_name) for c in channels.values())
+        draft.ask("signals", where_commands_are(only, asked, commands, motions))
 
 
 def _in_one_direction(

@@ -11,6 +11,7 @@ from replay.machine.config import Machine
 from replay.machine.signal_table import quantity_of
 from replay.setup.draft_notes import Draft
 from replay.signals.candidate import source_of
+from replay.signals.name_parts import first_indices
 from replay.signals.named_units import bare_name
 from replay.signals.signal import Signals
 from replay.signals.symbol_rules import valve_current
@@ -42,7 +43,8 @@ def valve_currents(
     found : Signals
         As found by their names: valves whose openings are logged keep these.
     """
-    named = {name: c for c in channels.values() if (name := valve_current(c, machine)) is not None}
+    first = first_indices(channels)
+    named = {name: c for c in channels.values() if (name := valve_current(c, machine, first)) is not None}
     out: dict[str, SignalSource] = {}
     shown: list[str] = []
     for kind in ("wheel", "steer"):

@@ -92,6 +92,8 @@ def is_place(word: str) -> bool:
 
 def is_steering(name: str) -> bool:
     """Whether a name speaks of steering, or of an angle of an axle."""
+    if re.search(r"cast[eo]r", name.lower()):  # swivels by itself
+        return False
     if _STEER.search(name.lower()) is not None:
         return True
     words = {*tokens(name)}

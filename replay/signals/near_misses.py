@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from replay.log.raw_log import LogSummary
+from replay.signals.possible_commands import possible_commands
 
 _RECORD = "record the odometry itself (nav_msgs/Odometry, as /odom)"
 #: By signal: types of messages that hold it in a form that is not read, and what to record instead.
@@ -30,7 +31,12 @@ def near_misses(missing: Mapping[str, str], summaries: Sequence[LogSummary], unk
         The reason that is to be replaced: that nothing fits.
     """
     out = dict(missing)
-    for name, reason in missing.items():
+    commands = possible_commands((t.name, t.type_name) for s in summaries for t in s.topics)
+    for name, at in (("cmd.v", 0), ("cmd.omega", 1)):
+        if commands and out.get(name) == unknown:
+            topic, lines = next(iter(commands.items()))
+            out[name] = f"{topic} may be the command, which its name does not say; if it is, write {lines[at]}"
+    for name, reason in [*out.items()]:
         types, advice = _INSTEAD.get(name, ((), ""))
         held = [
             t.name

@@ -75,7 +75,7 @@ def _by_message(channel: Channel, machine: Machine, others: Mapping[str, Channel
     def found(signal: str, unit: str, rank: int, why: str = "") -> Candidate:
         return Candidate(signal, source_of(channel, unit), rank, why or f"{leaf} on {topic}")
 
-    if leaf in ("Twist", "TwistStamped") and re.search(r"cmd|command", topic.lower()):
+    if leaf in ("Twist", "TwistStamped") and (re.search(r"cmd|command", topic.lower()) or ASKING & {*tokens(topic)}):
         rank = {"cmd_vel": 1, "cmd": 2}.get(plain, 3) + topic.count("/") - 1
         if field in ("linear.x", "twist.linear.x"):
             yield found("cmd.v", "m/s", rank)

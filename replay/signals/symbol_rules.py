@@ -101,10 +101,19 @@ def by_symbol(channel: Channel, machine: Machine, first: Mapping[str, int]) -> I
         yield Candidate(signal, source_of(channel, unit), rank, f"{channel.name} {how}")
 
 
-def valve_current(channel: Channel, machine: Machine) -> str | None:
+def valve_current(channel: Channel, machine: Machine, first: Mapping[str, int]) -> str | None:
     """Canonical name of the command that a valve's current or voltage stands for, by its words or unit; None where a channel is none.
 
     A current opens its valve, by a scale that no name tells: it is no opening until somebody says which current is a full one.
+
+    Parameters
+    ----------
+    channel : Channel
+        Of a table, a PLC, or a message of a type that is not a common one.
+    machine : Machine
+        Its wheels and axles.
+    first : Mapping[str, int]
+        Smallest number of each numbered family of names.
     """
     said = _said(channel, machine)
     if (
@@ -114,7 +123,7 @@ def valve_current(channel: Channel, machine: Machine) -> str | None:
         or any(_NO_SIGNAL.search(w) for w in said.last)
     ):
         return None
-    part = axle_of(said.bare, machine) if said.steering else wheel_of(said.bare, machine)
+    part, _ = _part(channel, said, machine, first)
     return None if part is None else f"{'steer' if said.steering else 'wheel'}.{part}.u"
 
 
@@ -156,11 +165,7 @@ def _part(channel: Channel, said: _Said, machine: Machine, first: Mapping[str, i
     """Wheel or axle by its name, by its number, or as the only one, with the rank of that."""
     part = axle_of(said.bare, machine) if said.steering else wheel_of(said.bare, machine)
     numbered = index_of(said.name)
-    if (
-        part is None
-        and numbered is not None
-        and (said.steering or is_drive(said.bare) or "valve" in "_".join(said.last))
-    ):
+    if part is None and numbered is not None and (said.steering or is_drive(said.bare) or said.valve):
         order = machine.axles if said.steering else machine.wheels
         at = numbered[1] - min(first.get(_family(channel, numbered[0]), first.get(numbered[0], numbered[1])), 1)
         return (order[at] if 0 <= at < len(order) else None), 9

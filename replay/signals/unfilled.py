@@ -1,6 +1,6 @@
-"""Arrays of joint states that a driver does not fill in: 0 of every joint from start to end, while another array moves.
+"""Parts of messages that a driver does not fill in, which stay from start to end while others of their topic move.
 
-Taken for measurements they would be a position that contradicts its own speed, or a drive without effort.
+They are an array of joint states that is 0 of every joint, and an odometry's pose or twist that keeps its first value. Taken for measurements they would be a position that contradicts its own speed, or a drive without effort.
 """
 
 from __future__ import annotations
@@ -13,13 +13,14 @@ from replay.arrays.blocks import blocks
 from replay.log.raw_log import Channel
 
 _ARRAY = re.compile(r"(position|velocity|effort)\[[^\[\]]+\]$")
+_ODOMETRY = re.compile(r"(pose|twist)\.\1\.\w+\.[xyzw]$")
 _LEAST = 50  # samples
 
 
 def unfilled(channels: Mapping[str, Channel]) -> dict[str, str]:
-    """Channels of such arrays by their names, each with its topic and array in words (``/joint_states position``).
+    """Channels of such parts by their names, each with its topic and part in words (``/joint_states position``, ``/odom pose``).
 
-    An array of a topic in which nothing moves is none: the machine may have stood still.
+    A part of a topic in which nothing moves is none: the machine may have stood still.
 
     Parameters
     ----------
@@ -28,8 +29,9 @@ def unfilled(channels: Mapping[str, Channel]) -> dict[str, str]:
     """
     arrays: dict[str, dict[str, list[str]]] = defaultdict(lambda: defaultdict(list))
     for name, channel in channels.items():
-        found = _ARRAY.search(channel.field)
-        if found is not None and channel.type_name.rpartition("/")[2] == "JointState":
+        pattern = {"JointState": _ARRAY, "Odometry": _ODOMETRY}.get(channel.type_name.rpartition("/")[2])
+        found = None if pattern is None else pattern.match(channel.field)
+        if found is not None:
             arrays[channel.topic][found[1]].append(name)
     out: dict[str, str] = {}
     for topic, kinds in arrays.items():
@@ -40,11 +42,20 @@ def unfilled(channels: Mapping[str, Channel]) -> dict[str, str]:
 
 
 def unfilled_note(array: str) -> str:
-    """What is said of such an array."""
-    return f"{array}: 0 of every joint throughout, though the joints move: its driver does not fill it in, and it is not used"
+    """What is said of such a part."""
+    body = array.endswith((" pose", " twist"))
+    what = (
+        "the same throughout, though the machine moves"
+        if body
+        else "0 of every joint throughout, though the joints move"
+    )
+    return f"{array}: {what}: its driver does not fill it in, and it is not used"
 
 
 def _moves(channel: Channel) -> bool:
-    """Whether a channel ever differs from 0; of one that is too short that is not known."""
+    """Whether a channel ever differs from 0, that of an odometry from its first value; of one that is too short that is not known."""
     values = channel.values
-    return values.size < _LEAST or any(bool((values[part] != 0).any()) for part in blocks(values.size))
+    if values.size < _LEAST:
+        return True
+    rest = values[0] if _ODOMETRY.match(channel.field) else 0
+    return any(bool((values[part] != rest).any()) for part in blocks(values.size))

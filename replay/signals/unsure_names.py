@@ -19,7 +19,15 @@ from replay.machine.quantities import UNITS
 from replay.machine.toml_text import signal_line
 from replay.machine.units import known_unit
 from replay.signals.candidate import source_of
-from replay.signals.name_parts import is_place, is_steering, position, side_of, speaks_of_no_wheel, wheel_of
+from replay.signals.name_parts import (
+    first_indices,
+    is_place,
+    is_steering,
+    position,
+    side_of,
+    speaks_of_no_wheel,
+    wheel_of,
+)
 from replay.signals.name_words import ASKING, MEASURED, english, role, tokens
 from replay.signals.named_units import bare_name, unit_by_end
 from replay.signals.rules import candidates
@@ -110,12 +118,12 @@ def unsure(channels: Mapping[str, Channel], machine: Machine) -> list[Unsure]:
     sure: dict[str, set[str]] = defaultdict(set)
     for c in candidates(bare, machine):
         sure[c.origin.label].add(c.signal)
-    out = [*_seconds(bare, machine, sure)]
+    out, first_number = [*_seconds(bare, machine, sure)], first_indices(bare)
     others = {name: c for name, c in bare.items() if name not in sure}
     names = {name: said for name, c in others.items() if (said := _said(c, machine)) is not None}
     measured = {signal for signals in sure.values() for signal in signals}
     for name, channel in others.items():
-        current = valve_current(channel, machine)
+        current = valve_current(channel, machine, first_number)
         if current is not None:
             out.append(Unsure(current, source_of(channel, "1"), Open.CURRENT))
         elif name in names:

@@ -14,7 +14,7 @@ from diagnosis.audit.fleet.fault_types import FaultChange, FaultChangeRow, Fault
 from diagnosis.audit.fleet.fleet_types import BaselineRow, CoverageChangeRow
 from diagnosis.audit.fleet.machines import FleetFault, Machine
 from diagnosis.audit.fleet.parts import PartKey
-from diagnosis.pages.labels import utc
+from diagnosis.pages.labels import utc_moment
 from replay.faults import Side
 
 OUTCOMES: tuple[FaultChange, ...] = ("new", "worse", "better", "not_seen_again", "resolved", "unchanged")
@@ -99,7 +99,7 @@ def _gone(f: FleetFault, b: Machine | None) -> tuple[FaultChange, FleetFault, No
     last = f.last.result.start_ns
     later = [r for r in b.dated if last is not None and (r.result.start_ns or 0) > last]
     if known is not None and known.repaired_ns is not None and known.status == "repaired":
-        return "resolved", f, None, f"repaired on {utc(known.repaired_ns)[:10]}"
+        return "resolved", f, None, f"repaired on {utc_moment(known.repaired_ns)}"
     if known is not None:  # found in this audit too, and refuted since
         return "resolved", f, None, f"not in the last {known.clean} missions that assessed it"
     again = any(r.result.start_ns == last and r.name == f.last.name for r in b.dated)

@@ -78,7 +78,7 @@ def lists_of(document: FleetDocument) -> tuple[Left, ...]:
         place, reason = _why(leave, m, standing[k], document["missions"], rising[k])
         reason = _with_losses(leave, m, reason, untold) + _blind(m)
         if leave is not Leave.MAY and any(f["open"] and f["since"] for f in standing[k]) and _ready(m, document):
-            reason += "; its newest report says ready, as it judges its own mission alone"
+            reason += "; its newest report judges its own mission alone"
         name = "" if place is None else document["missions"][place]["name"]
         out.append(Left(leave, k, m["label"], reason, place, name))
     return tuple(out)

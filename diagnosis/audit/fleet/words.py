@@ -11,7 +11,7 @@ from diagnosis.audit.fleet.trend_types import Axis
 from diagnosis.audit.fleet.trends import PartTrend
 from diagnosis.audit.trends.trend import Forecast
 from diagnosis.decision.wording import join_words
-from diagnosis.pages.labels import utc
+from diagnosis.pages.labels import utc, utc_moment
 from diagnosis.results.fault_rows import mode_words
 from diagnosis.results.left_out import only_left_out
 from diagnosis.results.machine_words import MachineWords
@@ -107,7 +107,7 @@ def standing(m: Machine) -> str:
 
 def _since_repair(m: Machine, repaired_ns: int) -> str:
     """What is known of a machine since its repairs, where no mission after the last one was judged as a whole."""
-    day = utc(repaired_ns)[:10]
+    day = utc_moment(repaired_ns)
     repaired = [f for f in m.faults if f.status == "repaired" and f.repaired_ns is not None]
     told = [(f, _judged_since(m, f)) for f in repaired]
     waiting = [f for f, seen in told if not seen]
@@ -116,7 +116,7 @@ def _since_repair(m: Machine, repaired_ns: int) -> str:
     days: dict[str, list[tuple[FleetFault, int]]] = {}
     for f, seen in told:
         if seen:
-            days.setdefault(utc(f.repaired_ns or 0)[:10], []).append((f, seen))
+            days.setdefault(utc_moment(f.repaired_ns or 0), []).append((f, seen))
     shown = "; ".join(
         f"{_parts(m, [f for f, _ in fs])} clean in {count(min(n for _, n in fs), 'mission')} since the repair on {d}"
         for d, fs in days.items()
@@ -124,7 +124,7 @@ def _since_repair(m: Machine, repaired_ns: int) -> str:
     if not waiting:
         return f"{shown}, other parts not judged"
     since = max(f.repaired_ns or 0 for f in waiting)
-    return f"{shown}; {_parts(m, waiting)} not judged since the repair on {utc(since)[:10]}"
+    return f"{shown}; {_parts(m, waiting)} not judged since the repair on {utc_moment(since)}"
 
 
 def _judged_since(m: Machine, f: FleetFault) -> int:

@@ -86,6 +86,16 @@ def test_init_prints_without_a_name(capsys: pytest.CaptureFixture[str]) -> None:
     assert capsys.readouterr().out == starter()
 
 
+@pytest.mark.parametrize("words", [("init", "-o", "-"), ("show",)])
+def test_a_file_on_stdout_is_printed_also_when_quiet(
+    words: tuple[str, ...], capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run(["config", *words, "-q"]) == 0
+    out = capsys.readouterr().out
+    assert out
+    tomllib.loads(out)
+
+
 def test_show_gives_all_settings(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert run(["config", "show"]) == 0
     out = capsys.readouterr().out

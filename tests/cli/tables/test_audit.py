@@ -14,9 +14,19 @@ from diagnosis.audit.store.outcome import MissionState
 from diagnosis.results.vocabulary import Verdict
 
 
-def ending(name: str, state: str, verdict: str | None = None, machine: str = "M1") -> Ending:
+def ending(name: str, state: str, verdict: str | None = None, machine: str = "M1", report: str | None = None) -> Ending:
     return Ending(
-        name, MissionState(state), "[/] why" if state != "ok" else "", 1, machine, "Haulotte", verdict, "", None, 0, ""
+        name,
+        MissionState(state),
+        "[/] why" if state != "ok" else "",
+        1,
+        machine,
+        "Haulotte",
+        verdict,
+        "",
+        report,
+        0,
+        "",
     )
 
 
@@ -59,6 +69,11 @@ def test_failures_stand_first_then_machines_then_counts_and_the_page() -> None:
 def test_of_many_failures_some_are_shown() -> None:
     lines = printed(*(ending(f"m{i:02d}", "crashed") for i in range(30)))
     assert lines[11] == "… and 20 more"
+
+
+def test_copies_are_named() -> None:
+    lines = printed(*(ending(n, "ok", "ready", report=f"missions/{n[0]}") for n in ("a", "b", "b (1)")))
+    assert "copies of one log, which count once: b, b (1)" in lines
 
 
 def test_missions_that_are_gone_are_told() -> None:

@@ -108,6 +108,8 @@ def test_the_newest_report_says_what_is_open_from_earlier_missions(tmp_path: Pat
     page = (tmp_path / "missions/new/report.html").read_text("utf-8")
     assert "Open from earlier missions" in page
     assert said in page
+    assert "Ready for the next mission" not in page.partition('id="verdict"')[2].partition("</section>")[0]
+    assert "No fault in this mission" in page
     before = (tmp_path / "missions/new/report.html").stat().st_mtime_ns
     compare(path, "new")
     assert (tmp_path / "missions/new/report.html").stat().st_mtime_ns == before

@@ -22,7 +22,7 @@ from diagnosis.audit.repairs import record_repairs
 from diagnosis.audit.store.ingest import ingest
 from diagnosis.audit.store.repairs import Repair, read_repairs, record_repair, repaired_at
 from diagnosis.audit.store.store import Store
-from diagnosis.pages.labels import utc
+from diagnosis.pages.labels import utc_moment
 from replay.errors import ConfigError, OutputError
 from tests import fleet_samples as samples
 from tests.fleet_samples import DAY_NS, START_NS, Fault, Sample
@@ -138,7 +138,7 @@ def test_a_repair_closes_what_was_found_before_it(tmp_path: Path) -> None:
     done = repair(tmp_path, "HX-1 FR sensor", 7.5)
     assert done.told[0].closes == ("FR speed sensor without signal",)
     assert standing(tmp_path) == ("ready", "Ready", "repaired")
-    day = utc(at(7.5))[:10]
+    day = utc_moment(at(7.5))
     assert f"repaired on {day}" in (tmp_path / "fleet.html").read_text(encoding="utf-8")
     assert "Repaired" in (tmp_path / "fleet.html").read_text(encoding="utf-8")
     assert [m.words for m in done.machines] == ["Ready"]
@@ -150,7 +150,7 @@ def test_what_was_repaired_and_not_driven_since_is_not_ready(tmp_path: Path) -> 
     repair(tmp_path, "hx-1 fr", 3.0)
     verdict, words, status = standing(tmp_path)
     assert (verdict, status) == ("not_assessed", "repaired")
-    assert words == f"Not assessed since the repair on {utc(at(3.0))[:10]}"
+    assert words == f"Not assessed since the repair on {utc_moment(at(3.0))}"
     assert "The machine is ready" not in document(tmp_path)["verdict"]["title"]
 
 
@@ -169,7 +169,7 @@ def test_each_repair_is_told_with_its_own_date(tmp_path: Path) -> None:
     stored(tmp_path, [Sample(f"m{k}", day=float(k), verdict=v, faults=f) for k, (f, v) in enumerate(days)])
     repair(tmp_path, "HX-1 FR sensor", 0.5)
     repair(tmp_path, "HX-1 RL actuator", 3.5)
-    early, late = utc(at(0.5))[:10], utc(at(3.5))[:10]
+    early, late = utc_moment(at(0.5)), utc_moment(at(3.5))
     repair(tmp_path, "HX-1 FR actuator", 3.5)  # of which nothing was found: no part of the list
     words = (
         f"FR speed sensor clean in 3 missions since the repair on {early}; "
@@ -186,7 +186,7 @@ def test_missions_before_a_repair_say_nothing_of_it(tmp_path: Path) -> None:
     stored(tmp_path, [Sample(f"m{k}", day=float(k), verdict=v, faults=f) for k, (f, v) in enumerate(days)])
     repair(tmp_path, "HX-1 FR sensor", 2.5)
     repair(tmp_path, "HX-1 RL actuator", 2.5)
-    assert standing(tmp_path)[:2] == ("not_assessed", f"Not assessed since the repair on {utc(at(2.5))[:10]}")
+    assert standing(tmp_path)[:2] == ("not_assessed", f"Not assessed since the repair on {utc_moment(at(2.5))}")
 
 
 def test_a_fault_that_comes_back_is_open_again(tmp_path: Path) -> None:
@@ -195,7 +195,7 @@ def test_a_fault_that_comes_back_is_open_again(tmp_path: Path) -> None:
     verdict, _, status = standing(tmp_path)
     assert (verdict, status) == ("stop", "recurring")
     page = build_fleet_page(document(tmp_path))
-    assert f"found again since the repair on {utc(at(3.5))[:10]}" in page
+    assert f"found again since the repair on {utc_moment(at(3.5))}" in page
 
 
 def test_other_parts_stay_as_they_are(tmp_path: Path) -> None:
@@ -335,7 +335,7 @@ def test_what_stays_open_is_said(tmp_path: Path) -> None:
 
 def test_a_day_on_which_the_fault_was_found_needs_a_time(tmp_path: Path) -> None:
     stored(tmp_path, course("..x"))
-    day = utc(at(2.0))[:10]
+    day = utc_moment(at(2.0))[:10]
     with pytest.raises(ConfigError, match=f"after that mission it is --on {day}T"):
         record_repairs(tmp_path, ["HX-1 FR"], at(2.0) // DAY_NS * DAY_NS, lambda *_: None)
 

@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from diagnosis.decision.episodes import with_episodes
+from diagnosis.decision.episodes import with_episodes, with_onset
 from diagnosis.results.assessment import CODE, Assessment, Finding
 from diagnosis.results.result import Hypothesis
 from diagnosis.results.vocabulary import Tier
@@ -47,6 +47,12 @@ def test_pieces_of_one_loss_are_one_fault(side: Side) -> None:
     assert one.epsilon is not None
     assert one.epsilon.value == pytest.approx(0.25)
     assert "3 stretches (1.0–1.5 s, 3.0–3.5 s, 6.0–6.5 s)" in one.evidence[-1]
+
+
+def test_the_onset_is_told_before_what_comes_later() -> None:
+    (one,) = joined(*(loss(a, a + 500) for a in (1000, 3000)))
+    assert [e[:5] for e in with_onset(one, "Onset").evidence] == ["what ", "Onset", "It sh"]
+    assert with_onset(loss(1000, 1500), "Onset").evidence[-1] == "Onset"
 
 
 def test_healthy_time_between_makes_two_faults() -> None:

@@ -219,6 +219,19 @@ def test_turns_tell_the_sides_of_wheels_that_have_only_numbers(
     assert sum("which wheel has which number" in q for q in draft.questions) == 1
 
 
+def test_commands_of_wheels_tell_their_sides_where_a_wheel_fails(tmp_path: Path) -> None:
+    write_numbered(tmp_path, (0.4, -0.4, 0.4, -0.4))
+    table = pd.read_csv(tmp_path / "run.csv")
+    for i in range(4):
+        table[f"wheel{i}_speed_ref [rad/s]"] = table[f"wheel{i}_speed [rad/s]"]
+    table.loc[600:, "wheel2_speed [rad/s]"] = 0.0
+    table.to_csv(tmp_path / "run.csv", index=False)
+    draft = read_back(draft_machine(read_everything([tmp_path / "run.csv"])), tmp_path)
+    assert draft.machine.wheels == ("FL", "FR", "RL", "RR")
+    assert draft.machine.geometry is not None
+    assert draft.machine.geometry.wheels["FL"].y == pytest.approx(0.4, rel=0.02)
+
+
 def test_without_turns_the_numbers_are_asked(tmp_path: Path) -> None:
     write_numbered(tmp_path, (0.4, -0.4, 0.4, -0.4), commands=False)
     draft = draft_machine(read_everything([tmp_path / "run.csv"]))
@@ -383,6 +396,19 @@ def test_directions_and_lengths_are_of_signals_at_one_time(tmp_path: Path) -> No
     assert not any("exchanged" in q for q in draft.questions)
     assert draft.machine.geometry is not None
     assert draft.machine.geometry.wheels["FL"].y == pytest.approx(0.4, rel=0.05)
+
+
+def test_a_reference_is_a_command_and_another_velocity_is_asked_for(tmp_path: Path) -> None:
+    draft = drafted(tmp_path, Robot(command_topic="/rover/drive_controller/reference"))
+    assert draft.machine.signals["cmd.v"].topic == "/rover/drive_controller/reference"
+    draft = drafted(tmp_path, Robot(command_topic="/rover/nav_vel"))
+    assert "cmd.v" not in draft.machine.signals
+    (question,) = [q for q in draft.questions if "where are the commands?" in q]
+    assert '"cmd.v" = { topic = "/rover/nav_vel", field = "' in question
+    assert "None is in the log" not in question
+    draft = drafted(tmp_path, Robot(command_topic="/rover/gps/velocity"))
+    (question,) = [q for q in draft.questions if "where are the commands?" in q]
+    assert "None is in the log" in question
 
 
 def test_columns_that_ask_for_something_unsaid_are_pointed_at_rather_than_denied(tmp_path: Path) -> None:

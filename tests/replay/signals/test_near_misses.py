@@ -19,6 +19,15 @@ def test_transforms_and_joysticks_are_named_with_what_to_record() -> None:
     assert found["gnss.lat"] == NO_CHANNEL
 
 
+def test_a_velocity_that_may_be_the_command_is_named_with_the_line_to_write() -> None:
+    log = summary(("/odom_twist", "geometry_msgs/msg/Twist"), ("/base/velocity", "geometry_msgs/msg/TwistStamped"))
+    found = near_misses(dict.fromkeys(("cmd.v", "cmd.omega"), NO_CHANNEL), [log], NO_CHANNEL)
+    line = '"cmd.v" = { topic = "/base/velocity", field = "twist.linear.x", unit = "m/s" }'
+    assert found["cmd.v"].startswith("/base/velocity may be the command")
+    assert found["cmd.v"].endswith(line)
+    assert "twist.angular.z" in found["cmd.omega"]
+
+
 def test_other_reasons_and_fixed_transforms_stay() -> None:
     assert near_misses({"odom.x": "holds no number"}, [summary(("/tf", "tf2_msgs/msg/TFMessage"))], NO_CHANNEL) == {
         "odom.x": "holds no number"

@@ -10,6 +10,7 @@ import pytest
 from replay.log.raw_log import Channel
 from replay.machine.config import haulotte
 from replay.readers.tables.columns import unit_of
+from replay.signals.name_parts import is_steering
 from replay.signals.name_words import english, folded, role, tokens
 from replay.signals.named_units import bare_name, unit_by_end
 from replay.signals.rules import candidates
@@ -222,11 +223,18 @@ def test_a_battery_is_no_drive_of_a_machine_with_one() -> None:
 
 def test_currents_of_valves_are_known_for_what_they_are() -> None:
     machine = haulotte()
-    assert valve_current(column("Drive/FL valve current [mA]"), machine) == "wheel.FL.u"
-    assert valve_current(column("Ventilstrom Lenkung hinten [mA]"), machine) == "steer.rear.u"
-    assert valve_current(column("fVentil_Soll_VL [mA]"), machine) == "wheel.FL.u"
-    assert valve_current(column("fVentil_Soll_VL [%]"), machine) is None
-    assert valve_current(column("Drive/FL motor current [A]"), machine) is None
+    assert valve_current(column("Drive/FL valve current [mA]"), machine, {}) == "wheel.FL.u"
+    assert valve_current(column("Ventilstrom Lenkung hinten [mA]"), machine, {}) == "steer.rear.u"
+    assert valve_current(column("fVentil_Soll_VL [mA]"), machine, {}) == "wheel.FL.u"
+    assert valve_current(column("fVentil_Soll_VL [%]"), machine, {}) is None
+    assert valve_current(column("Drive/FL motor current [A]"), machine, {}) is None
+    numbered = symbol("GVL.stAntrieb[3].fVentilstrom", "mA")
+    assert valve_current(numbered, machine, {"GVL.stAntrieb[].fVentilstrom": 1}) == "wheel.RR.u"
+
+
+def test_a_caster_steers_no_wheel() -> None:
+    assert not is_steering("caster_swivel")
+    assert is_steering("front_swivel")
 
 
 def test_what_is_asked_is_never_taken_for_what_is_measured() -> None:

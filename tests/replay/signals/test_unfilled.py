@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from replay.setup.draft import draft_machine
 from replay.setup.read import read_everything
-from tests.replay.signals.test_mapping import joints, mapped
+from tests.replay.signals.test_mapping import joints, mapped, topic
 from tests.ros_robots import Robot, _Topics, write_robot
 
 Array = NDArray[np.float64]
@@ -27,6 +27,20 @@ def test_an_array_that_stays_at_zero_while_another_moves_is_not_mapped(empty: st
     assert not any((s.origin.field or "").startswith(empty) for s in found.items.values())
     assert found.items
     assert sum(f"/joint_states {empty}: 0 of every joint" in note for note in found.notes) == 1
+
+
+@pytest.mark.parametrize(
+    ("still", "value", "kept"),
+    [("pose", 0.0, {"odom.v"}), ("pose", 3.5, {"odom.v"}), ("twist", 0.0, {"odom.x", "odom.y"})],
+)
+def test_an_odometry_of_which_a_part_stays_is_used_without_it(still: str, value: float, kept: set[str]) -> None:
+    fields = ("pose.pose.position.x", "pose.pose.position.y", "twist.twist.linear.x")
+    columns = {f: np.full(200, value) if f.startswith(still) else MOVES for f in fields}
+    found = mapped(*topic("/odom", "nav_msgs/msg/Odometry", columns))
+    assert set(found.items) == kept
+    assert sum(f"/odom {still}: the same throughout" in note for note in found.notes) == 1
+    rest = mapped(*topic("/odom", "nav_msgs/msg/Odometry", dict.fromkeys(fields, ZERO)))
+    assert {"odom.v", "odom.x"} <= set(rest.items)
 
 
 def test_one_silent_joint_and_a_machine_at_rest_stay() -> None:

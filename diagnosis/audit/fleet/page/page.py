@@ -249,13 +249,13 @@ def _fault(f: FleetFaultRow, document: ShownDocument, directions: Mapping[tuple[
     e = f["epsilon"]
     notes = []
     if e and f["mode"] in SCALED:
-        notes.append(f"ε̂ {e['value']:.2f} ({e['low']:.2f} to {e['high']:.2f})".replace("-", "−"))
+        notes.append(f"ε̂ {e['value']:.2f} ({e['low']:.2f} to {e['high']:.2f}) in the fault".replace("-", "−"))
         direction = directions.get((f["machine"], f["component"], f["side"]), "not_known")
         notes += [direction] if direction != "not_known" else []
     if f["status"] == "repaired" and f["repaired_ns"] is not None:
-        notes.append(f"repaired on {rows.day(f['repaired_ns'])}")
+        notes.append(f"repaired on {labels.utc_moment(f['repaired_ns'])}")
     elif f["repaired_ns"] is not None:
-        notes.append(f"found again since the repair on {rows.day(f['repaired_ns'])}")
+        notes.append(f"found again since the repair on {labels.utc_moment(f['repaired_ns'])}")
     if f["open"] and f["since"]:
         none = f", clean in none of the {f['needed']} missions that close it"
         notes.append(f"open{open_words(True, f['clean'], f['needed']) or none}")

@@ -42,12 +42,12 @@ def symbol(mission: ShownMission) -> str:
 
 
 def fault_words(fault: FleetFaultRow | MissionFaultRow, machine_words: MachineWords) -> str:
-    """Part, mode and size in few words: ``RL drive valve inefficient 12 %``."""
+    """Part, mode and size in few words: ``RL drive valve inefficient, 12 % lost in the fault``."""
     words = machine_words.part_words(fault["kind"], fault["component"], fault["side"])
     words += f" {state_label(fault['mode'], fault['side']).lower()}"
     e = fault["epsilon"]
     sized = e is not None and fault["mode"] in SCALED and loss_known(e["low"], e["high"])
-    return words + (f" {100 * e['value']:.0f} %" if e and sized else "")
+    return words + (f", {100 * e['value']:.0f} % lost in the fault" if e and sized else "")
 
 
 def _verdict_words(verdict: Verdict | None) -> str:
