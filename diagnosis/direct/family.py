@@ -14,6 +14,7 @@ from diagnosis.direct.at_once import without_shared_moments
 from diagnosis.direct.identification import IdentifiedPair, identify, usual_spread
 from diagnosis.direct.inputs import Pair, make_pair
 from diagnosis.direct.low_speed import without_low_speed_habit
+from diagnosis.direct.small_deviations import without_small_deviations
 from diagnosis.direct.uncertainty import most_noise_of_kind, usual_of_kind
 from diagnosis.estimation.lag import low_passed
 from diagnosis.evidence import ACTUATOR, SENSOR, Array, Contribution, Flags, MissionView, Part
@@ -59,7 +60,12 @@ class DirectEvidence:
         sensors = {wheel: found for (wheel, side), found in identified.items() if side == SENSOR}
         told = without_low_speed_habit(sensors, {wheel: parts[wheel, SENSOR] for wheel in sensors})
         told = without_shared_moments(sensors, told)
-        return Contribution({**parts, **{(wheel, SENSOR): a for wheel, a in told.items()}})
+        valves = {wheel: found for (wheel, side), found in identified.items() if side == ACTUATOR}
+        small = without_small_deviations(valves, {wheel: parts[wheel, ACTUATOR] for wheel in valves})
+        parts |= {(wheel, SENSOR): a for wheel, a in told.items()} | {
+            (wheel, ACTUATOR): a for wheel, a in small.items()
+        }
+        return Contribution(parts)
 
 
 def _identified(pairs: dict[Part, Pair], limits: Limits, mission: MissionView) -> dict[Part, IdentifiedPair]:

@@ -1,0 +1,67 @@
+"""Small deviations that several valves of a machine have are how they are built and measured, and no fault of one of them.
+
+Coils warm, supplies fall, and a position sensor has a zero and a gain of its own: each keeps a healthy valve some hundredths off its
+command for long, which evidence that grows with time takes for a certain loss or noise. How far off valves usually are is taken from
+the others; a finding that is no further off is left open.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from diagnosis.channels.sample_status import PAIR
+from diagnosis.direct.identification import IdentifiedPair
+from diagnosis.direct.low_speed import left_open
+from diagnosis.results.assessment import Assessment, Finding
+
+_SMALL = 0.08  # of the span, root mean square: a larger deviation is none of a healthy valve, whatever the others do
+_WINDOW_S, _WINDOWS = 2.0, 4  # s; fewer show nothing
+_USUAL, _BEYOND = 0.9, 1.8  # quantile of the windows, and times it
+_VALVES = 3  # fewer show no habit
+
+
+def without_small_deviations(
+    found: Mapping[str, IdentifiedPair], assessments: Mapping[str, Assessment]
+) -> dict[str, Assessment]:
+    """Assessments of valves without findings that are no further off than other valves usually are.
+
+    Parameters
+    ----------
+    found : Mapping[str, IdentifiedPair]
+        Positions beside their commands, by wheel.
+    assessments : Mapping[str, Assessment]
+        What was found of them.
+    """
+    if len(found) < _VALVES or not any(a.findings for a in assessments.values()):
+        return dict(assessments)
+    usual = {w: _usual(one) for w, one in found.items()}
+    out = {}
+    for w, a in assessments.items():
+        most = _BEYOND * max(x for other, x in usual.items() if other != w)
+        span = found[w].pair.span
+        out[w] = left_open(
+            a, [f for f in a.findings if not f.mode.total and _deviation(f, found[w]) < min(most, _SMALL * span)]
+        )
+    return out
+
+
+def _usual(one: IdentifiedPair) -> float:
+    """How far a position usually is off where its valve opens, at most [unit]: of windows that no large deviation is in; 0 without any."""
+    dt = one.pair.dt
+    width = max(1, round(_WINDOW_S / dt))
+    size = one.samples.y.size // width * width
+    use = (one.samples.status[:size] == PAIR) & ~one.samples.quiet[:size]
+    off = np.where(use, np.nan_to_num(one.samples.y[:size] - one.samples.x[:size]), 0.0).reshape(-1, width)
+    count = np.count_nonzero(use.reshape(-1, width), axis=1)
+    size_of = np.sqrt((off**2).sum(axis=1) / np.maximum(count, 1))[count > 0.25 * width]
+    small = size_of[size_of < _SMALL * one.pair.span]
+    return float(np.quantile(small, _USUAL)) if small.size >= _WINDOWS else 0.0
+
+
+def _deviation(finding: Finding, one: IdentifiedPair) -> float:
+    """Root mean square of what a finding is off by [unit]; infinite where nothing is known."""
+    y, x, status, *_ = one.samples.part(finding.start, finding.stop)
+    off = (y - x)[status == PAIR]
+    return float(np.sqrt(np.mean(off**2))) if off.size else np.inf

@@ -1,0 +1,54 @@
+"""A valve that is no further off its command than the other valves of its machine is none that fails."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import cast
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from diagnosis.channels.sample_status import PAIR
+from diagnosis.direct.identification import IdentifiedPair
+from diagnosis.direct.small_deviations import without_small_deviations
+from diagnosis.results.assessment import CODE, Assessment, Finding
+from diagnosis.results.vocabulary import Tier
+from replay.faults import FaultMode, Side, State
+
+Array = NDArray[np.float64]
+DT, SIZE = 0.01, 6000
+WHEELS = ("FR", "FL", "RR", "RL")
+COMMAND = 0.6 * np.sin(np.arange(SIZE) * DT * 0.7)
+SPAN = (1000, 4000)
+
+
+def valve(gain: float) -> IdentifiedPair:
+    """A valve that opens by a share of what it is told."""
+    y, status, quiet = gain * COMMAND, np.full(SIZE, PAIR, np.int8), np.zeros(SIZE, np.bool_)
+    part = lambda a, b: (y[a:b], COMMAND[a:b], status[a:b])  # noqa: E731
+    samples = SimpleNamespace(x=COMMAND, y=y, status=status, quiet=quiet, part=part)
+    return cast(IdentifiedPair, SimpleNamespace(samples=samples, pair=SimpleNamespace(dt=DT, span=1.0)))
+
+
+def told(gains: tuple[float, ...], mode: FaultMode = FaultMode.INEFFICIENT) -> Assessment:
+    states = np.full(SIZE, CODE[State.HEALTHY])
+    states[slice(*SPAN)] = CODE[State(mode.value)]
+    finding = Finding(*SPAN, Side.ACTUATOR, mode, 0.97, (), None, None, (), Tier.DIRECT)
+    pairs = dict(zip(WHEELS, map(valve, gains), strict=False))
+    return without_small_deviations(pairs, {"FR": Assessment(states, findings=(finding,), tier=Tier.DIRECT)})["FR"]
+
+
+def test_what_another_valve_is_off_by_as_well_is_left_open() -> None:
+    after = told((0.9, 1.0, 0.93, 0.96))
+    assert after.findings == ()
+    assert (after.states[slice(*SPAN)] == CODE[State.NOT_ASSESSED]).all()
+
+
+@pytest.mark.parametrize("gains", [(0.9, 1.0, 0.99, 1.0), (0.6, 0.93, 0.93, 0.93), (0.9, 0.93)])
+def test_what_is_its_own_or_large_or_beside_too_few_stays(gains: tuple[float, ...]) -> None:
+    assert told(gains).findings
+
+
+def test_a_stuck_valve_stays() -> None:
+    assert told((0.9, 0.93, 0.93, 0.93), FaultMode.STUCK).findings
