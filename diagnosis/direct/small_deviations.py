@@ -17,6 +17,7 @@ from diagnosis.direct.low_speed import left_open
 from diagnosis.results.assessment import Assessment, Finding
 
 _SMALL = 0.08  # of the span, root mean square: a larger deviation is none of a healthy valve, whatever the others do
+_SHARE = 0.2  # of its command, likewise
 _WINDOW_S, _WINDOWS = 2.0, 4  # s; fewer show nothing
 _USUAL, _BEYOND = 0.9, 1.8  # quantile of the windows, and times it
 _VALVES = 3  # fewer show no habit
@@ -42,7 +43,7 @@ def without_small_deviations(
         most = _BEYOND * max(x for other, x in usual.items() if other != w)
         span = found[w].pair.span
         out[w] = left_open(
-            a, [f for f in a.findings if not f.mode.total and _deviation(f, found[w]) < min(most, _SMALL * span)]
+            a, [f for f in a.findings if not f.mode.total and _small(f, found[w], min(most, _SMALL * span))]
         )
     return out
 
@@ -60,8 +61,11 @@ def _usual(one: IdentifiedPair) -> float:
     return float(np.quantile(small, _USUAL)) if small.size >= _WINDOWS else 0.0
 
 
-def _deviation(finding: Finding, one: IdentifiedPair) -> float:
-    """Root mean square of what a finding is off by [unit]; infinite where nothing is known."""
+def _small(finding: Finding, one: IdentifiedPair, most: float) -> bool:
+    """Whether a position is off by little [unit], and by a small share of its command."""
     y, x, status, *_ = one.samples.part(finding.start, finding.stop)
-    off = (y - x)[status == PAIR]
-    return float(np.sqrt(np.mean(off**2))) if off.size else np.inf
+    use = status == PAIR
+    if not use.any():
+        return False
+    off, asked = (float(np.sqrt(np.mean(z[use] ** 2))) for z in (y - x, x))
+    return off < min(most, _SHARE * asked)
