@@ -33,6 +33,7 @@ _SHORTEST_S = 0.01
 _HOLD_S = 0.1
 _LEAD_S, _TAIL_S, _CHAIN_S = 0.3, 0.1, 0.05
 _SETTLED_LAGS = 5.0  # after a fault a channel returns with its lag
+_CLEAR = 3.0  # times the noise
 _HYSTERESIS, _RESTS_S = 0.025, 10.0  # of the span, off a healthy valve's command, for no longer than this
 _MIDDLE, _MOSTLY = 0.04, 0.98  # of the span: about its middle a valve opens nothing; of the time
 _OPEN_S, _DOUBT, _FAR_OFF = 0.5, 0.05, 0.2  # s; probability of a healthy channel; of the span
@@ -130,7 +131,7 @@ def finding_of(run: Run, found: IdentifiedPair, limits: Limits) -> Finding | Non
     if mode is None:
         return None
     pair, run, p = found.pair, isolated.run, isolated.p
-    if p[HEALTHY] > p[run.row] or _hysteresis(isolated, found):
+    if p[HEALTHY] > p[run.row] or _hysteresis(isolated, found) or _unresolved(isolated, found):
         return None
     ahead = [r for r in codes_of(pair.side) if r != HEALTHY and p[r] >= p[run.row]]
     p[ahead] = p[ahead].mean()  # what other rows explain as well is called by none of them more surely
@@ -169,6 +170,12 @@ def finding_of(run: Run, found: IdentifiedPair, limits: Limits) -> Finding | Non
         evidence=lines,
         tier=Tier.DIRECT,
     )
+
+
+def _unresolved(isolated: Isolated, found: IdentifiedPair) -> bool:
+    """Whether a log too slow for its commands shows a moment that stays below the threshold: a command that flips from sample to sample."""
+    brief = isolated.run.size * found.pair.dt < _OPEN_S
+    return found.coarse and brief and isolated.seen.deviation < _CLEAR * isolated.seen.noise
 
 
 def _hysteresis(isolated: Isolated, found: IdentifiedPair) -> bool:

@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 
+from diagnosis.direct.findings import _unresolved
 from diagnosis.direct.isolation import _not_silent
-from diagnosis.estimation.fault_models import HEALTHY, NO_SIGNAL, NOISY
+from diagnosis.estimation.fault_models import HEALTHY, INEFFICIENT, NO_SIGNAL, NOISY
+from diagnosis.estimation.segments import Run
 from diagnosis.pipeline import diagnose_signals
 from replay.faults import Side
 from replay.machine.config import haulotte
@@ -54,3 +58,15 @@ def test_a_dead_valve_under_a_switching_command_is_never_healthy(monkeypatch: py
         if (s["component"], s["side"], s["state"]) == ("FR", "actuator", "healthy")
     )
     assert healthy < 0.02 * (dead.stop_s - dead.start_s)
+
+
+@pytest.mark.parametrize(
+    ("coarse", "stop", "size", "open_"),
+    [(True, 30, 0.1, True), (True, 90, 0.1, False), (True, 30, 0.5, False), (False, 30, 0.1, False)],
+)
+def test_a_moment_below_the_threshold_of_a_log_too_slow_is_no_fault(
+    coarse: bool, stop: int, size: float, open_: bool
+) -> None:
+    isolated: Any = SimpleNamespace(run=Run(0, stop, INEFFICIENT), seen=SimpleNamespace(deviation=size, noise=0.1))
+    found: Any = SimpleNamespace(coarse=coarse, pair=SimpleNamespace(dt=0.01))
+    assert _unresolved(isolated, found) is open_
