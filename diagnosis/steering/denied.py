@@ -29,7 +29,7 @@ _AT_END, _REACHED, _STAYS = (
 )  # of the largest angle to that side, which is so much of the machine's; of the time
 _READ = 0.5  # of a finding: what delivers less is silent
 _LEAST_USUAL_S = 5.0  # for which a reading must be known without its fault
-_DISTURBED = 0.6  # probability of noise behind an opening that nobody measured: none of 10 was right on tuning seeds
+_DISTURBED = 0.4  # probability of noise behind an opening that nobody measured: none of 15 was right on tuning seeds of other machines
 _BURST_S = 0.6  # length at which half of the bursts of noise are what a model leaves out of a motion
 _PAUSE_S = 0.12  # likewise of a side that does nothing: a reading that did not change, a valve about its middle
 _TREMOR = 0.004  # rad: noise of less is no fault
