@@ -15,6 +15,7 @@ from diagnosis.results.result import Epsilon, Hypothesis, Sat
 from diagnosis.results.vocabulary import Tier
 from diagnosis.wheels.findings import WheelFindings
 from diagnosis.wheels.inputs import WheelsData
+from diagnosis.wheels.valve_map import effective
 from replay.arrays.blocks import blocks
 from replay.faults import FaultMode, Side, State
 
@@ -32,6 +33,8 @@ _INSIDE = 0.5  # of a finding's time
 _CHANGING, _CERTAIN, _TREMBLING = 0.1, 0.9, 0.45  # of the readings; a finding as sure stays, others are no surer
 _FOLLOWS_S, _AS_OTHERS = 0.3, 0.02  # behind its valve a wheel is; of a speed, by which healthy wheels differ
 _ALL_STAY = "Nothing else moves meanwhile, and the others read the same: a speed that stays is what a healthy sensor shows, too."
+_LEAST_READ, _CREEPS = 0.01, 3.0  # quantile of the readings that are none of 0; times it
+_CREEP = "Its valve gives hardly the least speed that this sensor ever reads: it may read 0 because the wheel creeps."
 _TREMBLES = "Its last digits go on changing, which those of a stuck sensor rarely do."
 _P, _VALVE = 0.96, 0.02  # that the sensor is frozen, and that its valve is; set by hand, not calibrated
 _FAR, _P_NEAR = (
@@ -124,7 +127,7 @@ def with_frozen(data: WheelsData, found: Mapping[int, WheelFindings]) -> dict[in
     for i, wheel in found.items():
         own = [r for r in held[i] if _moves_on(data, i, r) and not _all_held(held, i, r)]
         kept = [
-            _with_company(data, i, _alive(f, data.y[:, i]))
+            _with_company(data, i, _may_creep(data, i, _alive(f, data.y[:, i])))
             for f in wheel.findings
             if _stuck(f) or not any(_inside(f, r) for r in own)
         ]
@@ -174,6 +177,21 @@ def _alive(f: Finding, y: Array) -> Finding:
     known = y[f.start : f.stop]
     changes = np.diff(known[np.isfinite(known)]) != 0.0
     return limited(f, _TREMBLING, _TREMBLES) if changes.size and float(np.mean(changes)) > _CHANGING else f
+
+
+def _may_creep(data: WheelsData, i: int, f: Finding) -> Finding:
+    """A silent sensor is less sure where its valve gives no more speed than the least that it ever reads: counters read 0 below that."""
+    plant, part = data.plants[i], slice(f.start, f.stop)
+    if (f.side, f.mode) != (Side.SENSOR, FaultMode.NO_SIGNAL) or plant is None or f.probability <= _TREMBLING:
+        return f
+    read, opening = np.abs(data.y[:, i]), np.abs(data.u[part, i])
+    read = read[read > 0.0]
+    if not read.size or not np.isfinite(opening).any():
+        return f
+    least = float(np.quantile(read, _LEAST_READ))
+    given, unseen, _ = effective(np.full(1, np.nanmedian(opening)), plant, float(np.nanmedian(opening)))
+    creeps = plant.K * float(given[0] + unseen[0]) < _CREEPS * least
+    return limited(f, _TREMBLING, _CREEP) if creeps else f
 
 
 def _with_company(data: WheelsData, i: int, f: Finding) -> Finding:

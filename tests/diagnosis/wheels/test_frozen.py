@@ -14,6 +14,7 @@ from diagnosis.results.vocabulary import Tier
 from diagnosis.wheels.findings import WheelFindings
 from diagnosis.wheels.frozen import frozen_of, with_frozen
 from replay.faults import FaultMode, Side
+from replay.machine.config import WheelPlant
 
 DT, N, SPAN = 0.01, 6_000, 3.0
 T = np.arange(N) * DT
@@ -26,8 +27,18 @@ def speeds(seed: int = 1) -> np.ndarray:
     return np.asarray(np.round(v / 0.005) * 0.005)
 
 
-def data(y: np.ndarray) -> Any:
-    return SimpleNamespace(y=y, u=0.3 * y, span=SPAN, dt=DT, names=[(f"wheel.{w}.v", "u") for w in "abcd"])
+PLANTS = [WheelPlant(2.0, 0.1, dead=0.01)] * 4
+
+
+def data(y: np.ndarray, u: np.ndarray | None = None) -> Any:
+    return SimpleNamespace(
+        y=y,
+        u=0.3 * y if u is None else u,
+        plants=PLANTS,
+        span=SPAN,
+        dt=DT,
+        names=[(f"wheel.{w}.v", "u") for w in "abcd"],
+    )
 
 
 def found(y: np.ndarray, *findings: Finding) -> list[Finding]:
@@ -99,3 +110,25 @@ def test_a_sensor_that_is_frozen_for_the_whole_mission() -> None:
 def test_gaps_and_nothing() -> None:
     assert frozen_of(np.full(N, np.nan), SPAN, DT) == []
     assert frozen_of(np.zeros(0), SPAN, DT) == []
+
+
+@pytest.mark.parametrize(("opening", "sure"), [(0.03, False), (0.3, True)])
+def test_a_wheel_that_may_creep_below_what_its_sensor_reads_has_no_surely_dead_one(opening: float, sure: bool) -> None:
+    y = np.where(np.abs(moving := speeds() - 0.9) < 0.05, 0.0, moving)
+    u = 0.3 * y
+    y[2000:2600, 0], u[2000:2600, 0] = 0.0, opening
+    rows = (Hypothesis("sensor", FaultMode.NO_SIGNAL, 0.95), Hypothesis("none", "healthy", 0.05))
+    dead = Finding(2000, 2600, Side.SENSOR, FaultMode.NO_SIGNAL, 0.95, rows, None, None, (), Tier.MODEL)
+    told = with_frozen(data(y, u), {0: WheelFindings(findings=[dead])})[0].findings
+    assert (told[0].probability > 0.9) is sure
+
+
+def test_a_speed_that_stays_as_all_others_do_is_hardly_stuck() -> None:
+    y = np.round(speeds() * 0.0 + 0.34, 3)
+    y[:2000], y[2600:] = speeds()[:2000], speeds()[2600:]
+    rows = (Hypothesis("sensor", FaultMode.STUCK, 0.9), Hypothesis("none", "healthy", 0.1))
+    stuck = Finding(2000, 2600, Side.SENSOR, FaultMode.STUCK, 0.9, rows, None, None, (), Tier.MODEL)
+    (told,) = found(y, stuck)
+    assert told.probability < 0.5
+    y[2000:2600, 0] = 0.6  # it alone reads something else
+    assert found(y, stuck)[0].probability == pytest.approx(0.9)
