@@ -10,32 +10,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.results.assessment import Finding
-from diagnosis.results.limited import limited
 from diagnosis.results.result import Epsilon, Hypothesis, Sat
 from diagnosis.results.vocabulary import Tier
 from diagnosis.wheels.findings import WheelFindings
 from diagnosis.wheels.inputs import WheelsData
-from diagnosis.wheels.valve_map import effective
-from replay.arrays.blocks import blocks
+from diagnosis.wheels.unshown import TURNS, as_shown, moves_on
 from replay.faults import FaultMode, Side, State
 
 Array = NDArray[np.float64]
 
 _LEAST_S, _READINGS = 0.5, 20  # of one value, and readings at the channel's usual rate
 _LONGER = 2.5  # times the longest other run of one value, that is not this value
-_TURNS, _OF_MOST = (
-    0.02,
-    0.97,
-)  # of the largest speed: a reading of a wheel that turns; of its own largest: an end of its range
-_OPENED, _MOVED = 0.1, 0.05  # of full opening, of the largest speed: something else changes meanwhile
-_STEPS = 4.0  # of the reading, by which others move at least
+_OF_MOST = 0.97  # of its own largest: an end of its range
 _INSIDE = 0.5  # of a finding's time
-_CHANGING, _CERTAIN, _TREMBLING = 0.1, 0.9, 0.45  # of the readings; a finding as sure stays, others are no surer
-_FOLLOWS_S, _AS_OTHERS = 0.3, 0.02  # behind its valve a wheel is; of a speed, by which healthy wheels differ
-_ALL_STAY = "Nothing else moves meanwhile, and the others read the same: a speed that stays is what a healthy sensor shows, too."
-_LEAST_READ, _CREEPS = 0.01, 3.0  # quantile of the readings that are none of 0; times it
-_CREEP = "Its valve gives hardly the least speed that this sensor ever reads: it may read 0 because the wheel creeps."
-_TREMBLES = "Its last digits go on changing, which those of a stuck sensor rarely do."
 _P, _VALVE = 0.96, 0.02  # that the sensor is frozen, and that its valve is; set by hand, not calibrated
 _FAR, _P_NEAR = (
     8.0,
@@ -70,7 +57,7 @@ def frozen_of(y: Array, span: float, dt: float) -> list[Frozen]:
     if not starts.size:
         return []
     value, length = y[starts], (stops - starts) * dt
-    turns = np.abs(value) > _TURNS * span
+    turns = np.abs(value) > TURNS * span
     usual = _usual(starts, stops, same.size) * dt
     out = []
     for k in np.flatnonzero(turns & (length >= max(_LEAST_S, _READINGS * usual))):
@@ -103,15 +90,6 @@ def _largest(y: Array) -> float:
     return max(float(np.fmax.reduce(y, initial=-1.0)), -float(np.fmin.reduce(y, initial=1.0)))
 
 
-def _least_step(y: Array) -> float:
-    """Smallest size by which a value changes, block by block; infinite where none does."""
-    least = np.inf
-    for part in blocks(y.size):
-        steps = np.abs(np.diff(y[part.start : part.stop + 1]))
-        least = min(least, float(np.min(steps[steps > 0.0], initial=np.inf)))
-    return least
-
-
 def with_frozen(data: WheelsData, found: Mapping[int, WheelFindings]) -> dict[int, WheelFindings]:
     """Findings in which frozen sensors are told as such; what models say of such a time instead is left out.
 
@@ -125,9 +103,9 @@ def with_frozen(data: WheelsData, found: Mapping[int, WheelFindings]) -> dict[in
     held = {i: frozen_of(data.y[:, i], data.span, data.dt) for i in found}
     out = {}
     for i, wheel in found.items():
-        own = [r for r in held[i] if _moves_on(data, i, r) and not _all_held(held, i, r)]
+        own = [r for r in held[i] if moves_on(data, i, slice(r.start, r.stop)) and not _all_held(held, i, r)]
         kept = [
-            _with_company(data, i, _may_creep(data, i, _alive(f, data.y[:, i])))
+            as_shown(data, i, f, wheel.findings)
             for f in wheel.findings
             if _stuck(f) or not any(_inside(f, r) for r in own)
         ]
@@ -138,22 +116,6 @@ def with_frozen(data: WheelsData, found: Mapping[int, WheelFindings]) -> dict[in
             findings += [_surer(f, _told(data, i, r)) for f in fs] or [_told(data, i, r)]
         out[i] = replace(wheel, findings=sorted(findings, key=lambda f: f.start))
     return out
-
-
-def _moves_on(data: WheelsData, i: int, r: Frozen) -> bool:
-    """Whether the valve's opening, or the speed of most other wheels, which turn, changes meanwhile."""
-    part = slice(r.start, r.stop)
-    step = _least_step(data.y[:, i])
-    others = np.delete(data.y[part], i, axis=1)
-    if others.size and np.isfinite(others).any() and float(np.nanmedian(np.abs(others))) <= _TURNS * data.span:
-        return False  # all others stand: a wheel that stands reads one value, its offset too
-    with np.errstate(invalid="ignore"):
-        moved = [float(np.nanquantile(c, 0.95) - np.nanquantile(c, 0.05)) for c in others.T if np.isfinite(c).any()]
-    opening = data.u[part, i]
-    opening = opening[np.isfinite(opening)]
-    opened = float(np.quantile(opening, 0.95) - np.quantile(opening, 0.05)) if opening.size else 0.0
-    far = max(_MOVED * data.span, _STEPS * step if np.isfinite(step) else 0.0)
-    return opened > _OPENED or bool(moved and float(np.median(moved)) > far)
 
 
 def _all_held(held: Mapping[int, list[Frozen]], i: int, r: Frozen) -> bool:
@@ -168,45 +130,6 @@ def _common(a: Frozen, b: Frozen) -> int:
 
 def _inside(f: Finding, r: Frozen) -> bool:
     return min(f.stop, r.stop) - max(f.start, r.start) > _INSIDE * (f.stop - f.start)
-
-
-def _alive(f: Finding, y: Array) -> Finding:
-    """A stuck sensor is less sure where its last digits go on changing."""
-    if not _stuck(f) or f.probability >= _CERTAIN:
-        return f
-    known = y[f.start : f.stop]
-    changes = np.diff(known[np.isfinite(known)]) != 0.0
-    return limited(f, _TREMBLING, _TREMBLES) if changes.size and float(np.mean(changes)) > _CHANGING else f
-
-
-def _may_creep(data: WheelsData, i: int, f: Finding) -> Finding:
-    """A silent sensor is less sure where its valve gives no more speed than the least that it ever reads: counters read 0 below that."""
-    plant, part = data.plants[i], slice(f.start, f.stop)
-    if (f.side, f.mode) != (Side.SENSOR, FaultMode.NO_SIGNAL) or plant is None or f.probability <= _TREMBLING:
-        return f
-    read, opening = np.abs(data.y[:, i]), np.abs(data.u[part, i])
-    read = read[read > 0.0]
-    if not read.size or not np.isfinite(opening).any():
-        return f
-    least = float(np.quantile(read, _LEAST_READ))
-    given, unseen, _ = effective(np.full(1, np.nanmedian(opening)), plant, float(np.nanmedian(opening)))
-    creeps = plant.K * float(given[0] + unseen[0]) < _CREEPS * least
-    return limited(f, _TREMBLING, _CREEP) if creeps else f
-
-
-def _with_company(data: WheelsData, i: int, f: Finding) -> Finding:
-    """A stuck sensor is less sure where nothing else moves either, and it reads what the others do."""
-    part = slice(f.start, max(f.start + 1, f.stop - round(_FOLLOWS_S / data.dt)))
-    others = np.delete(data.y[part], i, axis=1)
-    own = data.y[part, i]
-    if not _stuck(f) or not np.isfinite(own).any() or not np.isfinite(others).any():
-        return f
-    level = float(np.nanmedian(own))
-    if _moves_on(data, i, Frozen(part.start, part.stop, level, 0.0)):
-        return f
-    step = _least_step(data.y[:, i])
-    near = max(_STEPS * step if np.isfinite(step) else 0.0, _AS_OTHERS * abs(level))
-    return limited(f, _TREMBLING, _ALL_STAY) if abs(level - float(np.nanmedian(others))) <= near else f
 
 
 def _stuck(f: Finding) -> bool:

@@ -1,0 +1,131 @@
+"""What a speed sensor that is said to be stuck or silent shows, and what a healthy one shows as well: such a claim is less sure."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from diagnosis.results.assessment import Finding
+from diagnosis.results.limited import limited
+from diagnosis.wheels.inputs import WheelsData
+from diagnosis.wheels.valve_map import effective
+from replay.arrays.blocks import blocks
+from replay.faults import FaultMode, Side
+
+Array = NDArray[np.float64]
+
+TURNS = 0.02  #: Of the largest speed: a wheel that turns.
+_CHANGING, _CERTAIN, _TREMBLING = 0.1, 0.9, 0.45  # of the readings; a finding as sure stays, others are no surer
+_TREMBLES = "Its last digits go on changing, which those of a stuck sensor rarely do."
+_LEAST_READ, _CREEPS, _MANY = 0.01, 3.0, 200_000  # quantile of so many readings that are none of 0; times it
+_CREEP = "Its valve gives hardly the least speed that this sensor ever reads: it may read 0 because the wheel creeps."
+_BEFORE_S, _AT_ONCE_S, _OTHERS = 0.6, 0.1, 2  # about the onset; wheels beside this one
+_FAR_OFF, _ALREADY = 0.5, 0.5  # of the others' speed, that a silent sensor is off; of that, before it falls silent
+_OFF_BEFORE = "Its wheel was as far off the others before the reading fell to zero: the wheel may stand, and its sensor read that."
+_FOLLOWS_S, _AS_OTHERS = 0.3, 0.02  # behind its valve a wheel is; of a speed, by which healthy wheels differ
+_ALL_STAY = "Nothing else moves meanwhile, and the others read the same: a speed that stays is what a healthy sensor shows, too."
+_OPENED, _MOVED = 0.1, 0.05  # of full opening, of the largest speed: something else changes meanwhile
+_STEPS = 4.0  # of the reading, by which others move at least
+
+
+def as_shown(data: WheelsData, i: int, f: Finding, told: Sequence[Finding]) -> Finding:
+    """A finding on a wheel, no surer than it shows.
+
+    Parameters
+    ----------
+    data : WheelsData
+        Channels.
+    i : int
+        The wheel.
+    f : Finding
+        The finding.
+    told : Sequence[Finding]
+        All of the wheel.
+    """
+    if f.side is not Side.SENSOR or not f.mode.total:
+        return f
+    f = _may_creep(data, i, _alive(f, data.y[:, i]))
+    return _with_company(data, i, _off_before(data, i, f, told))
+
+
+def _alive(f: Finding, y: Array) -> Finding:
+    """A stuck sensor is less sure where its last digits go on changing."""
+    if f.mode is not FaultMode.STUCK or f.probability >= _CERTAIN:
+        return f
+    known = y[f.start : f.stop]
+    changes = np.diff(known[np.isfinite(known)]) != 0.0
+    return limited(f, _TREMBLING, _TREMBLES) if changes.size and float(np.mean(changes)) > _CHANGING else f
+
+
+def _may_creep(data: WheelsData, i: int, f: Finding) -> Finding:
+    """A silent sensor is less sure where its valve gives no more speed than the least that it ever reads: counters read 0 below that."""
+    plant, part = data.plants[i], slice(f.start, f.stop)
+    if f.mode is not FaultMode.NO_SIGNAL or plant is None:
+        return f
+    read, opening = np.abs(data.y[:: -(-len(data.y) // _MANY), i]), np.abs(data.u[part, i])
+    read = read[read > 0.0]
+    if not read.size or not np.isfinite(opening).any():
+        return f
+    least = float(np.quantile(read, _LEAST_READ))
+    given, unseen, _ = effective(np.full(1, np.nanmedian(opening)), plant, float(np.nanmedian(opening)))
+    creeps = plant.K * float(given[0] + unseen[0]) < _CREEPS * least
+    return limited(f, _TREMBLING, _CREEP) if creeps else f
+
+
+def _off_before(data: WheelsData, i: int, f: Finding, told: Sequence[Finding]) -> Finding:
+    """A silent sensor is less sure where its wheel was off the others before it fell silent, by no other fault of the sensor: it may stand."""
+    reach, gap = round(_BEFORE_S / data.dt), round(_AT_ONCE_S / data.dt)
+    before, after = slice(max(0, f.start - reach), max(0, f.start - gap)), slice(f.start, min(f.stop, f.start + reach))
+    said = any(g is not f and g.side is Side.SENSOR and g.start < before.stop and g.stop > before.start for g in told)
+    if f.mode is not FaultMode.NO_SIGNAL or said or data.y.shape[1] <= _OTHERS:
+        return f
+
+    def off(part: slice) -> tuple[float, float]:
+        y = data.y[part]
+        y = y[np.isfinite(y).all(axis=1)]
+        middle = np.median(np.delete(y, i, axis=1), axis=1)
+        return (float(np.median(np.abs(y[:, i] - middle))), float(np.median(np.abs(middle)))) if len(y) else (0.0, 0.0)
+
+    (early, _), (late, speed) = off(before), off(after)
+    return limited(f, _TREMBLING, _OFF_BEFORE) if late > _FAR_OFF * speed and early > _ALREADY * late else f
+
+
+def _with_company(data: WheelsData, i: int, f: Finding) -> Finding:
+    """A stuck sensor is less sure where nothing else moves either, and it reads what the others do."""
+    part = slice(f.start, max(f.start + 1, f.stop - round(_FOLLOWS_S / data.dt)))
+    others = np.delete(data.y[part], i, axis=1)
+    own = data.y[part, i]
+    if f.mode is not FaultMode.STUCK or not np.isfinite(own).any() or not np.isfinite(others).any():
+        return f
+    level = float(np.nanmedian(own))
+    if moves_on(data, i, part):
+        return f
+    step = _least_step(data.y[:, i])
+    near = max(_STEPS * step if np.isfinite(step) else 0.0, _AS_OTHERS * abs(level))
+    return limited(f, _TREMBLING, _ALL_STAY) if abs(level - float(np.nanmedian(others))) <= near else f
+
+
+def moves_on(data: WheelsData, i: int, part: slice) -> bool:
+    """Whether the valve's opening, or the speed of most other wheels, which turn, changes meanwhile."""
+    step = _least_step(data.y[:, i])
+    others = np.delete(data.y[part], i, axis=1)
+    if others.size and np.isfinite(others).any() and float(np.nanmedian(np.abs(others))) <= TURNS * data.span:
+        return False  # all others stand: a wheel that stands reads one value, its offset too
+    with np.errstate(invalid="ignore"):
+        moved = [float(np.nanquantile(c, 0.95) - np.nanquantile(c, 0.05)) for c in others.T if np.isfinite(c).any()]
+    opening = data.u[part, i]
+    opening = opening[np.isfinite(opening)]
+    opened = float(np.quantile(opening, 0.95) - np.quantile(opening, 0.05)) if opening.size else 0.0
+    far = max(_MOVED * data.span, _STEPS * step if np.isfinite(step) else 0.0)
+    return opened > _OPENED or bool(moved and float(np.median(moved)) > far)
+
+
+def _least_step(y: Array) -> float:
+    """Smallest size by which a value changes, block by block; infinite where none does."""
+    least = np.inf
+    for part in blocks(y.size):
+        steps = np.abs(np.diff(y[part.start : part.stop + 1]))
+        least = min(least, float(np.min(steps[steps > 0.0], initial=np.inf)))
+    return least
