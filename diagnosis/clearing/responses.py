@@ -209,10 +209,16 @@ def response_limits(
 
     Of one whose sides are both measured twice only that of a change: what is left to be seen of it is its load. Arguments as of
     `usual_limits`; `carried` is the share of its speed that the ground gives each wheel [1], none by default. What is usual of a
-    wheel that is measured once may be below the others' by no more than the loss that counts leaves to be seen beside the ground.
+    wheel that is measured once may be below the others' by no more than the loss that counts leaves to be seen beside the ground, or above by
+    no more than such an excess does.
     """
     return [
-        limit if any(both) else limit._replace(lasting_below=min(limit.lasting_below, _seen(clear_at, held)))
+        limit
+        if any(both)
+        else limit._replace(
+            lasting_below=min(limit.lasting_below, _seen(clear_at, held)),
+            lasting_above=min(limit.lasting_above, float(np.log1p(clear_at * (1.0 - held)))),
+        )
         for limit, both, held in zip(
             _beside_others(responses, twice, clear_at), twice, carried or [0.0] * len(twice), strict=True
         )
