@@ -157,7 +157,7 @@ def is_halved(fault: FaultInterval) -> bool:
     """Whether a part that is to be watched may have lost half or more, by the upper bound of ε̂."""
     if fault.severity not in (Severity.MEDIUM, Severity.LOW) or fault.epsilon is None:
         return False
-    return fault.mode.scaled and fault.epsilon.high >= _HALF
+    return (fault.mode.scaled or fault.mode.varying) and fault.epsilon.high >= _HALF
 
 
 def halved_words(fault: FaultInterval, words: MachineWords) -> str:

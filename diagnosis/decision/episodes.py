@@ -25,6 +25,7 @@ from replay.faults import TOTAL, FaultMode, State
 #: Healthy time between two findings that makes two faults of them [s]: second measurements see it at once, a model needs longer.
 _SEEN_HEALTHY_S = {Tier.DIRECT: 0.05}
 _SEEN_BY_MODELS_S = 0.5
+_SEEN_SCALED_S = 0.3  # what loses a share looks healthy while its reference passes zero
 _SPARE = 0.1  # of ε̂: by which two bounds may miss each other
 _NAMED = 6
 _TOUCHES_S = 0.1
@@ -136,7 +137,8 @@ def _continues(a: Finding, b: Finding, states: Mapping[str, NDArray[np.int8]], d
     """Whether b goes on with the fault that a is."""
     if (a.side, a.mode, a.tier) != (b.side, b.mode, b.tier) or b.start < a.stop:
         return False
-    seen = _healthy_steps(a, b, states) * dt >= _SEEN_HEALTHY_S.get(a.tier, _SEEN_BY_MODELS_S)
+    usual = _SEEN_HEALTHY_S.get(a.tier, _SEEN_BY_MODELS_S)
+    seen = _healthy_steps(a, b, states) * dt >= (max(usual, _SEEN_SCALED_S) if a.mode.scaled else usual)
     changes = a.mode is FaultMode.INEFFICIENT and (b.start - a.stop) * dt <= _TOUCHES_S  # a loss that grows or fades
     return not seen and (changes or _alike(a.epsilon, b.epsilon)) and _same_value(a, b)
 

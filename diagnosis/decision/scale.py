@@ -24,6 +24,7 @@ _TURNS = 0.1  # rad; and of the usual yaw rate `_MOVES`
 _LEAST_S = 10.0  # of such motion
 _EVEN = 0.1  # ln; how much the factor may vary, as a standard deviation of its middle half
 _SLIPS = 0.1  # ln; tyres slip and wear by as much
+_TURN_SLIPS = 0.2  # ln; in a turn they slip sideways as well, and its lengths count
 _HARDLY = 0.2  # of the wheels' way: jacked up, or no sensor of this machine
 _STILL, _STILL_S = 0.01, 1.0  # of the usual speed; at rest for this long, a gyro shows its bias
 _ROTATIONAL = ("rad/s", "rpm", "deg/s", "rev/s")
@@ -68,7 +69,7 @@ class Scale(NamedTuple):
     @property
     def wrong(self) -> tuple[Scaled, ...]:
         """Those that contradict it."""
-        return tuple(s for s in self.found if abs(np.log(s.factor)) > _SLIPS)
+        return tuple(s for s in self.found if abs(np.log(s.factor)) > (_TURN_SLIPS if s.lengths else _SLIPS))
 
     @property
     def gross(self) -> str:

@@ -20,9 +20,10 @@ TURNS = 0.02  #: Of the largest speed: a wheel that turns.
 _CHANGING, _CERTAIN, _TREMBLING = 0.1, 0.9, 0.45  # of the readings; a finding as sure stays, others are no surer
 _TREMBLES = "Its last digits go on changing, which those of a stuck sensor rarely do."
 _LEAST_READ, _CREEPS, _MANY = 0.01, 3.0, 200_000  # quantile of so many readings that are none of 0; times it
+_STEPS_OF_NONE = 10.0  # of the reading
 _CREEP = "Its valve gives hardly the least speed that this sensor ever reads: it may read 0 because the wheel creeps."
 _BEFORE_S, _AT_ONCE_S, _OTHERS = 0.6, 0.1, 2  # about the onset; wheels beside this one
-_FAR_OFF, _ALREADY = 0.5, 0.5  # of the others' speed, that a silent sensor is off; of that, before it falls silent
+_FAR_OFF, _ALREADY = 3.0, 0.5  # times what the others are off each other; of how far off it is, before it falls silent
 _OFF_BEFORE = "Its wheel was as far off the others before the reading fell to zero: the wheel may stand, and its sensor read that."
 _FOLLOWS_S, _AS_OTHERS = 0.3, 0.02  # behind its valve a wheel is; of a speed, by which healthy wheels differ
 _ALL_STAY = "Nothing else moves meanwhile, and the others read the same: a speed that stays is what a healthy sensor shows, too."
@@ -70,7 +71,8 @@ def _may_creep(data: WheelsData, i: int, f: Finding) -> Finding:
         return f
     least = float(np.quantile(read, _LEAST_READ))
     given, unseen, _ = effective(np.full(1, np.nanmedian(opening)), plant, float(np.nanmedian(opening)))
-    creeps = plant.K * float(given[0] + unseen[0]) < _CREEPS * least
+    counts = least > _STEPS_OF_NONE * _least_step(data.y[:, i])  # it reads nothing between 0 and that
+    creeps = counts and plant.K * float(given[0] + unseen[0]) < _CREEPS * least
     return limited(f, _TREMBLING, _CREEP) if creeps else f
 
 
@@ -83,13 +85,16 @@ def _off_before(data: WheelsData, i: int, f: Finding, told: Sequence[Finding]) -
         return f
 
     def off(part: slice) -> tuple[float, float]:
+        """How far the wheel is off the others, and these off each other [m/s]."""
         y = data.y[part]
         y = y[np.isfinite(y).all(axis=1)]
-        middle = np.median(np.delete(y, i, axis=1), axis=1)
-        return (float(np.median(np.abs(y[:, i] - middle))), float(np.median(np.abs(middle)))) if len(y) else (0.0, 0.0)
+        others = np.delete(y, i, axis=1)
+        if not len(y):
+            return 0.0, np.inf
+        return float(np.median(np.abs(y[:, i] - np.median(others, axis=1)))), float(np.median(np.ptp(others, axis=1)))
 
-    (early, _), (late, speed) = off(before), off(after)
-    return limited(f, _TREMBLING, _OFF_BEFORE) if late > _FAR_OFF * speed and early > _ALREADY * late else f
+    (early, _), (late, apart) = off(before), off(after)
+    return limited(f, _TREMBLING, _OFF_BEFORE) if late > _FAR_OFF * apart and early > _ALREADY * late else f
 
 
 def _with_company(data: WheelsData, i: int, f: Finding) -> Finding:
