@@ -114,7 +114,7 @@ class Replay {
         const t = Math.min(s.start + d.dt, s.stop), shares = (await Promise.all(part.modes.map(async ({ m }) => ({ m, p: (await value(`p_${m}`, t))?.v })))).filter((x) => x.m !== "healthy" && Number.isFinite(x.p)).sort((a, b) => b.p - a.p), [now, top] = [await value("residual", t), await value("threshold", t)];
         const ratio = now && top && top.v > 0 && Math.abs(now.v) > top.v ? `; the residual is ${Now.number(+(Math.abs(now.v) / top.v).toPrecision(2))} times its threshold` : "";
         const whole = mine.find((f) => f.start <= t && t < f.stop), first = shares.length ? words[shares[0].m] : "";
-        const then = first && whole && whole.words !== first ? ` at first; the whole of it is ${whole.words}` : "", little = near(s) ? "" : "; no fault: too small, or too brief";
+        const then = first && whole && whole.words !== first ? ` at first; the whole of it is ${whole.words}` : "", little = near(s) ? "" : "; no fault is stated here";
         out.push({ t: s.start, sure: 1, words: `${clock(s.start)} · ${part.words}: the probability that it deviates passes ${Now.number(100 * limit)} %${first ? `, ${first} ${Math.round(100 * shares[0].p)} %${then}` : ""}${ratio}${little}.` });
         out.push({ t: s.stop, sure: 1, words: `${clock(s.stop)} · ${part.words}: the probability that it deviates falls below ${Now.number(100 * limit)} % again.` });
       }
@@ -152,7 +152,7 @@ class Replay {
       shares.forEach((p, i) => { part.bar.children[i].style.width = `${100 * (p || 0)}%`; if (p > (shares[top] ?? -1)) top = i; });
       const most = top < 0 ? "not judged" : `${Data.view.words[part.side][part.modes[top].m]} ${Math.round(100 * shares[top])} %`, slight = top >= 0 && part.modes[top].m !== "healthy" && !Data.view.faults.some((f) => Replay.of(f, part) && f.start <= t && t < f.stop);
       if (slight) for (const share of part.bar.children) share.style.width = "0";
-      part.says.textContent = slight ? "no fault: deviates by less than counts" : most;
+      part.says.textContent = slight ? "no fault stated" : most;
       part.bar.setAttribute("aria-label", `${part.words}: ${part.says.textContent}`);
     }
   }
