@@ -26,9 +26,11 @@ _CHANGED = 0.88  # a change counts by its limit in windows, not over the mission
 #: A deviation counts from this on, whatever the other wheels do [ln]: tyres hide most of a valve's loss, which is all that
 #: shows of it where neither side is measured twice.
 _LEAST_SEEN, _LEAST_SEEN_TWICE = 0.06, 0.1
+#: The same where both sides are measured twice, in windows and of a change: what is left to be seen is what lies behind the drive.
+_LEAST_BEHIND, _LEAST_CHANGED_BEHIND = 0.2, 0.13
+_LEAST_LASTING = 0.13  # the same over the mission, of what is measured twice on either side
 #: A deviation counts from so many times the largest of the other wheels' on, a change likewise.
 _ALONE, _CHANGED_ALONE = 3.0, 2.2
-_LEAST_TWICE = 0.75  # of the loss that counts, where both sides are measured twice
 OTHERS = 2
 #: Limits of speed per opening below and above the other wheels', in windows and over the mission, as multiples of the loss
 #: that counts, by whether opening and speed are measured twice. What measurements judge need not be judged by its likeness to
@@ -205,10 +207,9 @@ def usual_limits(twice: tuple[bool, bool], clear_at: float) -> Limits:
 def response_limits(
     responses: Responses, twice: Sequence[tuple[bool, bool]], clear_at: float, carried: Sequence[float] | None = None
 ) -> list[Limits]:
-    """Limits of every wheel [ln]: those of windows and of changes are lower where the other wheels deviate by much less.
+    """Limits of every wheel [ln], lower where the other wheels deviate by much less.
 
-    Of one whose sides are both measured twice only that of a change: what is left to be seen of it is its load. Arguments as of
-    `usual_limits`; `carried` is the share of its speed that the ground gives each wheel [1], none by default. What is usual of a
+    Arguments as of `usual_limits`; `carried` is the share of its speed that the ground gives each wheel [1], none by default. What is usual of a
     wheel that is measured once may be below the others' by no more than the loss that counts leaves to be seen beside the ground, or above by
     no more than such an excess does.
     """
@@ -232,23 +233,24 @@ def _seen(clear_at: float, carried: float) -> float:
 
 def _beside_others(responses: Responses, twice: Sequence[tuple[bool, bool]], clear_at: float) -> list[Limits]:
     most = [[float(x) for x in largest(sign * responses.windows)] for sign in (-1.0, 1.0)]
-    usual = [usual_limits(both, clear_at) for both in twice]
-    least = -_LEAST_TWICE * float(np.log1p(-clear_at))
-    return [
-        limit._replace(
-            changed=alone(responses.changes, i, limit.changed, least, _CHANGED_ALONE),
-            grown=alone(responses.grown, i, limit.grown, least, _CHANGED_ALONE),
-        )
-        if all(twice[i])
-        else limit._replace(
+    below = [usual.below for usual in responses.usual]
+    out = []
+    for i, both in enumerate(twice):
+        limit = usual_limits(both, clear_at)
+        seen = _LEAST_BEHIND if all(both) else _LEAST_SEEN_TWICE if any(both) else _LEAST_SEEN
+        changed = _LEAST_CHANGED_BEHIND if all(both) else seen
+        limit = limit._replace(
             below=alone(most[0], i, limit.below, seen, _ALONE),
-            above=alone(most[1], i, limit.above, seen, _ALONE),
-            changed=alone(responses.changes, i, limit.changed, seen, _CHANGED_ALONE),
-            grown=alone(responses.grown, i, limit.grown, seen, _CHANGED_ALONE),
+            changed=alone(responses.changes, i, limit.changed, changed, _CHANGED_ALONE),
+            grown=alone(responses.grown, i, limit.grown, changed, _CHANGED_ALONE),
         )
-        for i, limit in enumerate(usual)
-        for seen in (_LEAST_SEEN_TWICE if any(twice[i]) else _LEAST_SEEN,)
-    ]
+        if not all(both):
+            limit = limit._replace(above=alone(most[1], i, limit.above, seen, _ALONE))
+        if any(both):
+            lasting = alone(below, i, limit.lasting_below, _LEAST_LASTING, _ALONE)
+            limit = limit._replace(lasting_below=lasting)
+        out.append(limit)
+    return out
 
 
 def largest(windows: Array) -> Array:

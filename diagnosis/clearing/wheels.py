@@ -38,7 +38,7 @@ LATE_S = 0.2
 #: How much more of a partial loss the speed per opening shows than a carried wheel's speed alone: its controller asks for more.
 _ASKED_MORE = 2.0
 _TRACKING, _TRACKING_ALONE = 0.35, 0.12  # at most, and at least where the other wheels follow much better
-_SLOWER = 3.0  # times the deviation of the others' valves, or speeds: a slow one
+_VALVE_ALONE, _SLOWER = 2.2, 3.0  # times the deviation of the others' valves, and speeds
 VALVE = 1.4  # dead band and hysteresis of a healthy valve: the limit as a multiple of the loss that counts
 
 
@@ -81,7 +81,7 @@ def wheel_checks(cells: Cells, clear_at: float) -> Iterator[Checked]:
             creeps = worst(cells, about_sensor, creeping[:, i], most_creeping(slowly, i, clear_at), apart=True)
             yield max(driven, creeps, key=times)
         if twice[i][0]:
-            limit = alone(slowest, i, VALVE * clear_at, clear_at, _SLOWER)
+            limit = alone(slowest, i, VALVE * clear_at, clear_at, _VALVE_ALONE)
             yield worst(cells, (*about, Side.ACTUATOR, Check.SECOND_MEASUREMENT), behind[:, i], limit, apart=True)
         if wheel in cells.carried and not any(twice[i]) and _known(command[:, i]):
             limit = most_carried(limits[i].below, clear_at)
