@@ -1,13 +1,13 @@
 """Small deviations that several valves of a machine have are how they are built and measured, and no fault of one of them.
 
 Coils warm, supplies fall, and a position sensor has a zero and a gain of its own: each keeps a healthy valve some hundredths off its
-command for long, which evidence that grows with time takes for a certain loss or noise. How far off valves usually are is taken from
-the others; a finding that is no further off is left open.
+command for long, which evidence that grows with time takes for a certain loss or noise. How far off valves usually are, and are
+at the same time, is taken from the others; a finding that is no further off is left open.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -17,9 +17,10 @@ from diagnosis.direct.low_speed import left_open
 from diagnosis.results.assessment import Assessment, Finding
 
 _SMALL = 0.08  # of the span, root mean square: a larger deviation is none of a healthy valve, whatever the others do
-_SHARE = 0.2  # of its command, likewise
+_SHARE, _SHARE_OTHERS = 0.2, 0.3  # of its command, likewise: by habit, and while others are off as well
 _WINDOW_S, _WINDOWS = 2.0, 4  # s; fewer show nothing
 _USUAL, _BEYOND = 0.9, 1.8  # quantile of the windows, and times it
+_BEYOND_OTHERS = 1.6  # times what the others are off meanwhile
 _VALVES = 3  # fewer show no habit
 
 
@@ -40,10 +41,15 @@ def without_small_deviations(
     usual = {w: _usual(one) for w, one in found.items()}
     out = {}
     for w, a in assessments.items():
-        most = _BEYOND * max(x for other, x in usual.items() if other != w)
-        span = found[w].pair.span
+        others = [other for other in found if other != w]
+        most = max(usual[other] for other in others)
         out[w] = left_open(
-            a, [f for f in a.findings if not f.mode.total and _small(f, found[w], min(most, _SMALL * span))]
+            a,
+            [
+                f
+                for f in a.findings
+                if not f.mode.total and _small(f, found[w], most, _meanwhile(f, [found[x] for x in others]))
+            ],
         )
     return out
 
@@ -61,11 +67,24 @@ def _usual(one: IdentifiedPair) -> float:
     return float(np.quantile(small, _USUAL)) if small.size >= _WINDOWS else 0.0
 
 
-def _small(finding: Finding, one: IdentifiedPair, most: float) -> bool:
-    """Whether a position is off by little [unit], and by a small share of its command."""
+def _meanwhile(finding: Finding, others: Sequence[IdentifiedPair]) -> float:
+    """How far other positions are off during a finding [unit], by their median; 0 unless two are known."""
+    off = [x for one in others if (x := _off(finding, one)[0]) is not None]
+    return float(np.median(off)) if len(off) >= _VALVES - 1 else 0.0
+
+
+def _off(finding: Finding, one: IdentifiedPair) -> tuple[float | None, float]:
+    """Deviation of a position and its command during a finding, root mean square [unit]; None where nothing is known."""
     y, x, status, *_ = one.samples.part(finding.start, finding.stop)
     use = status == PAIR
     if not use.any():
-        return False
+        return None, 0.0
     off, asked = (float(np.sqrt(np.mean(z[use] ** 2))) for z in (y - x, x))
-    return off < min(most, _SHARE * asked)
+    return off, asked
+
+
+def _small(finding: Finding, one: IdentifiedPair, usual: float, meanwhile: float) -> bool:
+    """Whether a position is off by little beside what is usual, or meanwhile of others [unit], and by a small share of its command."""
+    off, asked = _off(finding, one)
+    most = max(min(_BEYOND * usual, _SHARE * asked), min(_BEYOND_OTHERS * meanwhile, _SHARE_OTHERS * asked))
+    return off is not None and off < min(most, _SMALL * one.pair.span)

@@ -63,7 +63,7 @@ def test_a_loss_is_found_from_the_size_that_is_stated(part: str, side: Side, bas
         span = float(places.first[k] * cells.dt), float(places.last[k] * cells.dt)
         assert _found(_with(mission, name, *span, 1.0 - 1.25 * sizes[k]), part, base=base), (span, sizes[k])
         if side is Side.ACTUATOR:  # where no other check sees it earlier
-            assert not _found(_with(mission, name, *span, 1.0 - 0.6 * sizes[k]), part, base=base), (span, sizes[k])
+            assert not _found(_with(mission, name, *span, 1.0 - 0.5 * sizes[k]), part, base=base), (span, sizes[k])
 
 
 def test_rows_state_every_part_and_length() -> None:

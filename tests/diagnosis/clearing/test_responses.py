@@ -41,17 +41,18 @@ def test_a_wheel_that_deviates_alone_is_held_to_a_lower_limit() -> None:
     assert second.below == usual.below  # another wheel deviates by far more
 
 
-def test_a_wheel_that_is_measured_twice_on_both_sides_keeps_its_limit() -> None:
+def test_a_wheel_that_is_measured_twice_on_both_sides_keeps_its_limit_of_what_is_above() -> None:
     of = responses(0.3, 0.02, 0.03, 0.03, changes=(0.3, 0.02, 0.01, None))
     usual = usual_limits(TWICE, CLEAR_AT)
     limits = response_limits(of, [TWICE] * 4, CLEAR_AT)
-    assert [limit._replace(changed=usual.changed, grown=usual.grown) for limit in limits] == [usual] * 4
+    assert [(limit.above, limit.lasting_above) for limit in limits] == [(usual.above, usual.lasting_above)] * 4
+    assert limits[0].below == pytest.approx(0.2)  # the others' are much less: what is left is behind its valve
 
 
 def test_a_change_that_one_wheel_alone_makes_counts_although_it_is_measured_twice() -> None:
     of = responses(0.0, 0.0, 0.0, 0.0, changes=(0.3, 0.02, 0.01, 0.02))
     first, *others = response_limits(of, [TWICE] * 4, CLEAR_AT)
-    assert first.changed == pytest.approx(0.75 * -np.log(0.75))
+    assert first.changed == pytest.approx(0.16)
     assert all(limit.changed == usual_limits(TWICE, CLEAR_AT).changed for limit in others)
 
 
@@ -99,3 +100,10 @@ def test_what_grows_is_seen_although_no_moment_parts_it() -> None:
     assert growth(np.where(np.arange(130) % 26 < 13, 0.2, 0.0), [every]) == 0.0  # comes and goes
     assert growth(np.where(every, np.nan, grows), [every]) == 0.0
     assert growth(np.r_[grows, -grows], [np.arange(260) < 130, np.arange(260) >= 130]) == pytest.approx(0.17)
+
+
+def test_a_loss_over_the_mission_of_one_wheel_alone_counts_although_it_is_measured_twice() -> None:
+    of = responses(*[0.05] * 4)._replace(usual=[Usual(0.2), Usual(0.03), Usual(0.02), Usual(0.0)])
+    alike = of._replace(usual=[Usual(0.2), Usual(0.1), Usual(0.15), Usual(0.0)])
+    assert response_limits(of, [TWICE] * 4, CLEAR_AT)[0].lasting_below == pytest.approx(0.13)
+    assert response_limits(alike, [TWICE] * 4, CLEAR_AT)[0].lasting_below == usual_limits(TWICE, CLEAR_AT).lasting_below

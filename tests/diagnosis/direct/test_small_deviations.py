@@ -23,19 +23,21 @@ COMMAND = 0.6 * np.sin(np.arange(SIZE) * DT * 0.7)
 SPAN = (1000, 4000)
 
 
-def valve(gain: float) -> IdentifiedPair:
-    """A valve that opens by a share of what it is told."""
-    y, status, quiet = gain * COMMAND, np.full(SIZE, PAIR, np.int8), np.zeros(SIZE, np.bool_)
+def valve(gain: float, opens: slice = slice(None)) -> IdentifiedPair:
+    """A valve that opens by a share of what it is told, for a while."""
+    gains = np.ones(SIZE)
+    gains[opens] = gain
+    y, status, quiet = gains * COMMAND, np.full(SIZE, PAIR, np.int8), np.zeros(SIZE, np.bool_)
     part = lambda a, b: (y[a:b], COMMAND[a:b], status[a:b])  # noqa: E731
     samples = SimpleNamespace(x=COMMAND, y=y, status=status, quiet=quiet, part=part)
     return cast(IdentifiedPair, SimpleNamespace(samples=samples, pair=SimpleNamespace(dt=DT, span=1.0)))
 
 
-def told(gains: tuple[float, ...], mode: FaultMode = FaultMode.INEFFICIENT) -> Assessment:
+def told(gains: tuple[float, ...], mode: FaultMode = FaultMode.INEFFICIENT, opens: slice = slice(None)) -> Assessment:
     states = np.full(SIZE, CODE[State.HEALTHY])
     states[slice(*SPAN)] = CODE[State(mode.value)]
     finding = Finding(*SPAN, Side.ACTUATOR, mode, 0.97, (), None, None, (), Tier.DIRECT)
-    pairs = dict(zip(WHEELS, map(valve, gains), strict=False))
+    pairs = dict(zip(WHEELS, (valve(x, opens) for x in gains), strict=False))
     return without_small_deviations(pairs, {"FR": Assessment(states, findings=(finding,), tier=Tier.DIRECT)})["FR"]
 
 
@@ -52,3 +54,10 @@ def test_what_is_its_own_or_large_or_beside_too_few_stays(gains: tuple[float, ..
 
 def test_a_stuck_valve_stays() -> None:
     assert told((0.9, 0.93, 0.93, 0.93), FaultMode.STUCK).findings
+
+
+@pytest.mark.parametrize(("gains", "stays"), [((0.9, 0.92, 0.92, 1.0), False), ((0.9, 0.98, 0.98, 0.98), True)])
+def test_what_others_are_off_by_meanwhile_is_left_open_though_they_seldom_are(
+    gains: tuple[float, ...], stays: bool
+) -> None:
+    assert bool(told(gains, opens=slice(1000, 1400)).findings) is stays
