@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 from diagnosis.estimation.one_cause import with_one_cause
 from diagnosis.estimation.simple_causes import Measured
 from diagnosis.results.assessment import Finding
-from diagnosis.results.result import Hypothesis
+from diagnosis.results.result import Epsilon, Hypothesis
 from diagnosis.steering.findings import SideFindings
 from diagnosis.steering.inputs import AxleInputs
 from diagnosis.steering.redundancy import MOST_APART
-from replay.faults import FaultMode, Side
+from replay.faults import FaultMode, Side, State
 from replay.machine.quantities import OPENING
 
 Array = NDArray[np.float64]
@@ -24,6 +24,12 @@ Array = NDArray[np.float64]
 _LOWER, _NORMAL = 0.25, 3.138
 _AT_REST = 0.5  # probability that a valve does not answer a command which stays
 _STEADY, _HARDLY = 0.25, 0.05  # of its mean, and of full opening, by which such a command varies
+# of a valve that moves as it is told: correlation of opening and command, and the least standard deviation of both that is a motion
+_FOLLOWS, _MOTION, _FEW = 0.9, 0.01, 12
+_EDGE = 0.15  # of a finding
+_LOSES, _IT_IS = 0.1, 0.9  # of its gain, from which it is a loss; probability of what a measured opening shows
+_SHIFTED = 0.5  # of the loss, from which a zero is no matter of how it changes
+_SHOWN = "The measured opening moves with its command: {gain:.2f} of it, {zero:+.1f}{{percent}} off."
 _CONSTANT = "The command hardly moved meanwhile: a {valve} that is off by a constant would look the same."
 
 
@@ -51,12 +57,55 @@ def of_one_cause(side: Side, found: SideFindings, inputs: AxleInputs, min_sat: f
     for f in found.findings:
         sound[f.start : f.stop] = False
     usual = float(np.quantile(np.abs(y - x)[sound], _LOWER)) if sound.any() else 0.0
+    if not sensor:
+        found = _as_it_opens(found, (y, x, use), inputs, min_sat)
     names = (inputs.channel(leaves[0]), inputs.channel(leaves[1]))
     unit = "rad" if sensor else OPENING
     noise = min(_NORMAL * usual, MOST_APART)
     measured = Measured(y, x, use, inputs.timeline.dt, names, unit, noise, min_sat)
     joined = with_one_cause(found.findings, measured)
     return found._replace(findings=tuple(joined) if sensor else _or_all_off(joined, x))
+
+
+def _as_it_opens(
+    found: SideFindings, pairs: tuple[Array, Array, NDArray[np.bool_]], inputs: AxleInputs, min_sat: float
+) -> SideFindings:
+    """A valve's findings, none of them stuck or dead while its measured opening moves with the command: `pairs` of both, shape (n,), and where."""
+    kept, open_ = [], list(found.unexplained)
+    length = 1 if inputs.blocks is None else inputs.blocks.length
+    for f in found.findings:
+        edge = round(_EDGE * (f.stop - f.start))  # a valve that begins to stick has moved until then
+        inner = slice(f.start + edge, f.stop - edge)
+        y, x = (z[inner][pairs[2][inner]] for z in pairs[:2])
+        if not f.mode.total or min(x.size, y.size) < _FEW or min(np.std(x), np.std(y)) < _MOTION:
+            kept.append(f)
+            continue
+        if float(np.corrcoef(x, y)[0, 1]) < _FOLLOWS:
+            kept.append(f)
+            continue
+        gain = float(np.cov(x, y)[0, 1] / np.var(x, ddof=1))
+        zero = float(np.mean(y) - gain * np.mean(x))
+        lost = 1.0 - gain
+        if lost < _LOSES and abs(zero) < min_sat and lost > -_LOSES:
+            open_.append((f.start // length, -(-f.stop // length)))
+            continue
+        shifted = abs(zero) >= max(min_sat, _SHIFTED * lost * float(np.sqrt(np.mean(x**2))))
+        mode = FaultMode.INEFFICIENT if lost >= _LOSES and not shifted else FaultMode.OUTSIDE_TABLE
+        kept.append(
+            replace(
+                f,
+                mode=mode,
+                probability=_IT_IS,
+                hypotheses=(
+                    Hypothesis(Side.ACTUATOR.value, mode.value, _IT_IS),
+                    Hypothesis("none", State.HEALTHY.value, 1.0 - _IT_IS),
+                ),
+                epsilon=Epsilon(lost, lost - _LOSES, lost + _LOSES),
+                sat=None,
+                evidence=(*f.evidence, _SHOWN.format(gain=gain, zero=100.0 * zero)),
+            )
+        )
+    return SideFindings(tuple(kept), tuple(open_))
 
 
 def _or_all_off(findings: Sequence[Finding], command: Array) -> tuple[Finding, ...]:

@@ -1,0 +1,66 @@
+"""A valve whose measured opening moves with its command neither sticks nor is dead, whatever a model of its axle makes of the angle."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import cast
+
+import numpy as np
+import pytest
+
+from diagnosis.results.assessment import Finding
+from diagnosis.results.result import Epsilon, Hypothesis
+from diagnosis.results.vocabulary import Tier
+from diagnosis.steering.findings import SideFindings
+from diagnosis.steering.inputs import AxleInputs
+from diagnosis.steering.measured_twice import of_one_cause
+from replay.faults import FaultMode, Side
+
+DT, SIZE, SPAN = 0.01, 3000, (1000, 1400)
+COMMAND = 0.5 * np.sin(np.arange(SIZE) * DT * 3.0)
+NOISE = 0.002 * np.random.default_rng(5).standard_normal(SIZE)
+
+
+def told(opening: np.ndarray, mode: FaultMode = FaultMode.STUCK) -> SideFindings:
+    """What is left of a finding on the valve that says that it sticks, of an opening measured meanwhile."""
+    values = {
+        "u": COMMAND,
+        "u_applied": np.where((np.arange(SIZE) >= SPAN[0]) & (np.arange(SIZE) < SPAN[1]), opening, COMMAND) + NOISE,
+    }
+    inputs = SimpleNamespace(
+        angle_redundant=False,
+        valve_redundant=True,
+        values=values.__getitem__,
+        channel=lambda leaf: f"steer.front.{leaf}",
+        timeline=SimpleNamespace(dt=DT, fresh={"steer.front.u_applied": np.ones(SIZE, np.bool_)}),
+        blocks=None,
+        command=COMMAND,
+    )
+    row = (Hypothesis(Side.ACTUATOR.value, mode.value, 1.0),)
+    finding = Finding(*SPAN, Side.ACTUATOR, mode, 1.0, row, Epsilon(1.0, 1.0, 1.0), None, (), Tier.MODEL)
+    return of_one_cause(Side.ACTUATOR, SideFindings((finding,), ()), cast(AxleInputs, inputs), 0.05)
+
+
+@pytest.mark.parametrize(
+    ("gain", "zero", "mode"),
+    [(0.4, 0.0, FaultMode.INEFFICIENT), (1.0, 0.12, FaultMode.OUTSIDE_TABLE), (1.4, 0.0, FaultMode.OUTSIDE_TABLE)],
+)
+def test_a_valve_that_moves_as_told_is_what_its_opening_shows(gain: float, zero: float, mode: FaultMode) -> None:
+    (finding,) = told(gain * COMMAND + zero).findings
+    assert finding.mode is mode
+    assert finding.probability < 1.0
+    assert finding.epsilon is not None
+    assert finding.epsilon.low <= 1.0 - gain <= finding.epsilon.high
+
+
+def test_a_valve_that_does_as_told_is_left_open() -> None:
+    found = told(COMMAND)
+    assert found.findings == ()
+    assert found.unexplained == (SPAN,)
+
+
+@pytest.mark.parametrize(("at", "mode"), [(0.06, FaultMode.STUCK), (0.0, FaultMode.NO_SIGNAL)])
+def test_a_valve_that_stays_where_it_is_stays_stuck(at: float, mode: FaultMode) -> None:
+    (finding,) = told(np.full(SIZE, at), mode).findings
+    assert finding.mode is mode
+    assert finding.probability == 1.0
