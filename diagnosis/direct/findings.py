@@ -16,6 +16,7 @@ from diagnosis.direct.same_share import as_beside, as_excess_beside
 from diagnosis.direct.sentences import alike_sentence, sentences
 from diagnosis.direct.stated_mode import least_constant, mode_of
 from diagnosis.direct.timing import timing_explains
+from diagnosis.estimation.changing_gain import as_changing_gain
 from diagnosis.estimation.fault_models import HEALTHY, INEFFICIENT, STUCK, TOTAL_ROWS, VARYING_ROWS
 from diagnosis.estimation.one_cause import with_one_cause
 from diagnosis.estimation.segments import Run, with_leads
@@ -101,7 +102,8 @@ def find_faults(path: ModePath, found: IdentifiedPair, limits: Limits) -> Faults
             findings.append(_widened(finding, run, whole, dt, _detected(path, whole, dt, shortest, found.lag)))
     beside = [as_excess_beside(as_beside(f, findings, found), findings, found) for f in findings]
     measured = _measured(found, limits)
-    return FaultsFound(with_one_cause(with_spikes(beside, measured), measured), timing, below)
+    joined = with_one_cause(with_spikes(beside, measured), measured)
+    return FaultsFound([as_changing_gain(f, measured) for f in joined], timing, below)
 
 
 def _left_open(run: Run, found: IdentifiedPair, limits: Limits) -> bool:
