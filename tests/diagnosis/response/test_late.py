@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -103,7 +105,8 @@ def test_a_delay_is_told_only_where_it_explains_the_other_view_as_well() -> None
     told = late_of(one, width * DT)
     assert len(told) == 1
     assert left_open({"RL": told}, {"RL": one}) == {"RL": []}
-    part = slice(FAULT.start // width, FAULT.stop // width)
-    wrong = np.array(found["RL"].wheel.blocks.mean)
-    wrong[part] *= 1.8  # a neighbour that reads too much is no delay of this wheel
-    assert left_open({"RL": told}, {"RL": one._replace(speed=wrong)}) == {"RL": told}
+    start, stop = round(55 / DT), round(61 / DT)
+    wrong = np.array(one.speed)
+    wrong[start // width : stop // width] *= 3.0  # a neighbour that reads too much is no delay of this wheel
+    part = [replace(told[0], start=start, stop=stop)]
+    assert left_open({"RL": part}, {"RL": one._replace(speed=wrong)}) == {"RL": part}
