@@ -47,9 +47,9 @@ from diagnosis.response.rivals import (
     told_and_doing_alike,
 )
 from diagnosis.response.sides import sides_of
-from diagnosis.response.sideways import goes_sideways
+from diagnosis.response.sideways import crossed, goes_sideways
 from diagnosis.response.spells import spells_of, until_back, where_asked
-from diagnosis.response.turning import turning_of, turns_with, unasked_turn, wrong_yaw_rate
+from diagnosis.response.turning import turning_of, turns_other_way, turns_with, unasked_turn, wrong_yaw_rate
 from diagnosis.results.assessment import CODE, Assessment, Finding
 from replay.faults import State
 from replay.machine.config import Limits
@@ -66,6 +66,10 @@ _PAIR = 2  # wheels, of which each moves one side of the machine
 _TURNED = (
     "The sides of the machine go apart as where it turns, of which the log has neither a command nor a measurement: log the commanded yaw "
     "rate (cmd.omega) or a measured one (imu.yaw_rate)."
+)
+_EXCHANGED = (
+    "the sides, or those of one axle, go apart the other way than the machine turns: left and right may be exchanged, or the sign of one "
+    "side, or of the yaw rate, is wrong"
 )
 
 
@@ -119,10 +123,11 @@ def assess_response(
         len(data) == _PAIR and len(found) == _PAIR and turns_by_wheels(*(j.wheel.blocks.mean for j in found.values()))
     )
     found = {w: j._replace(wheel=j.wheel._replace(habit=_habit(w, holds), lone=lone)) for w, j in found.items()}
-    sideways = any(d.commands.shape[1] > BODY_COMMANDS for d in drives) or goes_sideways(
-        {w: j.wheel.blocks.mean for w, j in found.items()}, geometry, width * dt
-    )
-    bodies = Bodies(speeds, None if yaw is None else cells(yaw, width), width * dt, sideways)
+    means, turned_by = {w: j.wheel.blocks.mean for w, j in found.items()}, None if yaw is None else cells(yaw, width)
+    rollers = any(d.commands.shape[1] > BODY_COMMANDS for d in drives)
+    sideways = rollers or goes_sideways(means, geometry, width * dt)
+    exchanged = sideways and not rollers and crossed(means, geometry, turned_by)
+    bodies = Bodies(speeds, turned_by, width * dt, sideways)
     efforts = {w: cells(j.data.effort, width) for w, j in found.items() if j.data.effort is not None and not sideways}
     mates = {w: tuple(o for o in found if o != w and same_side(w, o, geometry)) for w in found}
     efforts, none = powered(efforts)
@@ -187,7 +192,10 @@ def assess_response(
     remarks = (*astray, *left_notes, *((_TURNED,) if any(turned.values()) else ()))
     doubts = {w: j.odd for w, j in judged.items() if j.odd and not any(side.findings for side in parts[w])}
     doubts |= {w: j.joint.unlike for w, j in judged.items() if j.joint is not None and j.joint.unlike}
-    for w, text in (doubts | unlike(judged)).items():
+    doubts |= unlike(judged)
+    if exchanged or turns_other_way(judged, geometry, turning):
+        doubts = dict.fromkeys(judged, _EXCHANGED) | doubts
+    for w, text in doubts.items():
         parts[w] = _doubted(parts[w][0], [slice(None)], text), parts[w][1]
     lasting = lasting_losses(judged)
     for w, (sensor, drive) in parts.items():

@@ -171,15 +171,18 @@ def _by_all_others(w: str, wheels: Mapping[str, str], blocks: Mapping[str, Block
         return None
     kept = use.copy()
     speed = y
+    parts = table
     for _ in range(5):
-        speed = table @ np.linalg.lstsq(table[kept], y[kept], rcond=None)[0]
+        parts = table * np.linalg.lstsq(table[kept], y[kept], rcond=None)[0]
+        speed = parts.sum(axis=1)
         off = np.abs(y - speed)
         kept = use & (off <= np.quantile(off[use], 0.7))
     if np.median(np.abs(y - speed)[use]) > _TOGETHER * np.median(np.abs(y[use])):
         return None
     blame = _blame_by_commands(blocks[w], [blocks[o] for o in others])
     rough = np.asarray(np.max([blocks[o].rough for o in others], axis=0))
-    return Beside(speed, _noise(blocks[w], speed), blame, rough, " and ".join(wheels[o] for o in others))
+    made = np.sqrt((parts**2).sum(axis=1))  # wheels may cancel each other, their errors do not
+    return Beside(speed, _noise(blocks[w], speed, made), blame, rough, " and ".join(wheels[o] for o in others))
 
 
 def _by_body(
@@ -238,14 +241,17 @@ def _turned(y: Array, x: Array, yaw: Array) -> Array | None:
     return x + k * yaw if np.median(np.abs(y - x - k * yaw)[use]) < _ALIKE * moved else None
 
 
-def _noise(blocks: Blocks, speed: Array) -> Array:
-    """Usual misfit of a view, larger where the speed changes."""
+def _noise(blocks: Blocks, speed: Array, made: Array | None = None) -> Array:
+    """Usual misfit of a view, larger where the speed changes; `made` is the size of what it is put together from, its own where that is None."""
     off = np.abs(blocks.mean - speed)
     known = np.isfinite(off)
     change = np.abs(np.gradient(np.where(np.isfinite(speed), speed, 0.0)))
     floor = 1.5 * float(np.median(off[known]))
     return np.asarray(
-        floor + _SHARE * np.abs(speed) + 0.5 * change + 0.01 * float(np.quantile(np.abs(speed[known]), 0.9))
+        floor
+        + _SHARE * np.abs(speed if made is None else made)
+        + 0.5 * change
+        + 0.01 * float(np.quantile(np.abs(speed[known]), 0.9))
     )
 
 

@@ -57,9 +57,9 @@ def _alone(samples: Samples, place: NDArray[np.intp], dt: float) -> NDArray[np.b
     out = np.ones(place.size, np.bool_)
     for i, k in enumerate(place.tolist()):
         first, last = np.searchsorted(samples.step, samples.step[k] + np.array([-1, 1]) * round(_RAMP_S / dt))
-        before, after = samples.value[first:k], samples.value[k : last + 1]
-        if np.isfinite(before).any() and np.isfinite(after).any():
-            whole = np.nanmedian(after[-3:]) - np.nanmedian(before[:3])
+        before, after = (x[np.isfinite(x)] for x in (samples.value[first:k], samples.value[k : last + 1]))
+        if before.size and after.size:
+            whole = np.median(after[-3:]) - np.median(before[:3])
             out[i] = samples.change[k] * whole <= 0.0 or abs(samples.change[k]) >= _SHARE * abs(whole)
     return out
 

@@ -38,6 +38,7 @@ _LEAST_P, _LEAST_S = 0.8, 3.0
 _SURE = 0.95
 _OWN = 0.95  # that it is the sensor's where another view shows how this wheel turns
 _LENGTH_S = 10.0
+_EXPLAINS = 0.5  # of the misfit that nothing explains: so much of it, at most, a delay leaves beside each of what it is held against
 
 
 class Past(NamedTuple):
@@ -190,7 +191,9 @@ def late_neighbour(spell: Spell, wheel: str, late: Mapping[str, Sequence[Finding
 
 
 def left_open(late: Mapping[str, Sequence[Finding]], judged: Mapping[str, Judged]) -> dict[str, list[Finding]]:
-    """Of times in which a speed comes late, those that the ground explains: nothing healthy can be said of them, either.
+    """Of times in which a speed comes late, those that the ground explains, or no delay beside all that shows the speed.
+
+    Nothing healthy can be said of them, either.
 
     Parameters
     ----------
@@ -199,7 +202,9 @@ def left_open(late: Mapping[str, Sequence[Finding]], judged: Mapping[str, Judged
     judged : Mapping[str, Judged]
         All wheels.
     """
-    return {w: [f for f in found if _by_ground(f, w, judged)] for w, found in late.items()}
+    return {
+        w: [f for f in found if _by_ground(f, w, judged) or not _explained(f, judged[w])] for w, found in late.items()
+    }
 
 
 def late_wheels(judged: Mapping[str, Judged], block_s: float) -> dict[str, list[Finding]]:
@@ -239,6 +244,17 @@ def _by_ground(found: Finding, wheel: str, judged: Mapping[str, Judged]) -> bool
     by_command, block_s = pasts_of(one._replace(speed=None), width * one.wheel.dt), width * one.wheel.dt
     score = scores(one.wheel.blocks.mean, by_command, block_s)[part].sum(axis=0)
     return bool(score[0] >= score[1:-1].max()) or dragged(part, wheel, judged, 0.0)
+
+
+def _explained(found: Finding, one: Judged) -> bool:
+    """Whether some delay explains a speed beside its command and beside the other view, each by itself.
+
+    What is late is late beside both; a wheel that is merely off another one, as where that one is wrong, is so beside that one alone.
+    """
+    width = int(one.wheel.blocks.start[1])
+    part, block_s = slice(found.start // width, -(-found.stop // width)), width * one.wheel.dt
+    each = (scores(one.wheel.blocks.mean, [p], block_s)[part].sum(axis=0) for p in pasts_of(one, block_s))
+    return all(score[1:-1].max() >= _EXPLAINS * score[-1] for score in each)
 
 
 def _beside_sound(wheel: str, judged: Mapping[str, Judged]) -> Judged:

@@ -58,7 +58,7 @@ def mirrored(
     dt : float
         Step [s].
     """
-    made = _turns(data, answers, geometry)
+    made = turns_made(data, answers, geometry)
     if geometry is None or len(made) < 2:
         return Mirrored(dict(answers), {})
     odd = [w for w, x in made.items() if not _alike(x, float(np.median([y for o, y in made.items() if o != w])))]
@@ -85,10 +85,13 @@ def mirrored(
     return Mirrored(out, doubts)
 
 
-def _turns(
+def turns_made(
     data: Mapping[str, FollowerData], answers: Mapping[str, Response], geometry: Geometry | None
 ) -> dict[str, float]:
-    """What each fixed wheel makes of a turn beside what it makes of a speed, by its place: 1 as the machine is built."""
+    """What each fixed wheel makes of a turn beside what it makes of a speed, by its place: 1 as the machine is built, below 0 the other way.
+
+    Parameters are those of `mirrored`.
+    """
     out: dict[str, float] = {}
     for w, answer in answers.items():
         place = None if geometry is None else geometry.wheels.get(w)

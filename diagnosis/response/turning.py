@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from diagnosis.response.identification import beyond
 from diagnosis.response.jumps import falls_dead
 from diagnosis.response.machine import Judged
+from diagnosis.response.mirrored import turns_made
 from diagnosis.response.spells import Spell
 from replay.faults import FaultMode
 from replay.machine.geometry import Geometry
@@ -34,6 +35,7 @@ _OPPOSITE = (
     0.5  # of the difference of two sides' deviations: a smaller sum is a turn, of one wheel's fault they are alike
 )
 _TOO = 0.5  # of the deviation beside the yaw rate that a wheel has beside its command: then both say that it is wrong
+_EITHER_WAY, _TOGETHER = 0.3, 0.5  # of a turn as the machine is built, and correlation: less tells no direction
 _LEAST_SPELL, _BETTER = 6, 0.5  # blocks; of the misfit of any wheel's gain, that a fault of the yaw rate leaves
 
 
@@ -194,6 +196,33 @@ def fitted(apart: Array, yaw: Array, sound: NDArray[np.bool_], part: float = 0.8
     if noise > _FITS * float(np.std(weights[0] * apart[sound])):
         return None
     return float(weights[0]), float(weights[1]), noise
+
+
+def turns_other_way(judged: Mapping[str, Judged], geometry: Geometry | None, turning: Turning | None) -> bool:
+    """Whether the sides go apart the other way than the machine file has it, by the commanded turns and the yaw rate as far as each is known.
+
+    Either of these alone may have the wrong sign: where they contradict each other nothing is said against the wheels.
+
+    Parameters
+    ----------
+    judged : Mapping[str, Judged]
+        All wheels.
+    geometry : Geometry or None
+        Says which wheels are on one side.
+    turning : Turning or None
+        How the body is turned.
+    """
+    answers = {w: j.response for w, j in judged.items() if j.response.answered}
+    made = list(turns_made({w: j.data for w, j in judged.items()}, answers, geometry).values())
+    told = float(np.median(made)) if made else 0.0
+    signs = np.sign(told) if abs(told) > _EITHER_WAY else 0.0
+    if turning is not None:
+        apart = difference(judged, turning)
+        known = np.isfinite(apart) & np.isfinite(turning.yaw)
+        moves = np.count_nonzero(known) > 1 and min(np.ptp(x[known]) for x in (apart, turning.yaw)) > 0.0
+        alike = float(np.corrcoef(apart[known], turning.yaw[known])[0, 1]) if moves else 0.0
+        signs += np.sign(alike) if abs(alike) > _TOGETHER else 0.0
+    return bool(signs < 0.0)
 
 
 def wrong_yaw_rate(spell: Spell, one: Judged) -> bool:

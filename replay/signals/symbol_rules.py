@@ -51,6 +51,8 @@ _PLAIN = (
     )
 )
 _ANGLES = frozenset(("deg", "grad"))  # units
+#: Forward speed by an odometry: ``odom_v``, ``odom_linear_x``, ``odometry_speed``.
+_ODOMETRY = re.compile(r"(?:^|_)odom(?:etry)?_(?:twist_)*(?:v|vx|speed|(?:vel|velocity|lin|linear)(?:_x)?)$")
 _TURN = frozenset(("dreh", "drehung", "turn", "turning", "rotation", "rot", "wende"))
 _OMEGA = frozenset(("w", "omega", "wz", "yaw", "yaw_rate", "angular", "turn"))  # that say so beside a word that asks
 _RATES = frozenset(("speed", "velocity", "vel", "rate", "z"))
@@ -267,5 +269,9 @@ def _by_word(channel: Channel, text: str, last: Sequence[str], unit: str, turns_
         and {*last} - {*tokens(unit)} <= _WHOLE
     ):
         signal = "cmd.v"
+    elif (
+        signal is None and not asks and _ODOMETRY.search("_".join(w for w in text.split("_") if w not in tokens(unit)))
+    ):
+        signal = "odom.v"
     if signal is not None:
         yield Candidate(signal, source_of(channel, unit), 9 if named else 10, f"{channel.name} by its name")

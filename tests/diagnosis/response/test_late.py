@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from diagnosis.response.answering import wheels_of
 from diagnosis.response.assess import Judgement, assess_response
+from diagnosis.response.late import late_of, left_open
 from diagnosis.results.assessment import Finding
 from diagnosis.results.detectability import Deviation
 from replay.faults import FaultMode, Side
@@ -89,3 +93,20 @@ def test_a_wheel_beside_one_with_a_noisy_sensor_is_not_called_late() -> None:
     part = slice(round(12 / DT), round(22 / DT))
     measured["L"][part] += rng.uniform(-0.05, 0.05, part.stop - part.start)
     assert {w for w, _ in findings(judged(measured, asked, np.column_stack([v, turn / TRACK])))} == {"L"}
+
+
+def test_a_delay_is_told_only_where_it_explains_the_other_view_as_well() -> None:
+    measured, asked, body = speeds(31)
+    measured["RL"] = late(measured["RL"], 0.8)
+    width = round(0.25 / DT)
+    hidden = {w: np.zeros(y.size, np.bool_) for w, y in measured.items()}
+    found = wheels_of(followers_of(measured, asked, body), hidden, geometry(tuple(measured)), (1, width), LIMITS, DT)
+    one = found["RL"]._replace(speed=found["FL"].wheel.blocks.mean)
+    told = late_of(one, width * DT)
+    assert len(told) == 1
+    assert left_open({"RL": told}, {"RL": one}) == {"RL": []}
+    start, stop = round(55 / DT), round(61 / DT)
+    wrong = np.array(one.speed)
+    wrong[start // width : stop // width] *= 3.0  # a neighbour that reads too much is no delay of this wheel
+    part = [replace(told[0], start=start, stop=stop)]
+    assert left_open({"RL": part}, {"RL": one._replace(speed=wrong)}) == {"RL": part}

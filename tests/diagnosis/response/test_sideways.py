@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from diagnosis.response.assess import Judgement, assess_response
 from diagnosis.response.inputs import FollowerData
-from diagnosis.response.sideways import goes_sideways
+from diagnosis.response.sideways import crossed, goes_sideways
 from replay.faults import FaultMode
 from replay.machine.config import Limits
 from tests.diagnosis.response.robot import DT, WHEELS, followers_of, geometry, speeds
@@ -60,3 +60,14 @@ def test_wheels_without_rollers_do_not_go_sideways_whatever_one_sensor_says(wron
     assert goes_sideways(turned, geometry(), DT)
     assert not goes_sideways(turned, None, DT)
     assert not goes_sideways({w: turned[w] for w in WHEELS[:2]}, geometry(), DT)
+
+
+def test_wheels_of_one_axle_that_are_exchanged_follow_the_turns_and_those_on_rollers_do_not() -> None:
+    measured, _, _ = speeds(6)
+    yaw = measured["FR"] - measured["FL"]
+    measured["FL"], measured["FR"] = measured["FR"], measured["FL"]
+    assert goes_sideways(measured, geometry(), DT)
+    assert crossed(measured, geometry(), yaw)
+    assert not crossed(measured, geometry(), None)
+    turned = rollers(6)
+    assert not crossed(turned, geometry(), turned["FR"] + turned["RR"] - turned["FL"] - turned["RL"])

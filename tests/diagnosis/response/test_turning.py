@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from diagnosis.response.assess import assess_response
 from diagnosis.response.kernel import follow
-from diagnosis.results.assessment import Finding
-from replay.faults import FaultMode
+from diagnosis.results.assessment import CODE, Finding
+from replay.faults import FaultMode, State
 from replay.machine.config import Limits
 from tests.diagnosis.response.robot import DT, TRACK, WHEELS, commands, followers_of, geometry, speeds
 
@@ -101,3 +101,24 @@ def test_a_wheel_that_is_dead_is_told_where_turns_are_not(seed: int) -> None:
     measured = straight(seed, PAIR)
     measured["R"][SPELL] = 0.0
     assert {(w, f.mode) for w, f in told_without_turns(measured, seed, PAIR)} == {("R", FaultMode.NO_SIGNAL)}
+
+
+def healthy_anywhere(measured: dict[str, Array], yaw: Array, seed: int) -> list[bool]:
+    """Whether anything healthy is said of each sensor."""
+    _, asked, body = speeds(seed, PAIR)
+    parts = assess_response(followers_of(measured, asked, body), geometry(PAIR), yaw, Limits(), DT).parts.values()
+    return [bool((sensor.states == CODE[State.HEALTHY]).any()) for sensor, _ in parts]
+
+
+@pytest.mark.parametrize("seed", [3, 8])
+def test_nothing_healthy_is_said_of_sides_that_are_exchanged(seed: int) -> None:
+    measured, _, _ = speeds(seed, PAIR)
+    yaw = yaw_of(measured, seed)
+    left, right = PAIR
+    assert healthy_anywhere({left: measured[right], right: measured[left]}, yaw, seed) == [False, False]
+
+
+@pytest.mark.parametrize("seed", [3, 8])
+def test_a_gyro_with_the_other_sign_says_nothing_against_wheels_that_do_as_they_are_told(seed: int) -> None:
+    measured, _, _ = speeds(seed, PAIR)
+    assert healthy_anywhere(measured, -yaw_of(measured, seed), seed) == [True, True]

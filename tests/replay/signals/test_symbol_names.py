@@ -299,3 +299,20 @@ def test_words() -> None:
     assert english(tokens("Stellgröße_HR")) == ["valve", "cmd", "hr"]
     assert english(tokens("cmd_omega_rad_s")) == ["cmd", "omega", "rad", "s"]
     assert [role(english(tokens(n))) for n in ("n_soll", "n_ist", "soll_ist", "n")] == ["ref", "act", "both", ""]
+
+
+@pytest.mark.parametrize(
+    ("name", "signals"),
+    [
+        ("odom_v [m/s]", ["odom.v"]),
+        ("odom_linear_x", ["odom.v"]),
+        ("odometry_speed [km/h]", ["odom.v"]),
+        ("odom.twist.twist.linear.x", ["odom.v"]),
+        ("odom_angular_v", []),
+        ("odom_linear_y", []),
+        ("odom_speed_cmd", []),
+    ],
+)
+def test_a_tables_odometry_is_the_measured_speed_of_the_machine(name: str, signals: list[str]) -> None:
+    found = [c.signal for c in candidates({name: column(name)}, haulotte())]
+    assert [s for s in found if s.startswith("odom")] == signals
