@@ -28,7 +28,6 @@ class Replay {
       // without probabilities over time: those of its faults, as they are stated
       part.faults = part.modes.length ? [] : Data.view.faults.filter((f) => Replay.of(f, part));
       if (part.faults.length) part.modes = [...new Set(part.faults.map((f) => f.mode))].map((m) => ({ m }));
-      if (!part.modes.length) return [];
       const row = document.createElement("div"), name = document.createElement("span"), bar = document.createElement("span");
       name.textContent = part.words;
       bar.className = "stack";
@@ -97,13 +96,24 @@ class Replay {
     return list;
   }
 
+  // Stretches of the mission in which a residual is beyond its threshold, each from the sample on where every sample is stored.
+  static async passing(residual, threshold) {
+    const { t0, duration } = Data.view, read = (from, to) => Promise.all([Data.samples(residual, from, to, true), Data.samples(threshold, from, to)]);
+    const found = ([d, e]) => Replay.stretches(d, (i) => Math.abs(d.y[i]) > e.y[Math.min(e.y.length - 1, Math.max(0, Math.round((d.t + i * d.dt - e.t) / e.dt)))]);
+    const whole = await read(t0, duration), list = found(whole).slice(0, Replay.MOST), block = whole[0].dt;
+    if (whole[0].stride > 1) for (const s of list) {
+      const near = await read(Math.max(t0, s.start - block), s.start + 2 * block);
+      if (near.every((d) => d.stride === 1)) s.start = found(near)[0]?.start ?? s.start;
+    }
+    return list;
+  }
+
   async crossings(part) {
     const { t0, duration, limit } = Data.view, words = Data.view.words[part.side] ?? {}, out = [], mine = Data.view.faults.filter((f) => Replay.of(f, part)), near = (s) => mine.some((f) => f.start - Replay.BESIDE < s.stop && s.start < f.stop + Replay.BESIDE), get = (leaf) => this.names.get(part.base + leaf), clock = (t) => `${t.toFixed(3)} s`;
     const value = async (leaf, t) => { const c = get(leaf); if (c === undefined) return null; const { k, unit } = Data.view.channels[c], [a, b] = await Data.at(c, t); return { v: k * (a + b) / 2, text: `${Now.number(+(k * (a + b) / 2).toPrecision(3))}${unit === "1" ? "" : unit === "°" ? unit : ` ${unit}`}` }; };
     const p = get("probability"), r = get("residual"), h = get("threshold");
     if (r !== undefined && h !== undefined) {
-      const [d, e] = await Promise.all([Data.samples(r, t0, duration, true), Data.samples(h, t0, duration)]), other = (i) => e.y[Math.min(e.y.length - 1, Math.max(0, Math.round((d.t + i * d.dt - e.t) / e.dt)))];
-      for (const s of Replay.stretches(d, (i) => Math.abs(d.y[i]) > other(i)).slice(0, Replay.MOST)) {
+      for (const s of await Replay.passing(r, h)) {
         const [now, top, expected] = await Promise.all(["residual", "threshold", "expected"].map((leaf) => value(leaf, s.start)));
         out.push({ t: s.start, near: near(s), words: `${clock(s.start)} · ${part.words}: the residual, ${now.text}, passes its threshold of ${top.text}${expected && Number.isFinite(expected.v) ? `; ${expected.text} was expected` : ""}.` });
       }
@@ -139,7 +149,11 @@ class Replay {
     const why = last?.words ?? "Nothing has passed a threshold up to here.";
     if (one("#why").textContent !== why) one("#why").textContent = why;
     for (const part of this.parts) {
-      if (!part.bar) continue;
+      if (!part.modes.length) {
+        part.says.textContent = Pictures.lane(part.c, part.side, t).replaceAll("_", " ");
+        part.bar.setAttribute("aria-label", `${part.words}: ${part.says.textContent}`);
+        continue;
+      }
       if (part.faults.length) {
         const f = part.faults.find((x) => x.start <= t && t < x.stop);
         part.modes.forEach(({ m }, i) => { part.bar.children[i].style.width = `${f?.mode === m ? 100 * f.p : 0}%`; });
