@@ -96,32 +96,35 @@ class Replay {
     return list;
   }
 
-  // Stretches of the mission in which a residual is beyond its threshold, each from the sample on where every sample is stored.
-  static async passing(residual, threshold) {
-    const { t0, duration } = Data.view, read = (from, to) => Promise.all([Data.samples(residual, from, to, true), Data.samples(threshold, from, to)]);
-    const found = ([d, e]) => Replay.stretches(d, (i) => Math.abs(d.y[i]) > e.y[Math.min(e.y.length - 1, Math.max(0, Math.round((d.t + i * d.dt - e.t) / e.dt)))]);
-    const whole = await read(t0, duration), list = found(whole).slice(0, Replay.MOST), block = whole[0].dt;
-    if (whole[0].stride > 1) for (const s of list) {
-      const near = await read(Math.max(t0, s.start - block), s.start + 2 * block);
-      if (near.every((d) => d.stride === 1)) s.start = found(near)[0]?.start ?? s.start;
+  // Stretches of the mission in which a channel's size is beyond a limit, or another channel: by every sample where these are stored,
+  // else by blocks that are beyond it in whole.
+  static async passing(c, limit, other) {
+    const { dt } = Data.view, list = [];
+    for (const { from, to, every } of Data.parts(c)) {
+      const inside = every ? [from + 2 * dt, to - 2 * dt] : [from, to], [d, e] = await Promise.all([Data.samples(c, ...inside, -1), other === undefined ? null : Data.samples(other, ...inside)]);
+      const least = (i) => (e ? e.y[Math.min(e.y.length - 1, Math.max(0, Math.round((d.t + i * d.dt - e.t) / e.dt)))] : limit);
+      for (const s of Replay.stretches(d, (i) => Math.abs(d.y[i]) > least(i))) {
+        const last = list.at(-1);
+        if (last && s.start - last.stop < Replay.APART) last.stop = s.stop;
+        else if (list.length < Replay.MOST) list.push({ ...s, dt: d.dt });
+      }
     }
     return list;
   }
 
   async crossings(part) {
-    const { t0, duration, limit } = Data.view, words = Data.view.words[part.side] ?? {}, out = [], mine = Data.view.faults.filter((f) => Replay.of(f, part)), near = (s) => mine.some((f) => f.start - Replay.BESIDE < s.stop && s.start < f.stop + Replay.BESIDE), get = (leaf) => this.names.get(part.base + leaf), clock = (t) => `${t.toFixed(3)} s`;
+    const { limit } = Data.view, words = Data.view.words[part.side] ?? {}, out = [], mine = Data.view.faults.filter((f) => Replay.of(f, part)), near = (s) => mine.some((f) => f.start - Replay.BESIDE < s.stop && s.start < f.stop + Replay.BESIDE), get = (leaf) => this.names.get(part.base + leaf), clock = (t) => `${t.toFixed(3)} s`;
     const value = async (leaf, t) => { const c = get(leaf); if (c === undefined) return null; const { k, unit } = Data.view.channels[c], [a, b] = await Data.at(c, t); return { v: k * (a + b) / 2, text: `${Now.number(+(k * (a + b) / 2).toPrecision(3))}${unit === "1" ? "" : unit === "°" ? unit : ` ${unit}`}` }; };
     const p = get("probability"), r = get("residual"), h = get("threshold");
     if (r !== undefined && h !== undefined) {
-      for (const s of await Replay.passing(r, h)) {
+      for (const s of await Replay.passing(r, 0, h)) {
         const [now, top, expected] = await Promise.all(["residual", "threshold", "expected"].map((leaf) => value(leaf, s.start)));
         out.push({ t: s.start, near: near(s), words: `${clock(s.start)} · ${part.words}: the residual, ${now.text}, passes its threshold of ${top.text}${expected && Number.isFinite(expected.v) ? `; ${expected.text} was expected` : ""}.` });
       }
     }
     if (p !== undefined && limit) {
-      const d = await Data.samples(p, t0, duration, true);
-      for (const s of Replay.stretches(d, (i) => d.y[i] >= limit).slice(0, Replay.MOST)) {
-        const t = Math.min(s.start + d.dt, s.stop), shares = (await Promise.all(part.modes.map(async ({ m }) => ({ m, p: (await value(`p_${m}`, t))?.v })))).filter((x) => x.m !== "healthy" && Number.isFinite(x.p)).sort((a, b) => b.p - a.p), [now, top] = [await value("residual", t), await value("threshold", t)];
+      for (const s of await Replay.passing(p, limit)) {
+        const t = Math.min(s.start + s.dt, s.stop), shares = (await Promise.all(part.modes.map(async ({ m }) => ({ m, p: (await value(`p_${m}`, t))?.v })))).filter((x) => x.m !== "healthy" && Number.isFinite(x.p)).sort((a, b) => b.p - a.p), [now, top] = [await value("residual", t), await value("threshold", t)];
         const ratio = now && top && top.v > 0 && Math.abs(now.v) > top.v ? `; the residual is ${Now.number(+(Math.abs(now.v) / top.v).toPrecision(2))} times its threshold` : "";
         const whole = mine.find((f) => f.start <= t && t < f.stop), first = shares.length ? words[shares[0].m] : "";
         const then = first && whole && whole.words !== first ? ` at first; the whole of it is ${whole.words}` : "", little = near(s) ? "" : "; no fault is stated here";

@@ -74,7 +74,7 @@ const WhatIf = {
     const evidence = `evidence.${c}.${sensor ? "sensor" : "actuator"}.`, [second, expected, residual, threshold, speed, applied] = await Promise.all([`${kind}.${c}.${kind === "steer" ? "phi" : "v"}_true`, `${evidence}expected`, `${evidence}residual`, `${evidence}threshold`, kind === "wheel" ? `wheel.${c}.v` : "", `${kind}.${c}.u_applied`].map(on));
     const accurate = sensor ? second ?? expected : base.y, channel = Data.view.channels[own], r = names.get(`${evidence}residual`);
     if (!accurate) return null;
-    const limit = names.get(`${evidence}threshold`), passes = r === undefined || limit === undefined ? null : (await Replay.passing(r, limit)).find((s) => s.stop > f.start && s.start < f.stop);
+    const limit = names.get(`${evidence}threshold`), passes = r === undefined || limit === undefined ? null : (await Replay.passing(r, 0, limit)).find((s) => s.stop > f.start && s.start < f.stop);
     const sick = Data.view.faults.filter((g) => g.component === c), counts = Float64Array.from({ length: n }, (_, i) => { const t = base.t + i * base.dt; return speed && Number.isFinite(speed[i]) && Number.isFinite(base.y[i]) && !sick.some((g) => t >= g.start - 0.5 && t < g.stop + 0.5) ? 1 : 0; });
     return { f, own, sensor, n, t: base.t, dt: base.dt, stride: base.stride, log: sensor ? base.y : applied ?? base.y, accurate, residual, threshold, speed, channel, same: r !== undefined && Data.view.channels[r].unit === channel.unit, rk: r === undefined ? 1 : Data.view.channels[r].k, runit: r === undefined ? "" : Data.view.channels[r].unit, r, passes, plant: sensor || !speed ? null : WhatIf.fit(base.y, speed, counts, base.dt), second: Boolean(second), v: names.get(`wheel.${c}.v`) };
   },
