@@ -73,7 +73,7 @@ def sure_of(fault: IntervalRow, report: ReportDocument) -> str:
 def _judged_words(share: float, moving: str) -> str:
     """How much of a part's driving was judged: where that is little, the fault may be only what was seen of it."""
     if share < _NOTHING:
-        return f"the rest of its {moving} could not be judged, so that it may be faulty for longer"
+        return f"the rest of its {moving} was not judged, so that it may be faulty for longer"
     if share < _MOSTLY:
         return f"only {_share(share)} of its {moving} was judged, so that it may be faulty for longer"
     return f"{_share(share)} of its {moving} was judged"

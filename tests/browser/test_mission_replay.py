@@ -82,4 +82,6 @@ def test_plots_follow_the_clock_to_where_it_is_led(open_page: OPEN) -> None:
     page.keyboard.press("m")
     page.keyboard.press("j")  # what is chosen takes the clock along
     page.wait_for_url(re.compile(r"#fault=F2&"))
-    page.wait_for_function("() => { const [a, b] = document.getElementById('figure').layout.xaxis.range; return Now.t >= a && Now.t <= b; }")
+    page.wait_for_function(
+        "() => { const [a, b] = document.getElementById('figure').layout.xaxis.range; return Now.t >= a && Now.t <= b; }"
+    )

@@ -68,7 +68,9 @@ def test_sliders_change_residual_and_evidence(open_page: OPEN) -> None:
     page = open_page("five_faults", "#fault=F1&t=27,39")
     page.keyboard.press("w")
     words = page.locator("#whatif-words")
-    expect(words).to_contain_text(re.compile(r"What if: residual [\d.]+ times its threshold, beyond it from [\d.]+ s on, "))
+    expect(words).to_contain_text(
+        re.compile(r"What if: residual [\d.]+ times its threshold, beyond it from [\d.]+ s on, ")
+    )
     page.locator("#whatif-figure .main-svg").first.wait_for()
     times = re.compile(r"What if: residual ([\d.]+) times its threshold.* Log: ([\d.]+) times")
     found = times.search(words.inner_text())
