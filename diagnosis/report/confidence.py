@@ -96,7 +96,7 @@ def judged(report: ReportDocument) -> str:
     if not sides:
         return ""
     out = [f"{len(sides) - len(short)} of {len(sides)} parts judged, {len(_cleared(report)) or 'none'} cleared"]
-    for how, some in (("in part", True), ("not", False)):
+    for how, some in (("not judged long enough:", True), ("not judged:", False)):
         told = [
             words.listed(kind, mine)
             for kind in (Kind.WHEEL, Kind.STEER)
