@@ -137,7 +137,7 @@ def _coverage(report: Mapping[str, Any]) -> Iterator[str]:
 def _open(report: Mapping[str, Any]) -> Iterator[str]:
     """The part of which the verdict says that most of its driving is open, against the table of coverage and the states."""
     for text in report["verdict"]["caveats"]:
-        found = re.match(r"(\S+) .+: ([\d.]+) s of its [\d.]+ s of .* could not be judged(?: \((.*)\))?; this", text)
+        found = re.match(r"(\S+) .+: ([\d.]+) s of its [\d.]+ s of .* were not judged(?: \((.*)\))?; this", text)
         if not found:
             continue
         component, seconds, reason = found.group(1), float(found.group(2)), found.group(3)

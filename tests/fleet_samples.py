@@ -102,7 +102,7 @@ def _write(c: Any, k: int, s: Sample) -> None:
             e = f.epsilon or (None, None, None)
             kind = "steer" if f.component in AXLES else "wheel"
             row = (k, f"F{n}", f.component, kind, f.side, f.mode, f.severity, 5.0, 5.0 + f.seconds, (start or 0) + n)
-            c.execute("INSERT INTO fault VALUES (?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?)", (*row, *e, None, None, 0.98))
+            c.execute("INSERT INTO fault VALUES (?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?)", (*row, *e, None, None, 0.98, 0))
         for part in s.parts if judged else ():
             decided = 0.0 if part in s.blind else s.driving_s * 0.95
             e = s.epsilon.get(part, (None, None, None))

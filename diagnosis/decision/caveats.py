@@ -106,9 +106,13 @@ def by_model(assessments: Mapping[Part, Assessment], shown: Sequence[Detectable]
         ]
         said += [f"of a {name} {_from_size([r.size for r in rows])}"] if rows else []
         sizes_known |= any(r.size for r in rows)
-    sizes = f"A loss of theirs that lasts ten seconds shows in 95 of 100 places: {join_words(said)}. " if said else ""
+    sizes = (
+        f"A loss in one of them that lasts ten seconds shows in 95 of 100 places where it may begin: {join_words(said)}. "
+        if said
+        else ""
+    )
     if said and not sizes_known:
-        sizes = "A loss of theirs that lasts only ten seconds need not show, however large. "
+        sizes = "A loss in one of them that lasts only ten seconds need not show, however large. "
     return (
         words.fill(
             "Sensors and {valve}s without a second measurement were judged by a {wheel} model identified from this mission. "
@@ -245,7 +249,7 @@ def _most_open(
         return []
     reason = main_reason(assessments[most], against.open_state.get(most) or main_state(assessments[most]))
     return [
-        f"{against.words.part_words(Kind.WHEEL, *most)}: {open_s[most]:.1f} s of its {driven[most]:.1f} s of {against.words.moving} could not be judged"
+        f"{against.words.part_words(Kind.WHEEL, *most)}: {open_s[most]:.1f} s of its {driven[most]:.1f} s of {against.words.moving} were not judged"
         + (f" ({reason})" if reason else "")
         + f"; this is the most of all parts{' judged long enough' if against.short else ''}."
         " The timeline shows when."

@@ -272,7 +272,8 @@ def _without_faults(
         return Decision(Verdict.NOT_ASSESSED, _SENSORS_ALONE, seen)
     if against.short:
         who = against.words.listed(Kind.WHEEL, against.short)
-        text = f"No fault was found, but {who} could not be judged long enough to be called healthy."
+        was = "was" if len(against.short) == 1 else "were"
+        text = f"No fault was found, but {who} {was} not judged long enough to be called healthy."
         return Decision(Verdict.NOT_ASSESSED, "Not judged long enough", text)
     if against.unexplained:
         named = sorted({c for c, _ in against.unexplained})

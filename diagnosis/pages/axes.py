@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from diagnosis.pages.labels import number
 
 _LEFT, _BOTTOM = 46.0, 21.0
+_LETTER = 6.0  # mean width of a tick's letters
 
 
 @dataclass(frozen=True)
@@ -60,7 +61,8 @@ class Frame:
         parts.append('"/>')
         for k, (p, v) in enumerate(zip(down, xs, strict=True)):
             words = number(v, 6) + (f" {unit}" if k == len(xs) - 1 else "")
-            parts.append(label(p, self.bottom + 14, words, "mid"))
+            cut = p + _LETTER * len(words) / 2 > self.width
+            parts.append(label(self.width if cut else p, self.bottom + 14, words, "fin" if cut else "mid"))
         parts += [label(self.left - 5, p + 3.5, number(v, 6), "fin") for p, v in zip(across, ys, strict=True)]
         return Markup("".join(parts))
 

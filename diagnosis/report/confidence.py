@@ -73,7 +73,7 @@ def sure_of(fault: IntervalRow, report: ReportDocument) -> str:
 def _judged_words(share: float, moving: str) -> str:
     """How much of a part's driving was judged: where that is little, the fault may be only what was seen of it."""
     if share < _NOTHING:
-        return f"the rest of its {moving} could not be judged, so that it may be faulty for longer"
+        return f"the rest of its {moving} was not judged, so that it may be faulty for longer"
     if share < _MOSTLY:
         return f"only {_share(share)} of its {moving} was judged, so that it may be faulty for longer"
     return f"{_share(share)} of its {moving} was judged"
@@ -96,7 +96,7 @@ def judged(report: ReportDocument) -> str:
     if not sides:
         return ""
     out = [f"{len(sides) - len(short)} of {len(sides)} parts judged, {len(_cleared(report)) or 'none'} cleared"]
-    for how, some in (("in part", True), ("not", False)):
+    for how, some in (("not judged long enough:", True), ("not judged:", False)):
         told = [
             words.listed(kind, mine)
             for kind in (Kind.WHEEL, Kind.STEER)

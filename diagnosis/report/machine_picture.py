@@ -117,7 +117,7 @@ def _hit(name: str, c: Condition, shapes: Markup) -> Markup:
             name, c.title, c.title, shapes
         )
     return Markup(
-        '<g class="hit" data-c="{}" data-f="{}" data-scroll role="button" tabindex="0" aria-label="{}"><title>{}</title>{}</g>'
+        '<g class="hit" data-c="{}" data-f="{}" role="button" tabindex="0" aria-label="{}"><title>{}</title>{}</g>'
     ).format(name, c.fault, c.title, c.title, shapes)
 
 

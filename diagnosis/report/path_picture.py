@@ -78,7 +78,7 @@ def path_picture(
     for fault, (cx, cy) in marks:
         parts.append(
             Markup(
-                '<g class="mark {m}" data-f="{id}" data-scroll role="button" tabindex="0" aria-label="{id} on the path"'
+                '<g class="mark {m}" data-f="{id}" role="button" tabindex="0" aria-label="{id} on the path"'
                 ' transform="translate({x:.1f},{y:.1f})"><circle class="area" r="20"/><circle class="ring" r="12"/><text y="3.6">{id}</text>{b}</g>'
             ).format(m=fault["mode"], id=fault["id"], x=cx, y=cy, b=badge(fault["mode"], 10, -9, 11))
         )

@@ -193,6 +193,7 @@ def _side_rows(
             band=(base + "epsilon_low", base + "epsilon_high"),
             clip=(_lowest(columns.get(base + "epsilon")), 2.0),
             unknown=unknown_stretches(base + "epsilon", columns),
+            steps=True,
         ),
         Row(
             f"sat{of}",
@@ -201,6 +202,7 @@ def _side_rows(
             (Trace(base + "sat", "mean of the fault as stated, 95 % band", "measured", sat_scale),),
             band=(base + "sat_low", base + "sat_high"),
             band_scale=sat_scale,
+            steps=True,
         ),
         *_mode_row(fault, side, base, of, columns, words),
     ]
@@ -237,6 +239,7 @@ def _mode_row(fault: IntervalRow, side: Side, base: str, of: str, columns: Colum
                 for m in DECIDED
             ),
             limits=(-0.03, 1.03),
+            steps=bool(whole),
         )
     ]
 

@@ -76,6 +76,8 @@ class Row:
         Stretches in which what the row shows cannot be known: first and last time [s].
     small : tuple[tuple[float, float], ...]
         Stretches in which the part deviates by less than counts as a fault and was called healthy [s].
+    steps : bool
+        Whether what it shows holds until it changes: drawn as steps.
     """
 
     key: str
@@ -92,6 +94,7 @@ class Row:
     component: str = ""
     unknown: tuple[tuple[float, float], ...] = ()
     small: tuple[tuple[float, float], ...] = ()
+    steps: bool = False
 
     def shown(self, columns: Columns) -> list[Row]:
         """The row with the curves that exist, or nothing; a band or threshold without its column is left out.
@@ -175,6 +178,8 @@ def row_json(row: Row, index: Mapping[str, int]) -> dict[str, object]:
         data["unknown"] = [list(stretch) for stretch in row.unknown]
     if row.small:
         data["small"] = [list(stretch) for stretch in row.small]
+    if row.steps:
+        data["steps"] = True
     if row.component:
         data["component"] = row.component
     if row.right:

@@ -83,9 +83,29 @@ def test_a_spike_does_not_flatten_a_robust_scale(open_page: OPEN) -> None:
     page.locator("#signals-figure").focus()
     page.keyboard.press("z")
     until(page, f"{height} < {0.6 * robust}")
-    page.keyboard.press("Z")
-    page.keyboard.press("y")
+    page.keyboard.press("y")  # off: all values again, whatever was made taller
     expect(page.locator("#signals-figure")).not_to_contain_text("scale cut")
+    assert page.evaluate(height) == pytest.approx(before)
+
+
+def test_shift_and_scroll_make_values_taller_about_the_pointer_in_its_panel_alone(open_page: OPEN) -> None:
+    page = drawn(open_page("five_faults", "#fault=F1&t=27,39"))
+    axis = "document.getElementById('figure')._fullLayout.yaxis"
+    page.locator("#figure").scroll_into_view_if_needed()
+    box = page.locator("#figure").bounding_box()
+    assert box is not None
+    top, tall = (page.evaluate(f"{axis}2.{name}") for name in ("_offset", "_length"))
+    low, high = page.evaluate(f"{axis}2.range")
+    others = page.evaluate(f"[{axis}.range, {axis}3.range]")
+    page.mouse.move(box["x"] + 300, box["y"] + top + 0.25 * tall)
+    page.keyboard.down("Shift")
+    page.mouse.wheel(0, -100)
+    page.keyboard.up("Shift")
+    still = high - 0.25 * (high - low)
+    until(page, f"({axis}2.range[1] - {axis}2.range[0]) < {0.6 * (high - low)}")
+    below, above = page.evaluate(f"{axis}2.range")
+    assert above - 0.25 * (above - below) == pytest.approx(still, abs=0.02 * (high - low))
+    assert page.evaluate(f"[{axis}.range, {axis}3.range]") == others
 
 
 def test_residual_over_threshold_and_one_panel_for_all_wheels(open_page: OPEN) -> None:

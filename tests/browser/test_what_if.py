@@ -68,11 +68,19 @@ def test_sliders_change_residual_and_evidence(open_page: OPEN) -> None:
     page = open_page("five_faults", "#fault=F1&t=27,39")
     page.keyboard.press("w")
     words = page.locator("#whatif-words")
-    expect(words).to_contain_text(re.compile(r"What if: residual [\d.]+ times its threshold, first beyond it "))
+    expect(words).to_contain_text(
+        re.compile(r"What if: residual [\d.]+ times its threshold, beyond it from [\d.]+ s on, ")
+    )
     page.locator("#whatif-figure .main-svg").first.wait_for()
     times = re.compile(r"What if: residual ([\d.]+) times its threshold.* Log: ([\d.]+) times")
     found = times.search(words.inner_text())
     assert found
+    # the log's residual passes its threshold at one time, whoever says so
+    page.get_by_role("button", name="Play").click()
+    at = re.search(r"Log: .* beyond it from ([\d.]+) s on", words.inner_text())
+    assert at
+    expect(page.locator("#events")).to_contain_text(f"{at[1]} s · FR speed sensor: the residual, ")
+    page.get_by_role("button", name="Pause").click()
     assert float(found[1]) == pytest.approx(float(found[2]), rel=0.15)  # as it was diagnosed, it is as it was recorded
     page.locator("#whatif-mode").select_option("inefficient")
     page.locator("#whatif-epsilon").fill("0.2")

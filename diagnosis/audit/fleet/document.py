@@ -243,4 +243,5 @@ def _fault(k: int, f: FleetFault, at: Mapping[str, int], first_run: int | None) 
         "needed": f.needed,
         "clean": f.clean,
         "repaired_ns": f.repaired_ns,
+        "unclear": f.unclear,
     }

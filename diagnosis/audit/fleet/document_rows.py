@@ -121,6 +121,7 @@ def _fault(f: FoundFault) -> MissionFaultRow:
         "seconds": six_digits(f.seconds),
         "epsilon": bounds_row(f.epsilon),
         "probability": six_digits(f.probability),
+        "unclear": f.unclear,
     }
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Literal, TypedDict
+from typing import Literal, NotRequired, TypedDict
 
 from diagnosis.results.vocabulary import Severity
 
@@ -51,6 +51,8 @@ class FleetFaultRow(TypedDict):
         Missions without it after which it is past, and those so far.
     repaired_ns : int or None
         When the part was repaired last, as far as that was recorded.
+    unclear : bool
+        Whether the report of the last one says that its kind is unclear: `mode` is then the likeliest of several. Absent before.
     """
 
     machine: int
@@ -72,6 +74,7 @@ class FleetFaultRow(TypedDict):
     needed: int
     clean: int
     repaired_ns: int | None
+    unclear: NotRequired[bool]
 
 
 class MissionFaultRow(TypedDict):
@@ -86,6 +89,7 @@ class MissionFaultRow(TypedDict):
     seconds: float
     epsilon: BoundsRow | None
     probability: float
+    unclear: NotRequired[bool]
 
 
 class FaultStandingRow(TypedDict):

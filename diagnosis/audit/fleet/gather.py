@@ -199,6 +199,7 @@ def _fleet_fault(m: Machine, found: Sequence[tuple[Run, FoundFault]], own: _Know
         last_id=worst.id,
         since=since,
         epsilon=worst.epsilon,
+        unclear=worst.unclear,
         needed=needed,
         clean=clean,
         repaired_ns=repaired_at(own.repairs, f.component, f.side),

@@ -135,6 +135,7 @@ def _why(
     faults = sorted(standing, key=lambda f: -Severity(f["severity"]).rank)
     named = "; ".join(
         fault_words(f, words_of(m))
+        + (f" in {missions[f['last']]['name']}" if len({g["last"] for g in faults[:_FAULTS]}) > 1 else "")
         + (", rising" if (f["component"], f["side"]) in rising else "")
         + (", no repair recorded" + open_words(f["open"], f["clean"], f["needed"]) if f["open"] and f["since"] else "")
         for f in faults[:_FAULTS]
@@ -153,7 +154,7 @@ def _why(
         return last, "no fault in its last mission" + (f"; seen before: {named}" if faults else "")
     for place in (*sorted(m["failed"], key=lambda k: missions[k]["gone"]), *reversed(m["undated"])):
         if m["unjudged"] and missions[place]["verdict"] in (None, Verdict.NOT_ASSESSED):
-            more = f" ({count(m['unjudged'], 'mission')} not judged)" if m["unjudged"] > 1 else ""
+            more = f"; {count(m['unjudged'] - 1, 'other mission')} of it not judged either" if m["unjudged"] > 1 else ""
             lost = _lost(missions[place]) if place in m["failed"] and missions[place]["gone"] else ""
             return place, f"{named + '; ' if named else ''}{_said(missions[place])}{lost}{more}"
     if last is not None and m["verdict"] == missions[last]["verdict"] == Verdict.NOT_ASSESSED:

@@ -63,6 +63,8 @@ class FleetFault:
         Such missions so far; of an open fault those that would have shown it.
     repaired_ns : int or None
         When the part was repaired last, as far as that was recorded.
+    unclear : bool
+        Whether the report of the last one says that its kind is unclear.
     """
 
     component: str
@@ -81,6 +83,7 @@ class FleetFault:
     needed: int = STANDING
     clean: int = 0
     repaired_ns: int | None = None
+    unclear: bool = False
 
     @property
     def standing(self) -> bool:

@@ -50,6 +50,7 @@ class FoundFault:
     seconds: float
     epsilon: Bounds | None
     probability: float
+    unclear: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,7 +109,7 @@ _COLUMNS = (
 _RESULTS = f"SELECT {', '.join(_COLUMNS)} FROM result WHERE id IN (SELECT result FROM mission) ORDER BY id"
 _FAULTS = (
     "SELECT result, id, component, kind, side, mode, severity, stop_s - start_s, epsilon, epsilon_low, epsilon_high, "
-    "probability FROM fault ORDER BY result, start_ns, length(id), id"
+    "probability, {} FROM fault ORDER BY result, start_ns, length(id), id"
 )
 _STATES = {state.value: state for state in MissionState}
 _VERDICTS: dict[str | None, Verdict | None] = {None: None, **{verdict.value: verdict for verdict in Verdict}}
@@ -136,10 +137,19 @@ def read_missions(store: Path) -> list[Mission]:
     """
     with closing(_opened(store)) as db, db.snapshot(), db.decoding():
         faults: dict[int, list[FoundFault]] = defaultdict(list)
-        for row in db.rows(_FAULTS):
-            r, name, component, kind, side, mode, severity, seconds, e, low, high, p = _plausible(row)
+        for row in db.rows(_FAULTS.format("unclear" if db.has_column("fault", "unclear") else "0")):
+            r, name, component, kind, side, mode, severity, seconds, e, low, high, p, unclear = _plausible(row)
             found = FoundFault(
-                name, component, kind, Side(side), mode, Severity(severity), seconds, _bounds(e, low, high), p
+                name,
+                component,
+                kind,
+                Side(side),
+                mode,
+                Severity(severity),
+                seconds,
+                _bounds(e, low, high),
+                p,
+                bool(unclear),
             )
             faults[r].append(found)
         parts = read_parts(db)

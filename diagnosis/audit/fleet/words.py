@@ -12,6 +12,7 @@ from diagnosis.audit.fleet.trends import PartTrend
 from diagnosis.audit.trends.trend import Forecast
 from diagnosis.decision.wording import join_words
 from diagnosis.pages.labels import utc, utc_moment
+from diagnosis.results.candidates import UNCLEAR
 from diagnosis.results.fault_rows import mode_words
 from diagnosis.results.left_out import only_left_out
 from diagnosis.results.machine_words import MachineWords
@@ -37,7 +38,7 @@ def round_to(value: float, digits: int = 2) -> str:
 
 def fault_words(f: FleetFault, words: MachineWords) -> str:
     """Part and row: ``RL drive valve inefficient``."""
-    return f"{words.part_words(f.kind, f.component, f.side)} {mode_words(f.side, f.mode)}"
+    return f"{words.part_words(f.kind, f.component, f.side)} {UNCLEAR if f.unclear else mode_words(f.side, f.mode)}"
 
 
 def found_in(missions: int, assessed: int) -> str:

@@ -22,6 +22,7 @@ _WHAT = "SELECT application_id FROM pragma_application_id UNION ALL SELECT name 
 _TABLES = {"meta", "file", "mission", "result", "attempt", "fault", "component"}
 #: Tables that stores of the same schema may lack, because they were made by an earlier version.
 _LATER = ("repair",)
+_LATER_COLUMNS = (("fault", "unclear", "INTEGER NOT NULL DEFAULT 0"),)
 _FULL = ("database or disk is full", "disk I/O error", "unable to open database file")
 
 
@@ -81,15 +82,22 @@ class Database:
             )
 
     def _add_later(self, connection: sqlite3.Connection) -> None:
-        """Add the tables that an earlier version did not know."""
+        """Add the tables and columns that an earlier version did not know."""
         known = {row[0] for row in connection.execute("SELECT name FROM sqlite_schema WHERE type = 'table'")}
         for name in _LATER:
             if name not in known:
                 connection.execute(next(s for s in _schema() if f"CREATE TABLE {name} (" in s))
+        for table, column, kind in _LATER_COLUMNS:
+            if column not in {row[1] for row in connection.execute(f"PRAGMA table_info({table})")}:
+                connection.execute(f"ALTER TABLE {table} ADD COLUMN {column} {kind}")
 
     def has_table(self, name: str) -> bool:
         """Whether the store has a table; one that is only read may be of an earlier version."""
         return bool(self.rows("SELECT 1 FROM sqlite_schema WHERE type = 'table' AND name = ?", (name,)))
+
+    def has_column(self, table: str, column: str) -> bool:
+        """Whether a table has a column; a store that is only read may be of an earlier version."""
+        return any(row[1] == column for row in self.rows(f"PRAGMA table_info({table})"))
 
     def _create(self, connection: sqlite3.Connection) -> None:
         for statement in _schema():

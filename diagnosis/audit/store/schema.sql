@@ -70,6 +70,7 @@ CREATE TABLE fault (
     epsilon REAL, epsilon_low REAL, epsilon_high REAL,
     sat REAL, sat_unit TEXT,
     probability REAL NOT NULL,
+    unclear INTEGER NOT NULL DEFAULT 0, -- 1: no row has half of the probability, so that its kind is not told
     PRIMARY KEY (result, id)
 ) STRICT;
 

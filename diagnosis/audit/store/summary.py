@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TypedDict
 
+from diagnosis.results.candidates import candidates_of
 from diagnosis.results.document import CoverageRow, IntervalRow, LossRow, ReportDocument
 from diagnosis.results.size_rows import EpsilonRow
 from diagnosis.results.vocabulary import Severity
@@ -52,6 +53,7 @@ class FaultColumns(BoundsColumns):
     sat: float | None
     sat_unit: str | None
     probability: float
+    unclear: int
 
 
 class ComponentColumns(BoundsColumns):
@@ -115,6 +117,7 @@ def _fault(row: IntervalRow) -> FaultColumns:
         "sat": None if sat is None else sat["mean"],
         "sat_unit": None if sat is None else sat["unit"],
         "probability": row["probability"],
+        "unclear": int(bool(candidates_of(row))),
     }
 
 

@@ -157,12 +157,33 @@ const Data = (() => {
     return { x, y, exact, stride: Math.max(per, Math.round(width * per)), stored: per };
   }
 
-  // Every value of a channel over [t0, t1], or of each block the middle of its extremes, or that of the larger size.
-  async function samples(c, t0, t1, largest) {
+  // Parts of the mission one after another, and whether every sample of a channel is stored in them.
+  function parts(c) {
+    const time = (i) => view.t0 + i * view.dt, out = [];
+    let at = 0;
+    for (const [start, count, stride] of [...view.channels[c].segments].sort(([a], [b]) => a - b)) {
+      if (stride > 1) continue;
+      if (start > at) out.push({ from: time(at), to: time(start), every: false });
+      out.push({ from: time(Math.max(at, start)), to: time(start + count - 1), every: true });
+      at = start + count;
+    }
+    if (at < view.n) out.push({ from: time(at), to: time(view.n - 1), every: false });
+    return out;
+  }
+
+  // Every value of a channel over [t0, t1], or of each block the middle of its extremes, the one of the larger size (`of` 1), or the
+  // least size that the whole block has (−1).
+  async function samples(c, t0, t1, of = 0) {
     const { step, base } = view.channels[c], [a, b] = range(t0, t1), s = await segment(c, covering(c, a, b)), value = (v) => (v ? (base + v) * step : NaN);
     const i0 = Math.max(0, Math.floor((a - s.start) / s.stride)), i1 = Math.min(s.count, Math.ceil((b - s.start) / s.stride)), y = new Float64Array(Math.max(0, i1 - i0));
-    for (let i = i0; i < i1; i++) y[i - i0] = s.stride === 1 ? value(s.q[i]) : largest ? (Math.abs(value(s.low[i])) > Math.abs(value(s.high[i])) ? value(s.low[i]) : value(s.high[i])) : (value(s.low[i]) + value(s.high[i])) / 2;
+    for (let i = i0; i < i1; i++) y[i - i0] = s.stride === 1 ? value(s.q[i]) : block(value(s.low[i]), value(s.high[i]), of);
     return { y, t: view.t0 + (s.start + i0 * s.stride) * view.dt, dt: s.stride * view.dt, stride: s.stride };
+  }
+
+  function block(low, high, of) {
+    if (!of) return (low + high) / 2;
+    if (of < 0 && low < 0 && high > 0) return 0;
+    return Math.abs(low) > Math.abs(high) === of > 0 ? low : high;
   }
 
   // Smallest and largest value of a channel at a time: the same where every sample is stored.
@@ -249,7 +270,7 @@ const Data = (() => {
     return reading;
   }
 
-  return { view, full, curve, samples, at, thinned, csv, plotly, later, expanded, intervals, guard, fromBase64 };
+  return { view, full, parts, curve, samples, at, thinned, csv, plotly, later, expanded, intervals, guard, fromBase64 };
 })();
 
 // One time for the whole page, and two markers.

@@ -93,7 +93,7 @@ class Explorer {
     else if (plot) plot.push(...names.filter((n) => !plot.includes(n)));
     else this.plots.push(names.slice(0, 20));
     this.plots.splice(20);
-    this.changed(into);
+    this.changed(into)?.then(() => this.one("#signals-figure").scrollIntoView({ block: "nearest" }));
   }
 
   remove(at, name) {
@@ -132,7 +132,8 @@ class Explorer {
     if (one("#into").selectedIndex < 0) one("#into").value = "";
     for (const s of ["#signals-figure", "#signals-badge", "#signals-tools"]) one(s).hidden = !this.plots.length;
     one("#none").hidden = this.plots.length > 0;
-    this.onChange();
+    this.figure.release();
+    return this.onChange();
   }
 
   rows() {

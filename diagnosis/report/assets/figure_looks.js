@@ -3,11 +3,17 @@
 class FigureLooks {
   // Range of a row's axis, or null for all values; and what it cuts off.
   heights(row, curves) {
-    const y = curves.flatMap((c) => c.y.filter(Number.isFinite)), robust = this.robust && !row.limits ? Looks.robust(curves) : null;
-    if (this.tall === 1 || !y.length) return robust;
-    const least = y.reduce((a, b) => Math.min(a, b), Infinity), most = y.reduce((a, b) => Math.max(a, b), -Infinity), [low, high] = robust?.range ?? row.limits ?? [least, most], middle = (low + high) / 2, half = (high - low || 1) / 2 / this.tall;
-    return { range: [middle - half, middle + half], least, most };
+    const left = curves.filter((_, i) => !row.traces[i - curves.length + row.traces.length]?.right), held = this.held.get(Figure.named(row));
+    if (!held) return Figure.robust && !row.limits ? Looks.robust(left) : null;
+    const y = left.flatMap((c) => c.y.filter(Number.isFinite));
+    return { range: held.range, least: y.reduce((a, b) => Math.min(a, b), Infinity), most: y.reduce((a, b) => Math.max(a, b), -Infinity) };
   }
+
+  // Whether all figures of the page leave a few outliers outside.
+  static robust = false;
+
+  // What tells a row from the others of its figure.
+  static named(row) { return `${row.key} ${row.title}`; }
 
   static colour(name) { return getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim(); }
 
@@ -59,7 +65,7 @@ class FigureLooks {
   }
 
   // Closed outlines between two curves, one for each stretch without a gap.
-  static polygon(low, high) {
+  static polygon(low, high, steps) {
     const x = [], y = [];
     const runs = (d) => {
       const list = [];
@@ -71,8 +77,10 @@ class FigureLooks {
       return list;
     };
     const lows = runs(low), highs = runs(high);
+    // What holds until it changes is drawn as steps.
+    const corners = (run) => (steps ? run.flatMap(([a, b], i) => (i ? [[a, run[i - 1][1]], [a, b]] : [[a, b]])) : run);
     for (let i = 0; i < Math.min(lows.length, highs.length); i++) {
-      for (const [a, b] of [...highs[i], ...lows[i].reverse()]) { x.push(a); y.push(b); }
+      for (const [a, b] of [...corners(highs[i]), ...corners(lows[i]).reverse()]) { x.push(a); y.push(b); }
       x.push(NaN); y.push(NaN);
     }
     return { x, y, exact: low.exact, stride: low.stride, stored: low.stored };
@@ -83,7 +91,7 @@ class FigureLooks {
       const s = Figure.style(role), d = curves[list.length], { opacity, ...line } = Figure.line(s, d);
       list.push({ opacity,
         type: "scatter", mode: Figure.mode(d), marker: { size: 4 }, x: d.x, y: d.y, name: Figure.text(name), connectgaps: false, xaxis: "x",
-        yaxis: right ? `y${100 + i}` : `y${i ? i + 1 : ""}`, line: { color: Figure.colour(s.colour), ...line }, meta: role,
+        yaxis: right ? `y${100 + i}` : `y${i ? i + 1 : ""}`, line: { color: Figure.colour(s.colour), ...line, shape: this.rows[i].steps && role !== "band" ? "hv" : "linear" }, meta: role,
         hoverinfo: "skip", ...more,
       });
     };

@@ -19,7 +19,7 @@ const Lanes = {
 
   // The largest multiple of its threshold that a residual reached, and when.
   async nearest(row) {
-    const { duration, t0 } = Data.view, [r, h] = await Promise.all([Data.samples(row.traces[0].c, t0, duration, true), Data.samples(row.threshold, t0, duration)]);
+    const { duration, t0 } = Data.view, [r, h] = await Promise.all([Data.samples(row.traces[0].c, t0, duration, 1), Data.samples(row.threshold, t0, duration)]);
     let best = { part: -1 };
     for (let i = 0; i < r.y.length; i++) {
       const limit = h.y[Math.min(h.y.length - 1, Math.max(0, Math.round((r.t + i * r.dt - h.t) / h.dt)))], part = Math.abs(r.y[i]) / limit;

@@ -22,6 +22,8 @@
     }
     follow(explorer?.active && explorer.figure, range);
     follow(loop?.drawn && loop, range, "#loop-linked");
+    // The clock stands within what is shown: what is zoomed or chosen takes it along, as it takes the plots along where it is led.
+    if (Now.held && !Now.playing && (Now.t < range[0] || Now.t > range[1])) Now.set(Math.min(range[1], Math.max(range[0], Now.t)), { held: true });
     remember();
   });
   // What has just been drawn (`drawn`) follows the shared time, which may have moved meanwhile; what is zoomed leads.
@@ -47,7 +49,7 @@
     const key = e.target.dataset.part;
     if (!key || !e.target.open || figures[key] || !view.n) return;
     const element = e.target.querySelector(".lane-figure"), figure = figures[key] = new Figure(element);
-    Data.later().then(() => Lanes.draw(figure, key, e.target.querySelector(".near"))).catch((wrong) => { element.textContent = `The plots cannot be drawn: ${wrong.message}`; throw wrong; });
+    Data.later().then(() => Lanes.draw(figure, key, e.target.querySelector(".near"))).then(() => near(element)).catch((wrong) => { element.textContent = `The plots cannot be drawn: ${wrong.message}`; throw wrong; });
   }, true);
 
   // How the rows of a fault's figure are looked at: as they are, one row for every part, residuals as multiples of thresholds.
@@ -77,8 +79,9 @@
   }
 
   function robust() {
-    for (const f of Object.values(figures)) if (f) { f.robust = !f.robust; f.redraw(); }
-    for (const b of all("[data-act=robust]")) b.setAttribute("aria-pressed", String(evidence?.robust ?? loop?.robust));
+    Figure.robust = !Figure.robust;
+    for (const f of Object.values(figures)) { f?.release(); f?.redraw(); }
+    for (const b of all("[data-act=robust]")) b.setAttribute("aria-pressed", String(Figure.robust));
   }
 
   // The cursor by keys: some samples, or as many pixels as ten keys take.
@@ -93,7 +96,7 @@
   // Sliders below the plots: made when they are first opened.
   let panel = null;
   const whatIf = () => Data.later().then(() => { panel ??= new WhatIfPanel(one); figures.whatif = panel.figure; return panel.open(faults.get(current)); }).catch(failed("#whatif-words"));
-  one("#whatif")?.addEventListener("toggle", (e) => e.target.open && current && panel?.f?.id !== current && whatIf());
+  one("#whatif")?.addEventListener("toggle", (e) => e.target.open && current && (panel?.f?.id === current ? Promise.resolve() : whatIf()).then(() => near("#whatif")));
 
   const mark = (name) => Now.t !== null && Now.set(Now.t, { [name]: Now.t });
 
@@ -119,8 +122,7 @@
     replay.open().catch(failed("#events-none"));
   }));
   const play = () => one("#replay") && stage().then(() => replay.play());
-  one("#scrub")?.addEventListener("input", (e) => { Now.set(+e.target.value, { held: true }); stage(); });
-  one("#scrub")?.addEventListener("change", () => reach(0.5));
+  one("#scrub")?.addEventListener("input", (e) => { Now.set(+e.target.value, { held: true }); reach(0.5); stage(); });
   one("#events")?.addEventListener("click", (e) => { const b = e.target.closest("button"); if (b) { Now.set(+b.dataset.at, { held: true }); reach(0.5); } });
   // The cursor may as well be led along the timeline.
   one("#timeline")?.addEventListener("pointermove", (e) => {
@@ -175,6 +177,7 @@
     tell("");
     const before = current;
     current = id;
+    if (before !== id) evidence?.release();
     if (!articleOf(id)) brief(f);
     for (const e of all("[data-ev]")) e.hidden = e.dataset.ev !== id;
     for (const e of all("[aria-current]")) e.removeAttribute("aria-current");
@@ -197,6 +200,13 @@
 
   function go(where, atOnce) {
     one(where).scrollIntoView({ behavior: atOnce || matchMedia("(prefers-reduced-motion: reduce)").matches ? "auto" : "smooth" });
+  }
+
+  // What has been opened comes into view as far as it is not, its head first.
+  function near(where) {
+    const element = typeof where === "string" ? one(where) : where, { top, bottom } = element.getBoundingClientRect();
+    if (top >= 0 && bottom <= innerHeight) return;
+    element.scrollIntoView({ block: bottom - top < innerHeight - 80 && top > 0 ? "end" : "start", behavior: matchMedia("(prefers-reduced-motion: reduce)").matches ? "auto" : "smooth" });
   }
 
   function keepInTable(row) {
@@ -224,6 +234,7 @@
   function drawLoop(key) {
     const group = view.loop.find((g) => g.key === key);
     if (!loop || !group) return;
+    if (loopKey !== key) loop.release();
     loopKey = key;
     for (const b of all("[data-loop]")) b.setAttribute("aria-pressed", String(b.dataset.loop === key));
     loop.draw(group.rows, shadesOf(view.faults).map((f) => ({ ...f, main: false })), one("#loop-linked").checked && shared ? shared : loop.drawn ? loop.range : [0, view.duration]).catch(failed("#loop-figure"));
@@ -233,7 +244,7 @@
     remember();
     const range = one("#linked").checked && shared ? shared : explorer.figure.drawn ? explorer.figure.range : shared || [0, view.duration];
     const shades = shadesOf(view.faults, range[0]).map((f) => ({ ...f, main: false }));
-    explorer.draw(shades, range)?.catch(failed("#signals-figure"));
+    return explorer.draw(shades, range)?.catch(failed("#signals-figure"));
   }
 
   function setTheme(theme) {
@@ -271,7 +282,7 @@
     if (!target) return;
     if (target.dataset.act) actions[target.dataset.act](target);
     else if (target.dataset.loop) drawLoop(target.dataset.loop);
-    else { e.preventDefault(); select(target.dataset.f, { scroll: "scroll" in target.dataset, step: true }); }
+    else { e.preventDefault(); select(target.dataset.f, { scroll: true, step: true }); }
   });
 
   document.addEventListener("keydown", (e) => {

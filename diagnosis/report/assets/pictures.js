@@ -63,8 +63,13 @@ class Pictures {
   state(c, t) {
     const fault = Pictures.fault(c, t);
     if (fault) return fault.mode;
+    return ["sensor", "actuator"].map((side) => Pictures.lane(c, side, t)).find((s) => s !== "not_assessed") ?? "not_assessed";
+  }
+
+  // What the lane of a part says at a time.
+  static lane(c, side, t) {
     const at = 2000 * t / Data.view.duration;
-    for (const path of this.root.querySelectorAll(`.lane[data-c="${CSS.escape(c)}"] path.ln`)) {
+    for (const path of document.querySelectorAll(`.lane[data-c="${CSS.escape(c)}"][data-side="${side}"] path.ln`)) {
       for (const [, a, b] of path.getAttribute("d").matchAll(/M([\d.]+) 5H([\d.]+)/g)) if (+a <= at && at < +b) return path.getAttribute("class").split(" ")[1];
     }
     return "not_assessed";

@@ -3,7 +3,7 @@
 class Figure extends FigureLooks {
   constructor(element, badge, onRange) {
     super();
-    Object.assign(this, { element, badge, onRange, rows: [], shades: [], range: [0, 1], drawn: false, busy: false, again: false, job: 0, robust: false, tall: 1 });
+    Object.assign(this, { element, badge, onRange, rows: [], shades: [], range: [0, 1], drawn: false, busy: false, again: false, job: 0, held: new Map() });
     element.addEventListener("pointermove", (e) => { if (this.drawn && !e.buttons && this.read().inside(e)) Now.set(this.read().time(e)); });
     element.addEventListener("pointerleave", () => Now.leave());
     // A click sets a marker; a drag is a zoom.
@@ -15,7 +15,7 @@ class Figure extends FigureLooks {
         Now.set(this.read().time(e), { [e.shiftKey ? "b" : "a"]: this.read().time(e) });
       }, { once: true, capture: true });
     }, true);
-    element.addEventListener("wheel", (e) => { if (e.shiftKey && this.drawn) { e.preventDefault(); this.stretch(e.deltaY + e.deltaX < 0 ? 2 : 0.5); } }, { passive: false });
+    element.addEventListener("wheel", (e) => { if (e.shiftKey && this.drawn) { e.preventDefault(); this.stretch(e.deltaY + e.deltaX < 0 ? 2 : 0.5, e); } }, { passive: false });
   }
 
   read() { return (this.reading ??= new Reading(this)); }
@@ -39,8 +39,22 @@ class Figure extends FigureLooks {
     return { ...a, y };
   }
 
-  // Height of the values: twice or half as tall about the middle of what is shown; `robust`: without a few outliers.
-  stretch(by) { this.tall = by ? Math.min(64, Math.max(1, this.tall * by)) : 1; return this.redraw(); }
+  // Values so many times as tall: about the pointer in the panel below it, without one about the middle of every panel.
+  stretch(by, pointer) {
+    const down = pointer && pointer.clientY - this.element.getBoundingClientRect().top;
+    this.rows.forEach((row, i) => {
+      const axis = this.element._fullLayout[`yaxis${i ? i + 1 : ""}`], part = pointer ? (down - axis._offset) / axis._length : 0.5;
+      if (part < 0 || part > 1) return;
+      const held = this.held.get(Figure.named(row)), [low, high] = held?.range ?? axis.range, [least, most] = held?.whole ?? axis.range;
+      const height = Math.max((high - low) / by, (most - least) / 64), still = high - part * (high - low), top = Math.min(most, still + part * height), range = [Math.max(least, top - height), top];
+      if (height < most - least) this.held.set(Figure.named(row), { range, whole: [least, most] });
+      else this.held.delete(Figure.named(row));
+    });
+    return this.redraw();
+  }
+
+  // Every panel's values as tall as they are without a choice.
+  release() { this.held.clear(); }
 
   pixels() { return Math.max(200, (this.paper || this.element.clientWidth) - 70); }
 
@@ -53,7 +67,7 @@ class Figure extends FigureLooks {
     for (const row of this.rows) {
       if (row.band) {
         const [low, high] = await Promise.all(row.band.map((c) => one(c, row.bandScale)));
-        curves.push(Figure.polygon(low, high));
+        curves.push(Figure.polygon(low, high, row.steps));
       }
       if (row.threshold !== undefined) {
         const d = await one(row.threshold, row.bandScale);
@@ -120,7 +134,7 @@ class Figure extends FigureLooks {
         const r = e["xaxis.range"] || ("xaxis.range[0]" in e ? [e["xaxis.range[0]"], e["xaxis.range[1]"]] : null);
         if (r && !this.busy) this.zoom(r.map(Number));
       });
-      this.element.on("plotly_doubleclick", () => { if (this.shifted) return; Now.set(Now.t, { a: null }); this.zoom([0, Data.view.duration]); });
+      this.element.on("plotly_doubleclick", () => { if (this.shifted) return; Now.set(Now.t, { a: null }); this.release(); this.zoom([0, Data.view.duration]).then(() => this.redraw()); });
     }
     this.onRange?.(this.range, true);
     if (target !== this.range) this.zoom(this.range); // zoomed while it was drawn
@@ -133,7 +147,7 @@ class Figure extends FigureLooks {
     this.sheets = [];
     for (let i = 0; i < this.rows.length; i += most) {
       const part = new Figure(i ? document.createElement("div") : this.element);
-      Object.assign(part, { rows: this.rows.slice(i, i + most), curves: curves.slice(i, i + most).flat(), shades: this.shades, range: this.range, paper: width });
+      Object.assign(part, { rows: this.rows.slice(i, i + most), curves: curves.slice(i, i + most).flat(), shades: this.shades, range: this.range, held: this.held, paper: width });
       if (i) {
         part.element.className = "sheet";
         (this.sheets.at(-1) || this.element).after(part.element);
@@ -171,7 +185,7 @@ class Figure extends FigureLooks {
         const coarse = this.coarseness(curves), shapes = coarse === this.coarse ? {} : { shapes: this.layout().shapes };
         this.coarse = coarse;
         const axes = {};
-        if (this.robust || this.tall > 1) this.perRow(curves).forEach((part, i) => Object.entries(Figure.ranged(this.heights(this.rows[i], part), this.rows[i])).forEach(([k, v]) => { axes[`yaxis${i ? i + 1 : ""}.${k}`] = v; }));
+        if (Figure.robust || this.held.size) this.perRow(curves).forEach((part, i) => Object.entries(Figure.ranged(this.heights(this.rows[i], part), this.rows[i])).forEach(([k, v]) => { axes[`yaxis${i ? i + 1 : ""}.${k}`] = v; }));
         await Plotly.update(this.element, this.restyled(curves), { "xaxis.range": target, ...heads, ...shapes, ...axes });
         this.label(curves);
         if (Now.t !== null) this.read().show();

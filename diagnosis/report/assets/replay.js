@@ -28,7 +28,6 @@ class Replay {
       // without probabilities over time: those of its faults, as they are stated
       part.faults = part.modes.length ? [] : Data.view.faults.filter((f) => Replay.of(f, part));
       if (part.faults.length) part.modes = [...new Set(part.faults.map((f) => f.mode))].map((m) => ({ m }));
-      if (!part.modes.length) return [];
       const row = document.createElement("div"), name = document.createElement("span"), bar = document.createElement("span");
       name.textContent = part.words;
       bar.className = "stack";
@@ -97,21 +96,35 @@ class Replay {
     return list;
   }
 
+  // Stretches of the mission in which a channel's size is beyond a limit, or another channel: by every sample where these are stored,
+  // else by blocks that are beyond it in whole.
+  static async passing(c, limit, other) {
+    const { dt } = Data.view, list = [];
+    for (const { from, to, every } of Data.parts(c)) {
+      const inside = every ? [from + 2 * dt, to - 2 * dt] : [from, to], [d, e] = await Promise.all([Data.samples(c, ...inside, -1), other === undefined ? null : Data.samples(other, ...inside)]);
+      const least = (i) => (e ? e.y[Math.min(e.y.length - 1, Math.max(0, Math.round((d.t + i * d.dt - e.t) / e.dt)))] : limit);
+      for (const s of Replay.stretches(d, (i) => Math.abs(d.y[i]) > least(i))) {
+        const last = list.at(-1);
+        if (last && s.start - last.stop < Replay.APART) last.stop = s.stop;
+        else if (list.length < Replay.MOST) list.push({ ...s, dt: d.dt });
+      }
+    }
+    return list;
+  }
+
   async crossings(part) {
-    const { t0, duration, limit } = Data.view, words = Data.view.words[part.side] ?? {}, out = [], mine = Data.view.faults.filter((f) => Replay.of(f, part)), near = (s) => mine.some((f) => f.start - Replay.BESIDE < s.stop && s.start < f.stop + Replay.BESIDE), get = (leaf) => this.names.get(part.base + leaf), clock = (t) => `${t.toFixed(3)} s`;
+    const { limit } = Data.view, words = Data.view.words[part.side] ?? {}, out = [], mine = Data.view.faults.filter((f) => Replay.of(f, part)), near = (s) => mine.some((f) => f.start - Replay.BESIDE < s.stop && s.start < f.stop + Replay.BESIDE), get = (leaf) => this.names.get(part.base + leaf), clock = (t) => `${t.toFixed(3)} s`;
     const value = async (leaf, t) => { const c = get(leaf); if (c === undefined) return null; const { k, unit } = Data.view.channels[c], [a, b] = await Data.at(c, t); return { v: k * (a + b) / 2, text: `${Now.number(+(k * (a + b) / 2).toPrecision(3))}${unit === "1" ? "" : unit === "°" ? unit : ` ${unit}`}` }; };
     const p = get("probability"), r = get("residual"), h = get("threshold");
     if (r !== undefined && h !== undefined) {
-      const [d, e] = await Promise.all([Data.samples(r, t0, duration, true), Data.samples(h, t0, duration)]), other = (i) => e.y[Math.min(e.y.length - 1, Math.max(0, Math.round((d.t + i * d.dt - e.t) / e.dt)))];
-      for (const s of Replay.stretches(d, (i) => Math.abs(d.y[i]) > other(i)).slice(0, Replay.MOST)) {
+      for (const s of await Replay.passing(r, 0, h)) {
         const [now, top, expected] = await Promise.all(["residual", "threshold", "expected"].map((leaf) => value(leaf, s.start)));
         out.push({ t: s.start, near: near(s), words: `${clock(s.start)} · ${part.words}: the residual, ${now.text}, passes its threshold of ${top.text}${expected && Number.isFinite(expected.v) ? `; ${expected.text} was expected` : ""}.` });
       }
     }
     if (p !== undefined && limit) {
-      const d = await Data.samples(p, t0, duration, true);
-      for (const s of Replay.stretches(d, (i) => d.y[i] >= limit).slice(0, Replay.MOST)) {
-        const t = Math.min(s.start + d.dt, s.stop), shares = (await Promise.all(part.modes.map(async ({ m }) => ({ m, p: (await value(`p_${m}`, t))?.v })))).filter((x) => x.m !== "healthy" && Number.isFinite(x.p)).sort((a, b) => b.p - a.p), [now, top] = [await value("residual", t), await value("threshold", t)];
+      for (const s of await Replay.passing(p, limit)) {
+        const t = Math.min(s.start + s.dt, s.stop), shares = (await Promise.all(part.modes.map(async ({ m }) => ({ m, p: (await value(`p_${m}`, t))?.v })))).filter((x) => x.m !== "healthy" && Number.isFinite(x.p)).sort((a, b) => b.p - a.p), [now, top] = [await value("residual", t), await value("threshold", t)];
         const ratio = now && top && top.v > 0 && Math.abs(now.v) > top.v ? `; the residual is ${Now.number(+(Math.abs(now.v) / top.v).toPrecision(2))} times its threshold` : "";
         const whole = mine.find((f) => f.start <= t && t < f.stop), first = shares.length ? words[shares[0].m] : "";
         const then = first && whole && whole.words !== first ? ` at first; the whole of it is ${whole.words}` : "", little = near(s) ? "" : "; no fault is stated here";
@@ -139,7 +152,11 @@ class Replay {
     const why = last?.words ?? "Nothing has passed a threshold up to here.";
     if (one("#why").textContent !== why) one("#why").textContent = why;
     for (const part of this.parts) {
-      if (!part.bar) continue;
+      if (!part.modes.length) {
+        part.says.textContent = Pictures.lane(part.c, part.side, t).replaceAll("_", " ");
+        part.bar.setAttribute("aria-label", `${part.words}: ${part.says.textContent}`);
+        continue;
+      }
       if (part.faults.length) {
         const f = part.faults.find((x) => x.start <= t && t < x.stop);
         part.modes.forEach(({ m }, i) => { part.bar.children[i].style.width = `${f?.mode === m ? 100 * f.p : 0}%`; });

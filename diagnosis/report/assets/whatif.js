@@ -74,8 +74,9 @@ const WhatIf = {
     const evidence = `evidence.${c}.${sensor ? "sensor" : "actuator"}.`, [second, expected, residual, threshold, speed, applied] = await Promise.all([`${kind}.${c}.${kind === "steer" ? "phi" : "v"}_true`, `${evidence}expected`, `${evidence}residual`, `${evidence}threshold`, kind === "wheel" ? `wheel.${c}.v` : "", `${kind}.${c}.u_applied`].map(on));
     const accurate = sensor ? second ?? expected : base.y, channel = Data.view.channels[own], r = names.get(`${evidence}residual`);
     if (!accurate) return null;
+    const limit = names.get(`${evidence}threshold`), passes = r === undefined || limit === undefined ? null : (await Replay.passing(r, 0, limit)).find((s) => s.stop > f.start && s.start < f.stop);
     const sick = Data.view.faults.filter((g) => g.component === c), counts = Float64Array.from({ length: n }, (_, i) => { const t = base.t + i * base.dt; return speed && Number.isFinite(speed[i]) && Number.isFinite(base.y[i]) && !sick.some((g) => t >= g.start - 0.5 && t < g.stop + 0.5) ? 1 : 0; });
-    return { f, own, sensor, n, t: base.t, dt: base.dt, stride: base.stride, log: sensor ? base.y : applied ?? base.y, accurate, residual, threshold, speed, channel, same: r !== undefined && Data.view.channels[r].unit === channel.unit, rk: r === undefined ? 1 : Data.view.channels[r].k, runit: r === undefined ? "" : Data.view.channels[r].unit, r, plant: sensor || !speed ? null : WhatIf.fit(base.y, speed, counts, base.dt), second: Boolean(second), v: names.get(`wheel.${c}.v`) };
+    return { f, own, sensor, n, t: base.t, dt: base.dt, stride: base.stride, log: sensor ? base.y : applied ?? base.y, accurate, residual, threshold, speed, channel, same: r !== undefined && Data.view.channels[r].unit === channel.unit, rk: r === undefined ? 1 : Data.view.channels[r].k, runit: r === undefined ? "" : Data.view.channels[r].unit, r, passes, plant: sensor || !speed ? null : WhatIf.fit(base.y, speed, counts, base.dt), second: Boolean(second), v: names.get(`wheel.${c}.v`) };
   },
 
   // The mission with another fault: what the part gives, what the wheel does, and the residual.
@@ -98,19 +99,18 @@ const WhatIf = {
   // In a sentence: how far beyond its threshold the residual is, and when it first was.
   words(d, w) {
     if (!w.ratio || !d.residual) return "This part has no residual that the change could be seen in.";
-    const tell = (ratio, { start, stop }) => {
-      let sum = 0, n = 0, first = null;
+    const size = (ratio, { start, stop }) => {
+      let sum = 0, n = 0;
       for (let i = 0; i < d.n; i++) {
         const t = d.t + i * d.dt;
-        if (t < start || t >= stop || !Number.isFinite(ratio[i])) continue;
-        sum += ratio[i] ** 2;
-        n += 1;
-        if (first === null && Math.abs(ratio[i]) > 1) first = t - start;
+        if (t >= start && t < stop && Number.isFinite(ratio[i])) { sum += ratio[i] ** 2; n += 1; }
       }
-      return { size: Math.sqrt(sum / (n || 1)), first };
+      return `${Now.number(+Math.sqrt(sum / (n || 1)).toPrecision(3))} times its threshold`;
     };
-    const then = tell(w.ratio, w.spec), log = tell(d.residual.map((v, i) => v / d.threshold[i]), d.f), late = (x) => (x.first === null ? "never beyond it" : `first beyond it ${Now.number(+Math.max(0, 1000 * x.first).toPrecision(3))} ms after the onset`);
-    return `What if: residual ${Now.number(+then.size.toPrecision(3))} times its threshold, ${late(then)}. Log: ${Now.number(+log.size.toPrecision(3))} times, ${late(log)}.${d.plant ? ` Wheel model found here: K = ${Now.number(+d.plant.K.toPrecision(3))} m/s, τ = ${Now.number(+d.plant.tau.toPrecision(2))} s, dead zone ${Now.number(100 * d.plant.dead)} %; it explains ${Now.number(+(100 * d.plant.explains).toPrecision(3))} % of the healthy speed.` : ""}`;
+    // As the sentences of the replay have it: some samples on end.
+    const beyond = Replay.stretches({ y: w.ratio, t: d.t, dt: d.dt, stride: d.stride }, (i) => Math.abs(w.ratio[i]) > 1).find((s) => s.stop > w.spec.start && s.start < w.spec.stop);
+    const late = (s, onset) => { if (!s) return "never beyond it"; const ms = 1000 * (s.start - onset), is = `${Now.number(+Math.abs(ms).toPrecision(3))} ms`; return `beyond it from ${s.start.toFixed(3)} s on, ${Math.abs(ms) < 0.5 ? "from the onset" : ms > 0 ? `${is} after the onset` : `${is} before the onset stated`}`; };
+    return `What if: residual ${size(w.ratio, w.spec)}, ${late(beyond, w.spec.start)}${beyond && d.stride > 1 ? `, to ${Figure.duration(d.dt)}` : ""}. Log: ${size(d.residual.map((v, i) => v / d.threshold[i]), d.f)}, ${late(d.passes, d.f.start)}.${d.plant ? ` Wheel model found here: K = ${Now.number(+d.plant.K.toPrecision(3))} m/s, τ = ${Now.number(+d.plant.tau.toPrecision(2))} s, dead zone ${Now.number(100 * d.plant.dead)} %; it explains ${Now.number(+(100 * d.plant.explains).toPrecision(3))} % of the healthy speed.` : ""}`;
   },
 };
 
@@ -123,6 +123,7 @@ class WhatIfPanel {
   }
 
   async open(f) {
+    if (this.f !== f) this.figure.release();
     this.f = f;
     const { one } = this, row = (await Data.intervals())[f.id], d = this.data = await WhatIf.load(f, row), none = !d;
     if (this.f !== f) return;

@@ -53,7 +53,7 @@ def make_report() -> Callable[..., dict[str, Any]]:
         fault = {
             "id": "F1", "component": "FR", "kind": "wheel", "side": "actuator", "mode": "inefficient", "start_s": 10.0,
             "stop_s": 30.0, "start_ns": start_ns + 10 * 10**9, "epsilon": bounds, "sat": None, "probability": 0.98,
-            "severity": "medium",
+            "severity": "medium", "hypotheses": [{"side": "actuator", "mode": "inefficient", "p": 0.98}],
         }  # fmt: skip
         coverage = [
             {

@@ -365,4 +365,4 @@ def test_open_driving_has_the_reason_that_it_has_while_driving() -> None:
             driving_s=driven,
             open_state={("FL", "actuator"): state},
         )
-        assert any(f"could not be judged ({reason})" in c for c in got.caveats)
+        assert any(f"were not judged ({reason})" in c for c in got.caveats)

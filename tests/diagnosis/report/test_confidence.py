@@ -77,7 +77,7 @@ def test_a_fault_of_a_part_that_was_hardly_judged_may_last_for_longer() -> None:
         return sure_of(fault(0.93, side=side), samples.report_with(coverage=list(rows)))
 
     assert words(row("actuator", 0.0)).endswith(
-        "the rest of its driving could not be judged, so that it may be faulty for longer"
+        "the rest of its driving was not judged, so that it may be faulty for longer"
     )
     assert words(row("actuator", 23.0)).endswith(
         "only 23 % of its driving was judged, so that it may be faulty for longer"

@@ -50,7 +50,7 @@ def kpis(document: ShownDocument) -> list[tuple[str, str, str]]:
         (
             hours(c["driving_s"]),
             "driving time",
-            f"{c['distance_m'] / 1000:.{1 if c['distance_m'] >= 1000 else 3}f} km",
+            f"{c['distance_m'] / 1000:.1f} km" if c["distance_m"] >= 1000 else f"{c['distance_m']:.0f} m",
         ),
         (labels.grouped(c["with_faults"]), "missions with faults", share),
         (

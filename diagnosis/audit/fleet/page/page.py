@@ -33,6 +33,7 @@ from diagnosis.audit.fleet.words import count, missions_words, open_words, repai
 from diagnosis.pages import labels
 from diagnosis.pages.environment import DARK, SHARED, asset, environment, shared_style
 from diagnosis.pages.mode_style import mode_rules
+from diagnosis.results.candidates import UNCLEAR
 from diagnosis.results.fault_rows import state_label
 from diagnosis.results.machine_words import words_of
 from diagnosis.results.vocabulary import Verdict
@@ -248,7 +249,7 @@ def _fault(f: FleetFaultRow, document: ShownDocument, directions: Mapping[tuple[
     first, last = (document["missions"][place] for place in (f["first"], f["last"]))
     e = f["epsilon"]
     notes = []
-    if e and f["mode"] in SCALED:
+    if e and f["mode"] in SCALED and not f.get("unclear"):
         notes.append(f"ε̂ {e['value']:.2f} ({e['low']:.2f} to {e['high']:.2f}) in the fault".replace("-", "−"))
         direction = directions.get((f["machine"], f["component"], f["side"]), "not_known")
         notes += [direction] if direction != "not_known" else []
@@ -265,7 +266,7 @@ def _fault(f: FleetFaultRow, document: ShownDocument, directions: Mapping[tuple[
     return {
         "machine": document["machines"][f["machine"]]["label"],
         "symbol": labels.known(f["mode"]),
-        "words": state_label(f["mode"], f["side"]),
+        "words": UNCLEAR.capitalize() if f.get("unclear") else state_label(f["mode"], f["side"]),
         "part": words_of(document["machines"][f["machine"]]).part_words(f["kind"], f["component"], f["side"]),
         "severity": f["severity"],
         "status": _STATUS[f["status"]],

@@ -14,6 +14,7 @@ from diagnosis.audit.fleet.page.svg import mark
 from diagnosis.audit.fleet.words import missions_words
 from diagnosis.audit.store.outcome import MissionState
 from diagnosis.pages import labels
+from diagnosis.results.candidates import UNCLEAR
 from diagnosis.results.fault_rows import state_label
 from diagnosis.results.machine_words import ANY_DRIVE, MachineWords, words_of
 from diagnosis.results.sizes import loss_known
@@ -44,6 +45,8 @@ def symbol(mission: ShownMission) -> str:
 def fault_words(fault: FleetFaultRow | MissionFaultRow, machine_words: MachineWords) -> str:
     """Part, mode and size in few words: ``RL drive valve inefficient, 12 % lost in the fault``."""
     words = machine_words.part_words(fault["kind"], fault["component"], fault["side"])
+    if fault.get("unclear"):
+        return f"{words} {UNCLEAR}"
     words += f" {state_label(fault['mode'], fault['side']).lower()}"
     e = fault["epsilon"]
     sized = e is not None and fault["mode"] in SCALED and loss_known(e["low"], e["high"])

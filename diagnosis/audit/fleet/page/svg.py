@@ -86,11 +86,12 @@ def trend_picture(trend: TrendRow, title: str, unit: str) -> Markup:
     parts = [frame.axes(unit)]
     y = float(frame.py(limit))
     parts.append(Markup('<path class="lim" d="M{:.1f} {:.1f}H{:.1f}"/>').format(frame.left, y, frame.right))
-    parts.append(label(frame.left + 4, y - 4, f"limit {number(limit)}", "lbl"))
+    below = float(values[0]) > limit and y < frame.bottom - 14  # beside the line where no mission stands
+    parts.append(label(frame.left + 4, y + 12 if below else y - 4, f"limit {number(limit)}", "lbl"))
     if now < end * 0.995:
         parts.append(frame.line(now, "now"))
     parts += [_change(frame, points, c) for c in trend["changes"]]
-    if trend["line"] is not None:
+    if trend["line"] is not None and f["state"] != "not_known":  # no line where the words tell none
         parts += _line(frame, trend, trend["line"], points, end)
     parts += _points(frame, points, trend["outliers"], every)
     if f["state"] == "crossing":
@@ -123,8 +124,7 @@ def _line(frame: Frame, trend: TrendRow, line: LineRow, points: Array, end: floa
     """Line and band of the last stretch; dashed from now on."""
     now, first = trend["now"], trend["first"]
     begin = float(points[first, 0])
-    stop = now if trend["forecast"]["state"] == "not_known" else end
-    x = np.linspace(begin, stop, 40)
+    x = np.linspace(begin, end, 40)
     level, slope, centre = line["level"], line["slope"], line["centre"]
     spread, half = slope["high"] - slope["value"], level["high"] - level["value"]
     scale = float(stdtrit(line["dof"], 0.95) / stdtrit(line["dof"], 0.975))  # from 95 % to 90 %
@@ -140,7 +140,7 @@ def _line(frame: Frame, trend: TrendRow, line: LineRow, points: Array, end: floa
     )
     path = "L".join(f"{a:.1f} {b:.1f}" for a, b in zip([*px, *px[::-1]], [*upper, *lower[::-1]], strict=True))
     out = [Markup('<path class="band" d="M{}Z"/>').format(path)]
-    for style, a, b in (("fit", begin, now), ("fit far", now, stop)):
+    for style, a, b in (("fit", begin, now), ("fit far", now, end)):
         within = _within(a, b, (level["value"] - slope["value"] * now, slope["value"]), least, most)
         if within is not None:
             (x0, y0), (x1, y1) = ((float(frame.px(v)), float(frame.py(w))) for v, w in within)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sqlite3
+from contextlib import closing
 from pathlib import Path
 
 from diagnosis.audit.fleet.leave import Left, lists_of
@@ -9,6 +11,7 @@ from diagnosis.audit.fleet.listed import listed_machines
 from diagnosis.audit.fleet.may_leave import Leave
 from diagnosis.audit.fleet.page.page import build_fleet_page
 from diagnosis.audit.fleet_files import fleet_json, load_fleet
+from diagnosis.audit.store.database import Database
 from tests import fleet_samples as samples
 from tests.fleet_samples import Fault, Sample
 
@@ -143,3 +146,38 @@ def test_a_loss_that_may_be_within_its_limit_is_told_beside_the_leave(tmp_path: 
     )
     assert words == "Ready"
     assert title == "The machine may go out"
+
+
+def test_each_fault_of_a_row_names_its_mission_where_they_are_several(tmp_path: Path) -> None:
+    one, other = Fault("FR", "sensor", "stuck", "high"), Fault("RL", "actuator", "stuck", "high")
+    (both,) = listed(tmp_path, Sample("a", faults=[one]), Sample("b", day=1.0, faults=[other])).values()
+    assert "FR speed sensor stuck in a" in both.reason
+    assert "RL drive valve stuck in b" in both.reason
+
+
+def test_a_kind_that_its_report_calls_unclear_is_unclear_in_the_lists(tmp_path: Path) -> None:
+    store = samples.write_store(
+        tmp_path / "fleet.sqlite",
+        [Sample("a", faults=[Fault("FR", "actuator", "inefficient", "high", (1.0, 0.9, 1.0))])],
+    )
+    with closing(Database(store)) as db, db.transaction() as c:
+        c.execute("UPDATE fault SET unclear = 1")
+    document = fleet_json(load_fleet(store))
+    (one,) = lists_of(document)
+    assert one.reason.startswith("FR drive valve faulty, kind unclear")
+    page = build_fleet_page(document)
+    assert "faulty, kind unclear" in page
+    assert "lost in the fault" not in page
+
+
+def test_a_store_of_an_earlier_version_is_read_and_written_on(tmp_path: Path) -> None:
+    store = samples.write_store(
+        tmp_path / "fleet.sqlite", [Sample("a", faults=[Fault("FR", "sensor", "stuck", "high")])]
+    )
+    with closing(sqlite3.connect(store)) as plain:
+        plain.execute("ALTER TABLE fault DROP COLUMN unclear")
+    for write in (False, True):
+        if write:
+            Database(store).close()
+        (one,) = lists_of(fleet_json(load_fleet(store)))
+        assert one.reason.startswith("FR speed sensor stuck")
