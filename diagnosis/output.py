@@ -117,7 +117,7 @@ def _write_table(columns: Mapping[str, NDArray[Any]], path: Path, layout: Layout
             table,
             file,
             compression="zstd",
-            compression_level=3,
+            compression_level=2,
             use_dictionary=False,
             use_byte_stream_split=True,
             write_statistics=False,  # extremes of whole columns: a fifth of the time, and no use to a reader

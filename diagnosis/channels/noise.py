@@ -183,9 +183,10 @@ def relative_lag(y: Array, x: Array, use: NDArray[np.bool_], least_lag: int, max
 
     def mean_square(lag: float) -> float:
         found = misfit(lag)
-        if np.count_nonzero(found == found) < _FEWEST_PLACES:  # x has gaps there
+        found = found[found == found]
+        if found.size < _FEWEST_PLACES:  # x has gaps there
             return np.inf
-        return float(np.nanmean(np.minimum(found, most) ** 2))
+        return float(np.mean(np.minimum(found, most) ** 2))
 
     steps = np.arange(max(least_lag, -max_lag), max_lag + 1, dtype=np.float64)
     most = _SOUND * min(lower(c) for c in steps) or np.inf

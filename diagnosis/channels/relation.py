@@ -248,6 +248,11 @@ def _scale(places: _Places, relation: Relation, dt: float) -> float:
 def _misfit(places: _Places, relation: Relation, dt: float, scale: float) -> float:
     """Cauchy's loss at the places [1]."""
     followed = _followed(places.x, relation.play, relation.lag, dt) if relation.lag or relation.play else places.x
+    return _misfit_of(followed, places, relation, scale)
+
+
+def _misfit_of(followed: Array, places: _Places, relation: Relation, scale: float) -> float:
+    """The same of a reference with play and lag."""
     whole = int(np.floor(relation.delay))
     part = relation.delay - whole
     return float(_loss(followed, places.at, places.y, whole, part if part >= 1e-9 else 0.0, relation.gain, scale))
@@ -278,7 +283,7 @@ def _least(places: _Places, trials: Iterable[Relation], dt: float, scale: float)
         if (trial.lag, trial.play) != key:
             key = (trial.lag, trial.play)
             followed = filled.followed(trial.play, trial.lag, dt)
-        misfit = _misfit(places._replace(x=followed), trial._replace(lag=0.0, play=0.0), dt, scale)
+        misfit = _misfit_of(followed, places, trial, scale)
         if misfit < least:
             best, least = trial, misfit
     return best, least

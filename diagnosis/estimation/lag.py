@@ -24,14 +24,19 @@ def low_passed_on(u: Array, tau: float, dt: float, state: float | None) -> tuple
     """
     a = np.exp(-dt / tau) if tau > 0 else 0.0
     out = np.empty(u.size)
-    first = float(next(iter(u[np.isfinite(u)]), 0.0)) if state is None else state
-    last = _scan_lag(np.ascontiguousarray(u), a, first, out)
+    last = _scan_lag(np.ascontiguousarray(u), a, np.nan if state is None else state, out)
     return out, float(last)
 
 
 @njit(cache=True)
 def _scan_lag(u, a, x, out):  # type: ignore[no-untyped-def]
-    """Write x and carry on with x ← a·x + (1 − a)·u; x stays where u is not known."""
+    """Write x and carry on with x ← a·x + (1 − a)·u; x stays where u is not known. NaN starts from the first finite u, else 0."""
+    if x != x:
+        x = 0.0
+        for value in u:
+            if np.isfinite(value):
+                x = value
+                break
     for k in range(u.size):
         out[k] = x
         if u[k] == u[k]:

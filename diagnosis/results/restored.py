@@ -22,6 +22,8 @@ _DIFFERENCES = (
     ("replay.{part}.u", "steer.{part}.u", "replay.{part}.u_difference"),
     ("evidence.{part}.sensor.residual", "wheel.{part}.v", "evidence.{part}.sensor.expected"),
     ("evidence.{part}.actuator.residual", "wheel.{part}.u_applied", "evidence.{part}.actuator.expected"),
+    ("evidence.{part}.sensor.residual", "steer.{part}.phi", "evidence.{part}.sensor.expected"),
+    ("evidence.{part}.actuator.residual", "steer.{part}.phi", "evidence.{part}.actuator.expected"),
 )
 _BLOCK = 1 << 15
 _ROUNDING = 1e-3  # of a step, for 32-bit arithmetic

@@ -13,11 +13,14 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from diagnosis.results.restored import differences_of
+
 _BLOCK = 1 << 15
 _PROBE = 20_000
 _HUGE, _LEAST = 1e30, 1e-30
 #: Steps of the grid within the range, and bits kept of each value; for recorded signals a float's own.
 _BITS = {"evidence": (10, 10), "replay": (11, 11)}
+_EXPECTED = (10, 0)  # a residual is made of it
 _ESTIMATE = (8, 8)  # δ̂, δ̄ and their deviations: a hundredth part of how well they are known
 _RECORDED, _WITH_LSB = 14, 16
 _RECORDED_OF = {"e": "v", "u_difference": "u"}
@@ -53,16 +56,19 @@ def grid_of(name: str, values: NDArray[np.floating], lsb: float | None = None) -
 
 def _bits_of(name: str, otherwise: tuple[int, int]) -> tuple[int, int]:
     """Steps within the range and bits kept, for columns that were replayed or found."""
-    group = name.partition(".")[0]
-    if group == "evidence" and name.rpartition(".")[2].startswith("delta"):
+    group, leaf = name.partition(".")[0], name.rpartition(".")[2]
+    if group == "evidence" and leaf.startswith("delta"):
         return _ESTIMATE
+    if group == "evidence" and leaf == "expected":
+        return _EXPECTED
     return _BITS.get(group, otherwise)
 
 
 def grids_of(columns: Mapping[str, NDArray[np.floating]], lsb: Mapping[str, float]) -> dict[str, float]:
     """Step of every column's grid, as `grid_of`; a difference from a recorded column is no finer than that one's.
 
-    Columns of shape (n,); each step in its column's unit.
+    What a residual is expected from is as fine as the residual, which is then made of it. Columns of shape (n,); each step in
+    its column's unit.
     """
     grids = {name: grid_of(name, values, lsb.get(name)) for name, values in columns.items()}
     for name in grids:
@@ -71,6 +77,10 @@ def grids_of(columns: Mapping[str, NDArray[np.floating]], lsb: Mapping[str, floa
         if group == "replay" and leaf in _RECORDED_OF:
             recorded = (f"{kind}.{part}.{_RECORDED_OF[leaf]}" for kind in ("wheel", "steer"))
             grids[name] = max(grids[name], *(grids.get(r, 0.0) for r in recorded))
+        elif leaf == "residual" and (pair := differences_of(name, columns)):
+            grids[name] = max(grids[name], grids[pair[0]])
+            if 0.0 < grids[name] < grids[pair[1]]:
+                grids[pair[1]] = grids[name]
     return grids
 
 
@@ -90,8 +100,8 @@ def _put_on_grid(part: NDArray[np.float32], grid: np.float32) -> None:
 def stored(name: str, values: NDArray[np.floating], grid: float) -> NDArray[np.float32]:
     """Column as stored, wrong by half a step of its grid at most.
 
-    Replayed columns are also rounded to 2.5·10⁻⁴, evidence to 5·10⁻⁴, its estimates (δ̂, δ̄, their deviations) to 2·10⁻³ of each
-    value, where that is coarser.
+    Replayed columns are also rounded to 2.5·10⁻⁴, evidence but for what is expected to 5·10⁻⁴, its estimates (δ̂, δ̄, their
+    deviations) to 2·10⁻³ of each value, where that is coarser.
 
     Parameters
     ----------

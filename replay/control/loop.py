@@ -224,6 +224,8 @@ def any_finite(values: Array) -> NDArray[np.bool_]:
     for part in blocks(len(values)):
         found |= np.isfinite(values[part]).any(axis=0)
         release(values)
+        if found.all():
+            break
     return found
 
 

@@ -37,6 +37,18 @@ def test_a_difference_comes_back_to_a_step_of_its_grid() -> None:
     assert np.abs(again["replay.a.b.e"] - exact["replay.a.b.e"]).max() <= 1.001 * steps["replay.a.b.e"]
 
 
+def test_a_small_residual_of_a_steering_angle_comes_back_from_an_expected_angle_as_fine() -> None:
+    expected = np.repeat(np.cumsum(RNG.normal(size=500)) / 10, 10)
+    phi = expected + 1e-3 * RNG.normal(size=5000)
+    names = "evidence.front.sensor.residual", "steer.front.phi", "evidence.front.sensor.expected"
+    exact = dict(zip(names, (phi - expected, phi, expected), strict=True))
+    steps = grids_of(exact, {"steer.front.phi": 2.5e-4})
+    assert steps[names[2]] == steps[names[0]] == steps[names[1]] == 2.0**-14
+    kept = {k: stored(k, v, steps[k]) for k, v in exact.items()}
+    assert sources_of(exact, kept, steps) == {names[0]: names[1:]}
+    assert np.abs(difference(kept[names[1]], kept[names[2]]) - exact[names[0]]).max() <= 1.001 * steps[names[0]]
+
+
 def test_both_sides_of_a_part_stand_once_and_no_others() -> None:
     exact = {f"evidence.{part}.{side}.residual": REF for part in ("front", "rear") for side in ("sensor", "actuator")}
     sources = sources_of(exact, *_kept(exact))
