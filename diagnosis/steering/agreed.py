@@ -13,6 +13,7 @@ from replay.faults import FaultMode, Side
 
 _AGREE = 2.0  # times what is usual between both angles
 _LEAST, _MOST = 0.004, 0.02  # rad: differences of less are none, and angles that usually differ by more tell nothing
+_PLAY = 0.012  # rad, root mean square: a linkage has so much play between both angles, which shakes neither
 _LEAST_USUAL_S = 5.0  # for which both must be known without a fault
 _FEW = 5  # pairs of readings in a finding
 
@@ -45,7 +46,7 @@ def without_agreed(found: Mapping[Side, SideFindings], inputs: AxleInputs) -> di
 
 
 def _agreed(findings: tuple[Finding, ...], inputs: AxleInputs) -> list[Finding]:
-    """Findings in which both angles differ by no more than they do without any."""
+    """Findings in which both angles differ by no more than they do without any; noise also where only their play is between them."""
     y, x = inputs.values("phi"), inputs.values("phi_true")
     use = inputs.timeline.fresh[inputs.channel("phi")] & np.isfinite(y) & np.isfinite(x)
     sound = use.copy()
@@ -59,9 +60,13 @@ def _agreed(findings: tuple[Finding, ...], inputs: AxleInputs) -> list[Finding]:
     if rms > _MOST:
         return []
     most = max(_LEAST, _AGREE * rms)
+    shaken = float(np.std(np.diff(apart[sound])))
 
     def agrees(f: Finding) -> bool:
         part = (apart[f.start : f.stop] - usual)[use[f.start : f.stop]]
-        return part.size >= _FEW and float(np.sqrt(np.mean(part**2))) <= most
+        if part.size < _FEW:
+            return False
+        calm = f.mode is FaultMode.NOISY and float(np.std(np.diff(part))) <= _AGREE * shaken
+        return float(np.sqrt(np.mean(part**2))) <= (max(most, _PLAY) if calm else most)
 
     return [f for f in findings if f.mode is not FaultMode.NO_SIGNAL and agrees(f)]

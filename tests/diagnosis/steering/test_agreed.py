@@ -59,3 +59,13 @@ def test_what_tells_nothing_denies_nothing() -> None:
     assert without_agreed(found, inputs(apart, truth, valve=True)) == found  # two angles that never agree
     assert without_agreed(found, inputs(None, truth, valve=True)) == found
     assert without_agreed(lost, inputs(truth + rng.normal(0.0, 1e-3, SIZE), truth, valve=True)) == lost
+
+
+@pytest.mark.parametrize(("mode", "stays"), [(FaultMode.NOISY, False), (FaultMode.STUCK, True)])
+def test_play_between_both_angles_is_no_noise(mode: FaultMode, *, stays: bool) -> None:
+    rng = np.random.default_rng(3)
+    truth = 0.2 * np.sin(np.arange(SIZE) * DT)
+    first, second = truth + rng.normal(0.0, 1e-3, SIZE), truth + rng.normal(0.0, 1e-3, SIZE)
+    first[1000:1150] -= 0.01
+    found = {Side.SENSOR: noisy(mode), Side.ACTUATOR: NOTHING}
+    assert bool(without_agreed(found, inputs(second, first, valve=True))[Side.SENSOR].findings) is stays
