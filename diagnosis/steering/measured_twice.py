@@ -64,7 +64,7 @@ def of_one_cause(side: Side, found: SideFindings, inputs: AxleInputs, min_sat: f
     noise = min(_NORMAL * usual, MOST_APART)
     measured = Measured(y, x, use, inputs.timeline.dt, names, unit, noise, min_sat)
     joined = with_one_cause(found.findings, measured)
-    return found._replace(findings=tuple(joined) if sensor else _or_all_off(joined, x))
+    return found._replace(findings=tuple(joined) if sensor else _or_all_off(joined, x, losses=True))
 
 
 def _as_it_opens(
@@ -108,9 +108,10 @@ def _as_it_opens(
     return SideFindings(tuple(kept), tuple(open_))
 
 
-def _or_all_off(findings: Sequence[Finding], command: Array) -> tuple[Finding, ...]:
-    """A valve's findings, those beside a command [fraction], shape (n,), that stays where it is as `_or_off` has them."""
-    return tuple(_or_off(f) if f.mode.total and _rests(command[f.start : f.stop]) else f for f in findings)
+def _or_all_off(findings: Sequence[Finding], command: Array, *, losses: bool = False) -> tuple[Finding, ...]:
+    """A valve's findings, those beside a command [fraction], shape (n,), that stays where it is as `_or_off` has them; `losses`: also of gain."""
+    constant = {f.start for f in findings if f.mode.total or (losses and f.mode is FaultMode.INEFFICIENT)}
+    return tuple(_or_off(f) if f.start in constant and _rests(command[f.start : f.stop]) else f for f in findings)
 
 
 def _or_off(finding: Finding) -> Finding:

@@ -21,11 +21,11 @@ COMMAND = 0.5 * np.sin(np.arange(SIZE) * DT * 3.0)
 NOISE = 0.002 * np.random.default_rng(5).standard_normal(SIZE)
 
 
-def told(opening: np.ndarray, mode: FaultMode = FaultMode.STUCK) -> SideFindings:
+def told(opening: np.ndarray, mode: FaultMode = FaultMode.STUCK, command: np.ndarray = COMMAND) -> SideFindings:
     """What is left of a finding on the valve that says that it sticks, of an opening measured meanwhile."""
     values = {
-        "u": COMMAND,
-        "u_applied": np.where((np.arange(SIZE) >= SPAN[0]) & (np.arange(SIZE) < SPAN[1]), opening, COMMAND) + NOISE,
+        "u": command,
+        "u_applied": np.where((np.arange(SIZE) >= SPAN[0]) & (np.arange(SIZE) < SPAN[1]), opening, command) + NOISE,
     }
     inputs = SimpleNamespace(
         angle_redundant=False,
@@ -34,7 +34,7 @@ def told(opening: np.ndarray, mode: FaultMode = FaultMode.STUCK) -> SideFindings
         channel=lambda leaf: f"steer.front.{leaf}",
         timeline=SimpleNamespace(dt=DT, fresh={"steer.front.u_applied": np.ones(SIZE, np.bool_)}),
         blocks=None,
-        command=COMMAND,
+        command=command,
     )
     row = (Hypothesis(Side.ACTUATOR.value, mode.value, 1.0),)
     finding = Finding(*SPAN, Side.ACTUATOR, mode, 1.0, row, Epsilon(1.0, 1.0, 1.0), None, (), Tier.MODEL)
@@ -64,3 +64,8 @@ def test_a_valve_that_stays_where_it_is_stays_stuck(at: float, mode: FaultMode) 
     (finding,) = told(np.full(SIZE, at), mode).findings
     assert finding.mode is mode
     assert finding.probability == 1.0
+
+
+def test_beside_a_command_that_rests_a_share_may_be_a_constant_that_is_missing() -> None:
+    after = told(np.full(SIZE, 0.1), FaultMode.INEFFICIENT, np.full(SIZE, 0.2))
+    assert {h.mode: h.p for h in after.findings[0].hypotheses} == {"inefficient": 0.5, "outside_table": 0.5}
