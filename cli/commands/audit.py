@@ -96,7 +96,7 @@ FailOnOrUnjudged = Annotated[
     FailOn,
     typer.Option(
         "--fail-on",
-        help="Lowest severity that ends with code 1; with never, a log that could not be judged counts as 0 too.",
+        help="Lowest severity that ends with code 1; with never, a log that is not judged counts as 0 too.",
     ),
 ]
 Resume = Annotated[

@@ -32,7 +32,7 @@ FailOnOrUnjudged = Annotated[
     FailOn,
     typer.Option(
         "--fail-on",
-        help="Lowest severity that ends with code 1; with never, a log that could not be judged ends with 0 too.",
+        help="Lowest severity that ends with code 1; with never, a log that is not judged ends with 0 too.",
     ),
 ]
 MachineId = Annotated[

@@ -86,7 +86,7 @@ def wheel_checks(cells: Cells, clear_at: float) -> Iterator[Checked]:
         if wheel in cells.carried and not any(twice[i]) and _known(command[:, i]):
             limit = most_carried(limits[i].below, clear_at)
             yield Checked(*about, Side.ACTUATOR, Check.CARRIED, cells.carried[wheel], limit)
-        # where an opening is no speed, nothing of it is asked of a wheel that is measured twice on either side
+        # where an opening is no speed, what it gives says nothing of a wheel whose sides are both measured twice
         if _known(used[:, i]) and speed.shape[1] > OTHERS and (tells or not all(twice[i])):
             own = limits[i]
             response = (*about, either, Check.RESPONSE)
@@ -103,6 +103,8 @@ def wheel_checks(cells: Cells, clear_at: float) -> Iterator[Checked]:
             if not all(twice[i]):  # of a wheel that is measured twice on both sides, it is the ground's doing
                 yield worst(cells, (*about, either, Check.EXCESS), windows[:, i], own.above, apart=True)
                 yield lasts(cells, (*about, either, Check.LASTING_EXCESS), lasting[i].above, own.lasting_above)
+        elif _known(used[:, i]) and speed.shape[1] > OTHERS:  # nothing tells what lies behind such a drive
+            yield lasts(cells, (*about, either, Check.RESPONSE), None, limits[i].below)
         if _known(reference[:, i]):
             if (
                 _known(used[:, i]) or twice[i][1]

@@ -304,3 +304,10 @@ def test_a_command_that_has_only_just_come_has_moved_nothing_yet() -> None:
     rate = np.roll(np.where(opening > 0.0, 0.1, 0.0), 20)
     columns["steer.front.u"], columns["steer.front.phi"] = opening, np.cumsum(rate) / 100.0
     assert np.nanmax(commanded_still(in_cells(replace(mission, columns=columns), base=True), 0)) < 0.06
+
+
+def test_where_an_opening_is_no_speed_nothing_clears_what_lies_behind_a_drive(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("diagnosis.clearing.wheels.openings_tell", lambda *_: False)
+    responses = [c for c in checks_of(in_cells(simulated(), base=False), HYDRAULIC) if c.check is Check.RESPONSE]
+    assert [c.component for c in responses] == ["FR", "FL", "RR", "RL"]
+    assert not any(c.passed for c in responses)
