@@ -104,7 +104,7 @@ def wheel_checks(cells: Cells, clear_at: float) -> Iterator[Checked]:
                 yield worst(cells, (*about, either, Check.EXCESS), windows[:, i], own.above, apart=True)
                 yield lasts(cells, (*about, either, Check.LASTING_EXCESS), lasting[i].above, own.lasting_above)
         elif _known(used[:, i]) and speed.shape[1] > OTHERS:  # nothing tells what lies behind such a drive
-            yield lasts(cells, (*about, either, Check.RESPONSE), None, limits[i].below)
+            yield Checked(*about, either, Check.BEHIND, None, limits[i].below)
         if _known(reference[:, i]):
             if (
                 _known(used[:, i]) or twice[i][1]

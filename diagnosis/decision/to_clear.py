@@ -225,6 +225,11 @@ def _act(check: Checked, twice: Collection[str]) -> str:
             f"log wheel.<part>.u_applied (the {words.drive}'s own measurement), or lift the machine, give every {words.part} the same "
             "command for 10 s, and diagnose that log"
         )
+    if check.check is Check.BEHIND:
+        return (
+            f"lift the machine, release the brakes and turn every {words.part} by hand; no log of these "
+            "signals clears this"
+        )
     if check.check is Check.SECOND_MEASUREMENT and check.worst is not None:
         return "compare both measurements at one steady speed with a third one, such as a hand tachometer, then repair or rescale the one that is off"
     if check.worst is None:

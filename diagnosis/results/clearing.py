@@ -23,6 +23,7 @@ class Check(StrEnum):
     EXCESS = "excess"
     LASTING_EXCESS = "lasting_excess"
     CARRIED = "carried"
+    BEHIND = "behind"
     TRACKING = "tracking"
     ROUGHNESS = "roughness"
     DELAY = "delay"
@@ -65,6 +66,10 @@ CHECK_WORDS: dict[Check, tuple[str, str]] = {
     Check.CARRIED: (
         "share of the speed that the ground gives a {wheel} whose {valve} is dead",
         "the ground carries {part}: by this mission's own model of the {wheels} a dead {valve} would leave it {value} of its speed",
+    ),
+    Check.BEHIND: (
+        "what lies behind a {valve} that does as it is told",
+        "the speed of {part} does not follow its {unit_command}, so that nothing tells what lies behind its {valve}, such as a brake that drags",
     ),
     Check.TRACKING: (
         "error of tracking, less that of the other {wheels}",
@@ -166,12 +171,11 @@ class Checked:
         if self.passed:
             return ""
         words = self.words.part_words(self.kind, self.component, self.side)
-        if self.worst is None:
+        if self.worst is None and self.check is not Check.BEHIND:
             return f"{words}: this mission leaves the check “{self.asked}” open"
         two = self.check is Check.SECOND_MEASUREMENT
-        said = self.words.fill(CHECK_WORDS[self.check][1]).format(
-            part=words if two else self.component, value=self._value
-        )
+        value = "" if self.worst is None else self._value
+        said = self.words.fill(CHECK_WORDS[self.check][1]).format(part=words if two else self.component, value=value)
         return said + (f" at {self.start_s:.1f}–{self.stop_s:.1f} s" if self.start_s is not None else "")
 
     @property

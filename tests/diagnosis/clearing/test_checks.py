@@ -308,6 +308,7 @@ def test_a_command_that_has_only_just_come_has_moved_nothing_yet() -> None:
 
 def test_where_an_opening_is_no_speed_nothing_clears_what_lies_behind_a_drive(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("diagnosis.clearing.wheels.openings_tell", lambda *_: False)
-    responses = [c for c in checks_of(in_cells(simulated(), base=False), HYDRAULIC) if c.check is Check.RESPONSE]
-    assert [c.component for c in responses] == ["FR", "FL", "RR", "RL"]
-    assert not any(c.passed for c in responses)
+    behind = [c for c in checks_of(in_cells(simulated(), base=False), HYDRAULIC) if c.check is Check.BEHIND]
+    assert [c.component for c in behind] == ["FR", "FL", "RR", "RL"]
+    assert not any(c.passed for c in behind)
+    assert "nothing tells what lies behind its valve" in behind[0].text
