@@ -27,7 +27,7 @@ _CHANGED = 0.88  # a change counts by its limit in windows, not over the mission
 #: shows of it where neither side is measured twice.
 _LEAST_SEEN, _LEAST_SEEN_TWICE = 0.06, 0.1
 #: The same where both sides are measured twice, in windows and of a change: what is left to be seen is what lies behind the drive.
-_LEAST_BEHIND, _LEAST_CHANGED_BEHIND = 0.2, 0.16
+_LEAST_BEHIND, _LEAST_CHANGED_BEHIND = 0.288, 0.16
 _LEAST_LASTING = 0.13  # the same over the mission, of what is measured twice on either side
 #: A deviation counts from so many times the largest of the other wheels' on, a change likewise.
 _ALONE, _CHANGED_ALONE = 3.0, 2.2
