@@ -67,7 +67,7 @@ def _bits_of(name: str, otherwise: tuple[int, int]) -> tuple[int, int]:
 def grids_of(columns: Mapping[str, NDArray[np.floating]], lsb: Mapping[str, float]) -> dict[str, float]:
     """Step of every column's grid, as `grid_of`; a difference from a recorded column is no finer than that one's.
 
-    What a residual is expected from is as fine as the residual, which is then made of it. Columns of shape (n,); each step in
+    What a steering residual is expected from is as fine as the residual, which is then made of it. Columns of shape (n,); each step in
     its column's unit.
     """
     grids = {name: grid_of(name, values, lsb.get(name)) for name, values in columns.items()}
@@ -77,7 +77,7 @@ def grids_of(columns: Mapping[str, NDArray[np.floating]], lsb: Mapping[str, floa
         if group == "replay" and leaf in _RECORDED_OF:
             recorded = (f"{kind}.{part}.{_RECORDED_OF[leaf]}" for kind in ("wheel", "steer"))
             grids[name] = max(grids[name], *(grids.get(r, 0.0) for r in recorded))
-        elif leaf == "residual" and (pair := differences_of(name, columns)):
+        elif leaf == "residual" and (pair := differences_of(name, columns)) and pair[0].startswith("steer."):
             grids[name] = max(grids[name], grids[pair[0]])
             if 0.0 < grids[name] < grids[pair[1]]:
                 grids[pair[1]] = grids[name]

@@ -157,7 +157,7 @@ def _write_result(
         for table in ("fault", "component"):
             connection.execute(f"DELETE FROM {table} WHERE result = ?", (identity,))
     for table, columns, rows in (
-        ("fault", _FAULT, summary["faults"]),
+        ("fault", _FAULT, [{"unclear": 0, **fault} for fault in summary["faults"]]),
         ("component", _COMPONENT, summary["components"]),
     ):
         _insert(connection, table, ("result", *columns), [{**r, "result": identity} for r in rows])

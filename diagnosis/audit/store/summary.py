@@ -6,7 +6,7 @@ The keys of the rows are the columns' names in ``schema.sql``, the values plain 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TypedDict
+from typing import NotRequired, TypedDict
 
 from diagnosis.results.candidates import candidates_of
 from diagnosis.results.document import CoverageRow, IntervalRow, LossRow, ReportDocument
@@ -53,7 +53,7 @@ class FaultColumns(BoundsColumns):
     sat: float | None
     sat_unit: str | None
     probability: float
-    unclear: int
+    unclear: NotRequired[int]  # objects of older versions have none
 
 
 class ComponentColumns(BoundsColumns):
