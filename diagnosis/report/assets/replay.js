@@ -78,6 +78,7 @@ class Replay {
       return item;
     }));
     this.events = found;
+    this.looked = true;
     this.one("#events-none").hidden = found.length > 0 && !left;
     this.one("#events-none").textContent = left ? `${left} more crossing${left > 1 ? "s" : ""} of residuals, which led to no finding, ${left > 1 ? "are" : "is"} left out.` : "No residual or probability passes its threshold in this mission.";
     return this.show();
@@ -149,7 +150,7 @@ class Replay {
       const box = one("#events"), y = last.item.offsetTop;
       if (y < box.scrollTop || y > box.scrollTop + box.clientHeight - 40) box.scrollTop = y - 30;
     }
-    const why = last?.words ?? "Nothing has passed a threshold up to here.";
+    const why = last?.words ?? (this.looked ? "Nothing has passed a threshold up to here." : "Looking for what passes its threshold.");
     if (one("#why").textContent !== why) one("#why").textContent = why;
     for (const part of this.parts) {
       if (!part.modes.length) {
