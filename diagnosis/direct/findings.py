@@ -35,8 +35,7 @@ _HOLD_S = 0.1
 _LEAD_S, _TAIL_S, _CHAIN_S = 0.3, 0.1, 0.05
 _SETTLED_LAGS = 5.0  # after a fault a channel returns with its lag
 _CLEAR = 3.0  # times the noise
-_HYSTERESIS = 0.025  # of the span, off a healthy valve's command, ...
-_RESTS_S, _VARIES_S = 10.0, 30.0  # ... for no longer than this, where it stays as it is and where it varies
+_HYSTERESIS, _RESTS_S = 0.025, 10.0  # of the span, off a healthy valve's command, for no longer than this
 _MIDDLE, _MOSTLY = 0.04, 0.98  # of the span: about its middle a valve opens nothing; of the time
 _OPEN_S, _DOUBT, _FAR_OFF = 0.5, 0.05, 0.2  # s; probability of a healthy channel; of the span
 _GROWTH_S = 0.1  # a shorter time of growth is not worth a sentence
@@ -186,8 +185,7 @@ def _hysteresis(isolated: Isolated, found: IdentifiedPair) -> bool:
     pair, run, seen = found.pair, isolated.run, isolated.seen
     if pair.side is not Side.ACTUATOR or not seen.use.any():
         return False
-    longest = _VARIES_S if run.row in VARYING_ROWS else _RESTS_S
-    brief = (run.stop - run.start) * pair.dt < longest
+    brief = (run.stop - run.start) * pair.dt < _RESTS_S
     both = np.maximum(np.abs(seen.y[seen.use]), np.abs(seen.x[seen.use]))
     rests = float(np.nanquantile(both, _MOSTLY)) < _MIDDLE * pair.span
     return rests or (brief and seen.deviation < _HYSTERESIS * pair.span)

@@ -27,9 +27,10 @@ _STEADY, _HARDLY = 0.25, 0.05  # of its mean, and of full opening, by which such
 # of a valve that moves as it is told: correlation of opening and command, and the least standard deviation of both that is a motion
 _FOLLOWS, _MOTION, _FEW = 0.9, 0.01, 12
 _EDGE = 0.15  # of a finding
-_LOSES, _IT_IS = 0.1, 0.9  # of its gain, from which it is a loss; probability of what a measured opening shows
+_LOSES, _IT_IS = 0.1, 0.85  # of its gain, from which it is a loss; probability of what a measured opening shows
 _SHIFTED = 0.5  # of the loss, from which a zero is no matter of how it changes
 _SHOWN = "The measured opening moves with its command: {gain:.2f} of it, {zero:+.1f}{{percent}} off."
+_BY_MODEL = "times as probable with"  # says what the model of the axle took it for
 _CONSTANT = "The command hardly moved meanwhile: a {valve} that is off by a constant would look the same."
 
 
@@ -77,16 +78,14 @@ def _as_it_opens(
         edge = round(_EDGE * (f.stop - f.start))  # a valve that begins to stick has moved until then
         inner = slice(f.start + edge, f.stop - edge)
         y, x = (z[inner][pairs[2][inner]] for z in pairs[:2])
-        if not f.mode.total or min(x.size, y.size) < _FEW or min(np.std(x), np.std(y)) < _MOTION:
-            kept.append(f)
-            continue
-        if float(np.corrcoef(x, y)[0, 1]) < _FOLLOWS:
+        moves = f.mode.total and x.size >= _FEW and min(np.std(x), np.std(y)) >= _MOTION
+        if not moves or float(np.corrcoef(x, y)[0, 1]) < _FOLLOWS:
             kept.append(f)
             continue
         gain = float(np.cov(x, y)[0, 1] / np.var(x, ddof=1))
         zero = float(np.mean(y) - gain * np.mean(x))
         lost = 1.0 - gain
-        if lost < _LOSES and abs(zero) < min_sat and lost > -_LOSES:
+        if abs(lost) < _LOSES and abs(zero) < min_sat:
             open_.append((f.start // length, -(-f.stop // length)))
             continue
         shifted = abs(zero) >= max(min_sat, _SHIFTED * lost * float(np.sqrt(np.mean(x**2))))
@@ -100,9 +99,9 @@ def _as_it_opens(
                     Hypothesis(Side.ACTUATOR.value, mode.value, _IT_IS),
                     Hypothesis("none", State.HEALTHY.value, 1.0 - _IT_IS),
                 ),
-                epsilon=Epsilon(lost, lost - _LOSES, lost + _LOSES),
+                epsilon=Epsilon(lost, lost - _LOSES, min(1.0, lost + _LOSES)),
                 sat=None,
-                evidence=(*f.evidence, _SHOWN.format(gain=gain, zero=100.0 * zero)),
+                evidence=(_SHOWN.format(gain=gain, zero=100.0 * zero), *(e for e in f.evidence if _BY_MODEL not in e)),
             )
         )
     return SideFindings(tuple(kept), tuple(open_))
@@ -110,8 +109,11 @@ def _as_it_opens(
 
 def _or_all_off(findings: Sequence[Finding], command: Array, *, losses: bool = False) -> tuple[Finding, ...]:
     """A valve's findings, those beside a command [fraction], shape (n,), that stays where it is as `_or_off` has them; `losses`: also of gain."""
-    constant = {f.start for f in findings if f.mode.total or (losses and f.mode is FaultMode.INEFFICIENT)}
-    return tuple(_or_off(f) if f.start in constant and _rests(command[f.start : f.stop]) else f for f in findings)
+
+    def constant(f: Finding) -> bool:
+        return (f.mode.total or (losses and f.mode is FaultMode.INEFFICIENT)) and _rests(command[f.start : f.stop])
+
+    return tuple(_or_off(f) if constant(f) else f for f in findings)
 
 
 def _or_off(finding: Finding) -> Finding:
