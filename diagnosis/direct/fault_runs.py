@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -25,6 +27,7 @@ _BRIDGE_S, _APART_S = 5.0, 30.0
 _BRIEF_S = 0.1
 _NEAR = 20  # samples between runs that follow each other
 _ONE_GAIN = 0.1  # by which gains of one fault may differ
+_ABOUT = 0.05  # of what a gain leaves: as near to it a channel may rest
 _ZERO = 3.0  # times the noise: no reading
 _PLAYS = 3.0  # by which a command must move for a valve with a loss of gain to follow
 
@@ -83,25 +86,37 @@ def _moving(run: Run, samples: Samples, model: ModeModel) -> Run | None:
 def _resting(runs: list[Run], samples: Samples, model: ModeModel, play: float) -> list[Run]:
     """Constant runs beside one of a loss of gain under that one's row, where the reference rests and the gain explains them.
 
-    The reference rests where it moves no more than its noise, or than a valve's play.
+    The reference rests where it moves no more than a valve's play, or what the gain leaves of its motion no more than the noise.
     """
     out = list(runs)
     for i, run in enumerate(runs):
         if run.row not in VALUE_ROWS:
             continue
         y, x, noise = _pairs(run, samples, model)
-        if y.size < 3 or (float(np.std(x)) > 2 * noise and float(np.ptp(x)) > _PLAYS * play):
+        if y.size < 3:
             continue
-        for near in out[max(0, i - 1) : i] + runs[i + 1 : i + 2]:
-            if near.row not in SCALED_ROWS or min(abs(run.start - near.stop), abs(near.start - run.stop)) > _NEAR:
+        for near in (*_beside(out[: i + 1][::-1]), *_beside(runs[i:])):
+            if near.row not in SCALED_ROWS:
                 continue
             other, reference, _ = _pairs(near, samples, model)
             power = float(reference @ reference)
             delta = float(reference @ other) / power if power > 0.0 else 0.0
-            if abs(float(y.mean()) - delta * float(x.mean())) < max(noise, play):
+            share, left = delta * float(x.mean()), min(1.0, abs(delta)) * float(np.std(x))
+            rests = left <= 2 * noise or float(np.ptp(x)) <= _PLAYS * play
+            if rests and abs(float(y.mean()) - share) < max(noise, play, _ABOUT * abs(share)):
                 out[i] = Run(run.start, run.stop, near.row)
                 break
     return out
+
+
+def _beside(runs: list[Run]) -> list[Run]:
+    """The nearest run to the first one that is no noise, if all that lies between is noisy; runs in order of their distance."""
+    for last, near in pairwise(runs):
+        if max(last.start, near.start) - min(last.stop, near.stop) > _NEAR:
+            return []
+        if near.row not in VARYING_ROWS:
+            return [near]
+    return []
 
 
 def _pairs(run: Run, samples: Samples, model: ModeModel) -> tuple[Array, Array, float]:

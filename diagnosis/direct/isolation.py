@@ -45,6 +45,7 @@ _CALM_P = 0.95  # that a steady row which leaves hardly anything is the fault's
 _CLEARLY = 2.0  # times as probable as the path's row, from which on another one is stated
 _MAJORITY = 0.5  # of the probability: a fault is called by it
 ZERO = 0.01  # of the span: as far apart may two healthy instruments have their zero
+_NEAR_MEAN = 0.25  # of its mean: standard deviation of a reference that hardly changes
 _NOTHING = 0.05  # of the span, root mean square: a channel that shows more is not silent, however rough its usual noise
 
 
@@ -65,7 +66,7 @@ class RunSamples:
     loud : bool
         Whether it shows so much that it is not silent.
     still : bool
-        Whether its reference hardly moves.
+        Whether its reference hardly moves, or what a share of it leaves of its motion.
     deviation : float
         Root mean square of y − x [unit of y]; infinite where there is none.
     noise : float
@@ -120,9 +121,17 @@ def run_samples(run: Run, found: IdentifiedPair, min_sat: float = 0.0) -> RunSam
     size = float(np.sqrt(np.mean(y[use] ** 2))) if use.any() else 0.0
     loud = size > _NOTHING * found.pair.span
     zero = not use.any() or size <= min_sat or (abs(float(np.mean(y[use]))) <= slack and not loud)
-    still = bool(use.any()) and (float(np.std(x[use])) < 2 * noise or float(np.ptp(x[use])) < 2 * play)
+    still = bool(use.any()) and _hardly_moves(y[use], x[use], 2 * noise, 2 * play)
     deviation = float(np.sqrt(np.mean((y[use] - x[use]) ** 2))) if use.any() else float("inf")
     return RunSamples(y, x, status, use, zero, loud, still, deviation, noise)
+
+
+def _hardly_moves(y: Array, x: Array, least: float, play: float) -> bool:
+    """Whether a reference moves within a play or by less than `least`; of one that stays near its mean, what a share leaves of the motion counts."""
+    moves, size = float(np.std(x)), abs(float(np.mean(x)))
+    if moves < _NEAR_MEAN * size:
+        moves *= min(1.0, abs(float(x @ y)) / float(x @ x))
+    return moves < least or float(np.ptp(x)) < play
 
 
 def estimate_run(run: Run, found: IdentifiedPair) -> Estimate | None:

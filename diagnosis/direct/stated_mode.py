@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.direct.identification import IdentifiedPair
-from diagnosis.direct.isolation import ZERO, Isolated
+from diagnosis.direct.isolation import ZERO, Isolated, RunSamples
 from diagnosis.results.fault_rows import ROWS
 from replay.faults import FaultMode, Side
 from replay.machine.config import Limits
@@ -21,6 +21,11 @@ _LEFT_S = (
 )
 _AS_TRUE = 0.03  # of what a sensor measures: as far off may a healthy one be
 _LOST = 0.03  # of the span: as far from its command a healthy valve rests within its dead band
+_TRAVEL, _STANDS = (
+    0.08,
+    0.015,
+)  # of the span: a command that moves by more takes a healthy valve along; not in its middle
+_FEW = 10  # samples
 _MOST_PROBABLY = 0.75  # that a gain is more than any row has
 
 
@@ -43,7 +48,7 @@ def mode_of(isolated: Isolated, found: IdentifiedPair, limits: Limits) -> FaultM
         returns = _LEFT_S + 2.0 * (relation.lag + max(0.0, relation.delay * found.pair.dt))
         # a relation found in the mission is no truer than half a saturation term
         least = max(_CLEAR * noise, _LOST * found.pair.span, limits.min_sat / 2)
-        return None if seen.deviation < least or away < returns else mode
+        return mode if away >= returns and (seen.deviation >= least or _left_behind(seen, found)) else None
     # what leaves its place for a sample now and then, as a noisy reference does at rest, moves nothing
     lasts = _longest(np.abs(seen.y - seen.x)[seen.use] > _CLEAR * noise) * found.pair.dt
     if np.isfinite(seen.y).any() and lasts < min(_LEFT_S, 0.5 * isolated.run.size * found.pair.dt):
@@ -70,6 +75,18 @@ def _mode_of_gain(isolated: Isolated, noise: float, found: IdentifiedPair, limit
     if abs(1.0 - delta) * math.sqrt(float((reference**2).mean())) < max(0.5 * noise, ZERO * found.pair.span):
         return None  # what is lost of hardly anything is the reference's own noise, or where both have their zero
     return FaultMode.OUTSIDE_TABLE if outside else FaultMode.INEFFICIENT
+
+
+def _left_behind(seen: RunSamples, found: IdentifiedPair) -> bool:
+    """Whether a valve stands still away from its middle while its command moves by more than hysteresis lets it.
+
+    About its middle a dead band would do the same.
+    """
+    span, y, x = found.pair.span, seen.y[seen.use], seen.x[seen.use]
+    if y.size < _FEW or abs(float(np.mean(y))) < max(_STANDS * span, _CLEAR * found.model.constant_noise):
+        return False
+    low, high = np.quantile(x, (0.02, 0.98))
+    return bool(high - low > _TRAVEL * span + 2.0 * found.relation.play and np.std(y) < 2.0 * seen.noise)
 
 
 def _longest(there: Flags) -> int:

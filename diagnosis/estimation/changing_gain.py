@@ -8,6 +8,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from diagnosis.estimation.simple_causes import Measured, every_power
@@ -21,6 +22,7 @@ _WINDOW_S, _FEW, _FEW_READINGS = 1.0, 5, 10
 _MOVES = 10.0  # times the noise, root mean square: a reference beside which a share shows
 _LEFT = 0.1  # of the deviation's power, that the shares leave
 _ABOUT = 0.05  # by which a share is uncertain, and may be beyond the table
+_NOT_YET = 0.1  # of the gain: a window that has lost less is one of before
 _CHANGES, _SLOWLY = 0.15, 3.0  # of the gain, by which it changes; times that, the sum of all its changes
 _RIVAL = 2.0  # times what the shares leave: what an offset that changes as slowly leaves, at least
 _P, _P_EITHER, _P_OFFSET = 0.8, 0.5, 0.4
@@ -39,13 +41,20 @@ def as_changing_gain(finding: Finding, measured: Measured) -> Finding:
     """
     if finding.mode is not FaultMode.NOISY:
         return finding
-    windows = _windows(finding, measured)
+    at, windows = _windows(finding, measured)
     if len(windows) < _FEW:
         return finding
     gains = np.array([float(x @ y) / float(x @ x) for y, x in windows])
-    spread = float(np.ptp(gains))
-    slowly = float(np.abs(np.diff(gains)).sum()) <= _SLOWLY * spread
-    if not (spread >= _CHANGES and slowly and gains.min() >= -_ABOUT and gains.max() <= 1.0 + _ABOUT):
+    usual = np.median(
+        sliding_window_view(np.pad(gains, 1, mode="edge"), 3), axis=1
+    )  # a single window may be a reversal's
+    spread = float(np.ptp(usual))
+    slowly = float(np.abs(np.diff(usual)).sum()) <= _SLOWLY * spread
+    before = int(np.argmax(np.append(usual < 1.0 - _NOT_YET, True)))  # windows in which nothing is lost yet
+    gains, usual, windows = gains[before:], usual[before:], windows[before:]
+    if spread < _CHANGES or not slowly or len(windows) < _FEW:
+        return finding
+    if usual.min() < -_ABOUT or usual.max() > 1.0 + _ABOUT:
         return finding
     off = [y - x for y, x in windows]
     whole = max(every_power(np.concatenate(off), measured), 1e-30)
@@ -58,14 +67,15 @@ def as_changing_gain(finding: Finding, measured: Measured) -> Finding:
     side = finding.side.value
     named = [Hypothesis(side, FaultMode.INEFFICIENT.value, p), Hypothesis(side, FaultMode.OUTSIDE_TABLE.value, rest)]
     noise = Hypothesis(side, FaultMode.NOISY.value, 1.0 - p - rest)
-    lost = 1.0 - gains
+    lost = 1.0 - usual
     words = (
-        f"{measured.names[0]} is a share of {measured.names[1]} that changes slowly, from {gains.max():.2f} to {gains.min():.2f}; "
+        f"{measured.names[0]} is a share of {measured.names[1]} that changes slowly, from {usual.max():.2f} to {usual.min():.2f}; "
         f"this leaves {100 * left:.0f} % of the deviation's power."
     )
     figures = tuple(e for e in finding.evidence if e.startswith("Residual,") or "times as probable" in e)
     return replace(
         finding,
+        start=at[before] if before else finding.start,
         mode=FaultMode.INEFFICIENT,
         probability=p,
         hypotheses=(*named, noise),
@@ -79,15 +89,16 @@ def as_changing_gain(finding: Finding, measured: Measured) -> Finding:
     )
 
 
-def _windows(finding: Finding, measured: Measured) -> list[tuple[Array, Array]]:
-    """Channel and reference of every second of a finding in which the reference tells what share of it the channel is."""
+def _windows(finding: Finding, measured: Measured) -> tuple[list[int], list[tuple[Array, Array]]]:
+    """First steps, and channel and reference, of every second of a finding in which the reference tells what share of it the channel is."""
     width = max(1, round(_WINDOW_S / measured.dt))
-    out = []
+    at, out = [], []
     for start in range(finding.start, min(finding.stop, measured.y.size) - width // 2, width):
         part = slice(start, min(start + width, finding.stop))
         y, x = measured.y[part], measured.x[part]
         use = measured.use[part] & np.isfinite(y) & np.isfinite(x)
         y, x = y[use], x[use]
         if x.size >= _FEW_READINGS and float(np.sqrt(np.mean(x**2))) > _MOVES * measured.noise:
+            at.append(start)
             out.append((y, x))
-    return out
+    return at, out

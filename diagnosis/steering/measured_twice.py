@@ -8,17 +8,19 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from diagnosis.channels.relation import Relation, relation_of
 from diagnosis.estimation.one_cause import with_one_cause
 from diagnosis.estimation.simple_causes import Measured
 from diagnosis.results.assessment import Finding
 from diagnosis.results.result import Epsilon, Hypothesis
 from diagnosis.steering.findings import SideFindings
 from diagnosis.steering.inputs import AxleInputs
-from diagnosis.steering.redundancy import MOST_APART
+from diagnosis.steering.redundancy import MOST_APART, most_lag
 from replay.faults import FaultMode, Side, State
 from replay.machine.quantities import OPENING
 
 Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
 
 # lower quarter of what is off, which a fault that grows before it is found leaves alone, and standard deviations per that
 _LOWER, _NORMAL = 0.25, 3.138
@@ -58,18 +60,27 @@ def of_one_cause(side: Side, found: SideFindings, inputs: AxleInputs, min_sat: f
     for f in found.findings:
         sound[f.start : f.stop] = False
     usual = float(np.quantile(np.abs(y - x)[sound], _LOWER)) if sound.any() else 0.0
+    command = x
     if not sensor:
+        x = _followed(y, x, sound if sound.any() else use, inputs.timeline.dt)
+        use &= np.isfinite(x)
         found = _as_it_opens(found, (y, x, use), inputs, min_sat)
     names = (inputs.channel(leaves[0]), inputs.channel(leaves[1]))
     unit = "rad" if sensor else OPENING
     noise = min(_NORMAL * usual, MOST_APART)
     measured = Measured(y, x, use, inputs.timeline.dt, names, unit, noise, min_sat)
     joined = with_one_cause(found.findings, measured)
-    return found._replace(findings=tuple(joined) if sensor else _or_all_off(joined, x, losses=True))
+    return found._replace(findings=tuple(joined) if sensor else _or_all_off(joined, command, losses=True))
+
+
+def _followed(y: Array, x: Array, use: Flags, dt: float) -> Array:
+    """A valve's command as its opening follows it, with its lag and play: what it is late by is no fault. All of shape (n,)."""
+    span = float(np.max(np.abs(x[use]), initial=0.0))
+    return relation_of(y, x, use, Relation(), dt, (0, most_lag(dt)), span)._replace(gain=1.0).expected(x, dt)
 
 
 def _as_it_opens(
-    found: SideFindings, pairs: tuple[Array, Array, NDArray[np.bool_]], inputs: AxleInputs, min_sat: float
+    found: SideFindings, pairs: tuple[Array, Array, Flags], inputs: AxleInputs, min_sat: float
 ) -> SideFindings:
     """A valve's findings, none of them stuck or dead while its measured opening moves with the command: `pairs` of both, shape (n,), and where."""
     kept, open_ = [], list(found.unexplained)

@@ -47,7 +47,7 @@ def with_second_angle(
         What two healthy instruments may differ by [rad].
     """
     use = fresh & np.isfinite(y) & np.isfinite(true)
-    most = _most_lag(dt)
+    most = most_lag(dt)
     moved = shifted(true, -relative_lag(true, y, use, -most, most))
     moved = moved + _zero_error(y - moved, use & np.isfinite(moved))
     known = np.isfinite(moved)
@@ -98,7 +98,7 @@ def with_valve_opening(
         Position less command, at the command's time, as multiples of its healthy noise; NaN where unknown.
     """
     use = fresh & np.isfinite(u) & np.isfinite(position)
-    most = _most_lag(dt)
+    most = most_lag(dt)
     linked = _jitter_lag(position, u, use, most)
     lag = relative_lag(position, u, use, 0, most)
     command, doubt = _followed(position, u, use, lag, dt, blocks.length)
@@ -144,7 +144,7 @@ def _followed(position: Array, u: Array, use: Flags, delay: float, dt: float, le
     jitter is evened out. Where the command moves, the lag's own error counts.
     """
     span = float(np.max(np.abs(u[use]), initial=0.0))
-    found = relation_of(position, u, use, Relation(delay=delay), dt, (0, _most_lag(dt)), span)._replace(gain=1.0)
+    found = relation_of(position, u, use, Relation(delay=delay), dt, (0, most_lag(dt)), span)._replace(gain=1.0)
     even, jitter = _without_jitter(u, np.isfinite(u), dt)
     jitter = np.nan_to_num(shifted(jitter, found.delay))
     if found.lag <= dt:
@@ -163,7 +163,7 @@ def _apart(position: Array, command: Array, use: Flags) -> float:
     return float(np.mean((position[known] - command[known]) ** 2)) if known.any() else np.inf
 
 
-def _most_lag(dt: float) -> int:
+def most_lag(dt: float) -> int:
     """Largest delay between two instruments [steps]."""
     return max(1, round(_MAX_LAG_S / dt)) if dt <= _MAX_LAG_S else 0
 

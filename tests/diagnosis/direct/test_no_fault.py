@@ -117,3 +117,35 @@ def test_that_a_burst_is_brief_makes_no_other_row_more_probable(monkeypatch: pyt
     assert told
     for f in told:
         assert f.probability >= max(h.p for h in f.hypotheses if h.mode != "healthy") - 1e-9
+
+
+def _stands_still_at(place: float) -> list[Finding]:
+    """A valve that stays at `place` for twelve seconds, while its command crosses the middle once and then keeps near it."""
+    t = np.clip(T - 30.0, 0.0, None)
+    near_middle = np.where(t < 2.0, -0.02 + 0.07 * np.sin(np.pi * t), -0.02 + 0.006 * np.sin(2.0 * t))
+    part = (T > 30.0) & (T < 42.0)
+    x = np.where(part, near_middle, command())
+    return found(Side.ACTUATOR, np.where(part, place, x) + noise(0.003), x)
+
+
+def test_a_valve_that_stands_still_near_its_middle_is_stuck_once_its_command_leaves_it() -> None:
+    (told,) = _stands_still_at(-0.042)
+    assert told.mode is FaultMode.STUCK
+    assert 11.5 < (told.stop - told.start) * DT < 12.5
+
+
+def test_about_its_middle_a_dead_band_holds_a_valve() -> None:
+    assert not [f for f in _stands_still_at(0.0) if f.mode.total and f.probability > 0.5]
+
+
+def test_a_loss_beside_a_command_that_hardly_changes_goes_on() -> None:
+    """What a fifth of the motion leaves is within the noise, so that it looks stuck meanwhile."""
+    t = T - 30.0
+    opening = command()
+    x = np.where((t > 6.0) & (t < 16.0), 0.9 + 0.01 * np.sin(t), np.where(t > 0.0, 0.75 * opening, opening))
+    (told,) = found(Side.ACTUATOR, np.where(t > 0.0, 0.2 * x, x) + noise(0.002), x)
+    assert told.mode is FaultMode.INEFFICIENT
+    assert told.start * DT < 30.5
+    assert told.stop * DT > 58.0
+    assert told.epsilon is not None
+    assert told.epsilon.low < 0.8 < told.epsilon.high

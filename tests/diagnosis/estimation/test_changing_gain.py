@@ -38,6 +38,14 @@ def test_a_share_that_falls_and_returns_is_a_loss_with_bounds_over_all_of_it() -
     assert sum(h.p for h in after.hypotheses) == pytest.approx(1.0)
 
 
+def test_it_begins_where_a_share_is_lost() -> None:
+    after = told(np.where(TIME > 8.0, 0.65, 1.02) * COMMAND)
+    assert after.mode is FaultMode.INEFFICIENT
+    assert 7.0 <= after.start * DT <= 8.5
+    assert after.epsilon is not None
+    assert after.epsilon.low < 0.35 < after.epsilon.high
+
+
 def test_beside_a_command_that_rests_an_offset_may_be_it_as_well() -> None:
     after = told(FADES * 0.4, np.full(SIZE, 0.4))
     assert {h.mode: h.p for h in after.hypotheses} == pytest.approx(

@@ -8,6 +8,7 @@ from typing import cast
 import numpy as np
 import pytest
 
+from diagnosis.estimation.lag import low_passed
 from diagnosis.results.assessment import Finding
 from diagnosis.results.result import Epsilon, Hypothesis
 from diagnosis.results.vocabulary import Tier
@@ -21,11 +22,17 @@ COMMAND = 0.5 * np.sin(np.arange(SIZE) * DT * 3.0)
 NOISE = 0.002 * np.random.default_rng(5).standard_normal(SIZE)
 
 
-def told(opening: np.ndarray, mode: FaultMode = FaultMode.STUCK, command: np.ndarray = COMMAND) -> SideFindings:
-    """What is left of a finding on the valve that says that it sticks, of an opening measured meanwhile."""
+def told(
+    opening: np.ndarray,
+    mode: FaultMode = FaultMode.STUCK,
+    command: np.ndarray = COMMAND,
+    healthy: np.ndarray | None = None,
+) -> SideFindings:
+    """What is left of a finding on the valve that says that it sticks, of an opening measured meanwhile; else `healthy`, or as told."""
+    before = command if healthy is None else healthy
     values = {
         "u": command,
-        "u_applied": np.where((np.arange(SIZE) >= SPAN[0]) & (np.arange(SIZE) < SPAN[1]), opening, command) + NOISE,
+        "u_applied": np.where((np.arange(SIZE) >= SPAN[0]) & (np.arange(SIZE) < SPAN[1]), opening, before) + NOISE,
     }
     inputs = SimpleNamespace(
         angle_redundant=False,
@@ -51,6 +58,15 @@ def test_a_valve_that_moves_as_told_is_what_its_opening_shows(gain: float, zero:
     assert finding.probability < 1.0
     assert finding.epsilon is not None
     assert finding.epsilon.low <= 1.0 - gain <= finding.epsilon.high
+
+
+def test_what_a_valve_is_late_by_is_no_part_of_what_it_is_off_by() -> None:
+    """Its command is so lively, and the valve so slow, that they hardly look alike."""
+    lively = 0.05 * np.sign(np.sin(np.arange(SIZE) * DT * 40.0)) + np.where(np.arange(SIZE) < SPAN[0], COMMAND, 0.03)
+    late = low_passed(lively, 0.05, DT)
+    (finding,) = told(0.1 + late, command=lively, healthy=late).findings
+    assert finding.mode is FaultMode.OUTSIDE_TABLE
+    assert "+10.0" in finding.evidence[0]
 
 
 def test_a_valve_that_does_as_told_is_left_open() -> None:
