@@ -185,7 +185,7 @@ def _hysteresis(isolated: Isolated, found: IdentifiedPair) -> bool:
     pair, run, seen = found.pair, isolated.run, isolated.seen
     if pair.side is not Side.ACTUATOR or not seen.use.any():
         return False
-    brief = (run.stop - run.start) * pair.dt < _RESTS_S
+    brief = np.count_nonzero(seen.use) * pair.dt < _RESTS_S
     both = np.maximum(np.abs(seen.y[seen.use]), np.abs(seen.x[seen.use]))
     rests = float(np.nanquantile(both, _MOSTLY)) < _MIDDLE * pair.span
     return rests or (brief and seen.deviation < _HYSTERESIS * pair.span)
