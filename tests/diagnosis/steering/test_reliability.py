@@ -61,6 +61,20 @@ def test_company_lowers_the_probability() -> None:
     assert {h.mode: h.p for h in first.hypotheses}["healthy"] == pytest.approx(1.0 - first.probability)
 
 
+def test_a_loss_of_a_valve_may_be_one_of_the_sensor() -> None:
+    (found,) = valves(finding(10.0, 30.0, FaultMode.INEFFICIENT)).findings
+    assert found.probability == pytest.approx(0.6)
+    told = {(h.side, h.mode): h.p for h in found.hypotheses}
+    assert told["sensor", "inefficient"] > 0.3
+    assert sum(told.values()) == pytest.approx(1.0)
+    (sensor,) = weighed(
+        {Side.SENSOR: SideFindings((replace(finding(10.0, 30.0, FaultMode.INEFFICIENT), side=Side.SENSOR),), ())},
+        LENGTH,
+        DT,
+    )[Side.SENSOR].findings
+    assert sensor.probability > 0.9
+
+
 def test_what_the_channel_itself_shows_is_left_alone() -> None:
     (found,) = valves(finding(10.0, 10.5, tier=Tier.SIGNAL)).findings
     assert found.probability == 0.98
