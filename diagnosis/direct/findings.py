@@ -182,10 +182,10 @@ def _unresolved(isolated: Isolated, found: IdentifiedPair) -> bool:
 
 def _hysteresis(isolated: Isolated, found: IdentifiedPair) -> bool:
     """Whether a valve rests about its middle where it is told to, or is off its command by no more than its hysteresis for a while."""
-    pair, run, seen = found.pair, isolated.run, isolated.seen
+    pair, seen = found.pair, isolated.seen
     if pair.side is not Side.ACTUATOR or not seen.use.any():
         return False
-    brief = np.count_nonzero(seen.use) * pair.dt < _RESTS_S
+    brief = int(np.count_nonzero(seen.use)) * pair.dt < _RESTS_S
     both = np.maximum(np.abs(seen.y[seen.use]), np.abs(seen.x[seen.use]))
     rests = float(np.nanquantile(both, _MOSTLY)) < _MIDDLE * pair.span
     return rests or (brief and seen.deviation < _HYSTERESIS * pair.span)

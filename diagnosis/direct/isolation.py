@@ -12,12 +12,11 @@ from diagnosis.direct.behind_play import gain_behind_play
 from diagnosis.direct.calm import calm_row
 from diagnosis.direct.fault_runs import inner
 from diagnosis.direct.identification import IdentifiedPair
+from diagnosis.direct.stated_row import not_silent, stated_row, with_lapses
 from diagnosis.estimation.fault_models import (
     HEALTHY,
     INEFFICIENT,
     NO_SIGNAL,
-    SCALED_ROWS,
-    STEADY_ROWS,
     STUCK,
     TOTAL_ROWS,
     VARYING_ROWS,
@@ -34,16 +33,11 @@ Array = NDArray[np.float64]
 #: ε̂, the saturation term and δ̂.
 Estimate = tuple[Epsilon | None, Sat | None, float]
 
-# From tuning missions, by `python tests/benchmarks/calibrate_direct.py`: share of findings that are not what they seem, and
-# the length at which half of those in a log too slow for its commands are.
-_LAPSE, _COARSE_S = 0.01, 1.7
 _BURST_S = 0.6  # at which half of the bursts of noise are what a motion leaves out: right were 12 of 48 below 1 s, 8 of 8 up to 3 s
 _WILD, _WILD_S, _WILD_SAMPLES = 10.0, 0.04, 4.0  # times the noise; motion that a wrong time may be off by
 _RESTLESS, _RESTLESS_P = 0.1, 0.8  # share of changing news from which a channel is not stuck, and how probably so
 _OF_PLAY = 0.3  # of its width per rms opening: standard deviation of the gain that a play leaves in simulated valves
 _CALM_P = 0.95  # that a steady row which leaves hardly anything is the fault's
-_CLEARLY = 2.0  # times as probable as the path's row, from which on another one is stated
-_MAJORITY = 0.5  # of the probability: a fault is called by it
 ZERO = 0.01  # of the span: as far apart may two healthy instruments have their zero
 _NEAR_MEAN = 0.25  # of its mean: standard deviation of a reference that hardly changes
 _NOTHING = 0.05  # of the span, root mean square: a channel that shows more is not silent, however rough its usual noise
@@ -183,7 +177,7 @@ def isolate(run: Run, found: IdentifiedPair, min_sat: float) -> Isolated | None:
     p = row_probabilities(evidence, model.side)
     seen = run_samples(run, found, min_sat)
     if seen.loud:
-        p = _not_silent(p, model.side)
+        p = not_silent(p, model.side)
     row = stated_row(run.row, p, zero=seen.zero, still=seen.still)
     if row != run.row:  # the path came by this one from its neighbours or for want of time to change
         other = estimate_run(replace(run, row=row), found)
@@ -193,7 +187,9 @@ def isolate(run: Run, found: IdentifiedPair, min_sat: float) -> Isolated | None:
         p[INEFFICIENT], p[run.row] = p[run.row], p[INEFFICIENT]
         run = replace(run, row=INEFFICIENT)
         estimate = _of_gain(delta, estimate_run(run, found)) or estimate
-    if run.row in VARYING_ROWS and (calm := _calm_row_of(seen, min_sat, ZERO * found.pair.span)) is not None:
+    restless = found.pair.side is Side.SENSOR and _changes(seen) > _RESTLESS
+    calm = _calm_row_of(seen, min_sat, ZERO * found.pair.span) if run.row in VARYING_ROWS else None
+    if calm is not None and not (calm == STUCK and restless):
         other = estimate_run(replace(run, row=calm), found)
         if other is not None:
             both = p[run.row] + p[calm]
@@ -201,7 +197,7 @@ def isolate(run: Run, found: IdentifiedPair, min_sat: float) -> Isolated | None:
             run, estimate = replace(run, row=calm), other
     gain = float(evidence[run.row] - evidence[HEALTHY])
     seconds = run.size * found.pair.dt
-    p = _with_lapses(p, run.row, model.side, seconds if found.coarse else None)
+    p = with_lapses(p, run.row, model.side, seconds if found.coarse else None)
     if run.row in VARYING_ROWS and not _wild(seen, found.pair.dt):
         burst = seconds**2 / (seconds**2 + _BURST_S**2)
         p[HEALTHY] += p[run.row] * (1.0 - burst)
@@ -213,7 +209,6 @@ def isolate(run: Run, found: IdentifiedPair, min_sat: float) -> Isolated | None:
         run = replace(run, row=NO_SIGNAL)
         p[NO_SIGNAL] += p[STUCK] + p[INEFFICIENT]
         p[[STUCK, INEFFICIENT]] = 0.0
-    restless = found.pair.side is Side.SENSOR and _changes(seen) > _RESTLESS
     if run.row == STUCK and seen.still and restless:
         # nothing moved, but the last digit did: a stuck channel does not do that
         other = estimate_run(replace(run, row=INEFFICIENT), found)
@@ -260,51 +255,3 @@ def _of_gain(delta: float, estimate: Estimate | None) -> Estimate | None:
 def _shifted_away(seen: RunSamples, delta: float, noise: float) -> bool:
     """Whether a gain beside a reference that hardly moves is no share of it."""
     return seen.still and abs(float(np.mean(seen.x[seen.use]))) > 3 * noise and not 0.0 <= delta <= 1.0
-
-
-def stated_row(row: int, p: Array, *, zero: bool, still: bool) -> int:
-    """The path's row of a run, or another fault's where that is clearly more probable, or has the majority.
-
-    Parameters
-    ----------
-    row : int
-        Row of the path.
-    p : Array, shape (rows,)
-        Probabilities of the rows.
-    zero, still : bool
-        Whether the channel stays at zero, and whether its reference hardly moves: some rows are alike then.
-    """
-    faults = [r for r in range(p.size) if r != HEALTHY]
-    best = max(faults, key=lambda r: float(p[r]))
-    constant = {*TOTAL_ROWS, *(SCALED_ROWS if row not in SCALED_ROWS else ())}
-    alike = (zero and {row, best} <= constant) or (still and {row, best} <= set(STEADY_ROWS))
-    other = p[best] > _CLEARLY * p[row] or p[best] > _MAJORITY
-    return best if other and not alike else row
-
-
-def _not_silent(p: Array, side: Side) -> Array:
-    """Probabilities of the rows, shape (rows,), of a channel that shows too much to have no signal: the other faults share that row's."""
-    others = [r for r in codes_of(side) if r not in (HEALTHY, NO_SIGNAL)]
-    out = p.copy()
-    out[others] += out[NO_SIGNAL] / len(others)
-    out[NO_SIGNAL] = 0.0
-    return out
-
-
-def _with_lapses(p: Array, row: int, side: Side, seconds: float | None) -> Array:
-    """Probabilities of the rows, lessened by how often a finding is not the fault that it seems, shape (rows,).
-
-    In a log too slow for its commands (`seconds` long; None elsewhere) most short findings are pieces of another fault,
-    so that what the row loses goes to the other faults of its side's table.
-    """
-    kept = 1.0 - _LAPSE
-    if seconds is not None:
-        kept *= seconds**2 / (seconds**2 + _COARSE_S**2)
-    out = p.copy()
-    others = [r for r in codes_of(side) if r not in (HEALTHY, row)]
-    share = 1.0 / len(others)
-    level = (float(p[others].max()) + share * float(p[row])) / max((1.0 + share) * float(p[row]), 1e-300)
-    kept = max(kept, min(level, 1.0))
-    out[others] += p[row] * (1.0 - kept) / len(others)
-    out[row] = p[row] * kept
-    return out

@@ -13,7 +13,7 @@ from numpy.testing import assert_array_equal
 from diagnosis.channels.sample_status import PAIR, SILENT, SKIP, sample_status
 from diagnosis.direct.assess import assess_pair
 from diagnosis.direct.inputs import Pair
-from diagnosis.direct.isolation import stated_row
+from diagnosis.direct.stated_row import stated_row
 from diagnosis.estimation.fault_models import HEALTHY, INEFFICIENT, NO_SIGNAL, NOISY, STUCK
 from diagnosis.results.assessment import CODE, Assessment, Finding
 from diagnosis.results.fault_rows import ROWS

@@ -149,3 +149,14 @@ def test_a_loss_beside_a_command_that_hardly_changes_goes_on() -> None:
     assert told.stop * DT > 58.0
     assert told.epsilon is not None
     assert told.epsilon.low < 0.8 < told.epsilon.high
+
+
+def test_a_reading_that_changes_all_the_time_is_not_stuck_however_little() -> None:
+    """A gain that fades while the wheel speeds up leaves the reading nearly where it is."""
+    t = T - 30.0
+    part = (t > 0.0) & (t < 3.0)
+    speed = np.where(part, 0.3 / (1.0 - 0.2 * np.clip(t, 0.0, 3.0)), command())
+    y = np.where(part, 0.3 + 0.02 * np.sin(2.0 * t), speed)
+    told = found(Side.SENSOR, y + noise(0.004), speed + noise(0.002, 2))
+    assert told
+    assert not [f for f in told if f.mode.total and f.probability > 0.5]

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from diagnosis.direct.findings import _unresolved
-from diagnosis.direct.isolation import _not_silent
+from diagnosis.direct.stated_row import not_silent
 from diagnosis.estimation.fault_models import HEALTHY, INEFFICIENT, NO_SIGNAL, NOISY
 from diagnosis.estimation.segments import Run
 from diagnosis.pipeline import diagnose_signals
@@ -24,9 +24,9 @@ from replay.simulation.structures import StructureOptions
 BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
 
 
-def test_a_channel_that_shows_something_is_not_silent() -> None:
+def test_a_channel_that_shows_something_isnot_silent() -> None:
     p = np.array([0.1, 0.1, 0.5, 0.1, 0.2])
-    out = _not_silent(p, Side.ACTUATOR)
+    out = not_silent(p, Side.ACTUATOR)
     assert out[NO_SIGNAL] == 0.0
     assert out[HEALTHY] == p[HEALTHY]
     assert out[NOISY] > p[NOISY]
