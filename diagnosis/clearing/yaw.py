@@ -1,4 +1,8 @@
-"""The yaw rate against that by the steering angles: an angle that is off its sensor's by an offset or a scale turns the machine."""
+"""The yaw rate against that by the steering angles: an angle that is off its sensor's by an offset or a scale turns the machine.
+
+Where no yaw rate is logged, wheels of both sides may tell it: they deny that an angle is right, and do not say that it is, for wheels
+that are held at their references slip instead.
+"""
 
 from __future__ import annotations
 
@@ -19,6 +23,9 @@ _FIXED = "fixed"  # axle of wheels that are not steered
 _STILL, _STILL_S = 0.01, 1.0  # m/s; at rest for this long, a gyro shows its bias
 _MOVING = 0.25  # of the top speed
 OFF, LASTING_OFF = 0.06, 0.04  # rad
+_OFF_BY_WHEELS = (
+    0.12  # rad, of windows: on straight ways wheels that slip differ for a moment, up to 0.09 on tuning machines
+)
 _STRAIGHT, _SHORTEST = 0.08, 0.1  # rad, m
 _LEAST_S = 6.0  # of driving straight, or of driving
 _OF_TURN = 0.15  # of a turn, by which its path may be off that by the angles
@@ -31,33 +38,27 @@ def yaw_checks(cells: Cells) -> Iterator[Checked]:
     In turns tyres and the wheels' offsets make the angles an approximation: by a share of the turn that counts for nothing. They are looked
     at where a mission has hardly any driving straight.
     """
-    straight, part = off_straight(cells), Side.SENSOR_OR_ACTUATOR
-    straight = _off_in_turns(cells) if straight is None else straight
-    if straight is None:
+    off = _off_angles(cells)
+    if off is None:
         return
-    windows, lasting = np.abs(cells.frame.mean(straight)), abs(float(np.nanmedian(straight)))
+    straight = off.straight_ways(cells)
+    looked_at = off.in_turns(cells) if straight is None else straight
+    if looked_at is None:
+        return
+    windows, lasting = np.abs(cells.frame.mean(looked_at)), abs(float(np.nanmedian(looked_at)))
+    told = bool(np.isfinite(windows).any()) and not (off.by_wheels and straight is None)  # in turns wheels slip
     for end in _ends(cells.machine).values():
         for axle in (name for name in end if name != _FIXED):  # one wheel's angle is a share of the mean of its end
-            if np.isfinite(windows).any():
-                yield worst(cells, (Kind.STEER, axle, part, Check.YAW), len(end) * windows, OFF)
-            yield lasts(cells, (Kind.STEER, axle, part, Check.LASTING_YAW), len(end) * lasting, LASTING_OFF)
+            about = (Kind.STEER, axle, Side.SENSOR_OR_ACTUATOR)
+            found = [worst(cells, (*about, Check.YAW), len(end) * windows, off.most)] if told else []
+            found.append(lasts(cells, (*about, Check.LASTING_YAW), len(end) * lasting, LASTING_OFF))
+            yield from (c for c in found if not (off.by_wheels and c.passed))
 
 
 def off_straight(cells: Cells) -> Array | None:
-    """By how much the path is off that by the angles [rad], NaN but where they point straight, shape (cells,); None for too little."""
+    """By how much the measured path is off that by the angles [rad], NaN but where they point straight, shape (cells,); None for too little."""
     off = _off_angles(cells)
-    if off is None:
-        return None
-    straight = np.where(off.straight, off.angle, np.nan)
-    return straight if np.count_nonzero(np.isfinite(straight)) * cells.dt >= _LEAST_S else None
-
-
-def _off_in_turns(cells: Cells) -> Array | None:
-    """The same wherever the machine moves, less what a turn may put in, shape (cells,); None for too little."""
-    off = _off_angles(cells)
-    if off is None or np.count_nonzero(np.isfinite(off.angle)) * cells.dt < _LEAST_S:
-        return None
-    return np.asarray(np.sign(off.angle) * np.maximum(np.abs(off.angle) - _OF_TURN * np.abs(off.turn), 0.0))
+    return None if off is None or off.by_wheels else off.straight_ways(cells)
 
 
 def _ends(machine: Machine) -> dict[float, list[str]]:
@@ -70,22 +71,71 @@ def _ends(machine: Machine) -> dict[float, list[str]]:
     return ends
 
 
+def yaw_by_wheels(cells: Cells) -> Array:
+    """Yaw rate that the wheels' speeds have at the end of the machine where they differ less [rad/s], NaN where none has two sides, shape (cells,).
+
+    A wheel that reads another speed than it has is at one end alone, and the machine turns at both.
+    """
+    geometry, speeds = cells.machine.geometry, dict(zip(cells.machine.wheels, cells.wheels("v").T, strict=True))
+    rates = []
+    for end in _ends(cells.machine).values():
+        placed = [(geometry.wheels[w].y, v) for w, v in speeds.items() if geometry and geometry.wheels[w].axle in end]
+        left, right = ([(y, v) for y, v in placed if side * y > _SHORTEST] for side in (1.0, -1.0))
+        if left and right:
+            (y, v), (z, u) = ([np.mean(x, axis=0) for x in zip(*of, strict=True)] for of in (left, right))
+            rates.append((u - v) / (y - z))
+    if len(rates) < 2:
+        return np.full(cells.size, np.nan)
+    both = np.column_stack(rates)
+    return np.asarray(np.take_along_axis(both, np.abs(both).argmin(axis=1)[:, np.newaxis], axis=1)[:, 0])
+
+
 class _Off(NamedTuple):
-    """By how much the path is off that by the angles, as an angle of one axle [rad], their turn likewise, and where they point straight, shape (cells,)."""
+    """By how much the path is off that by the angles.
+
+    Attributes
+    ----------
+    angle, turn : Array, shape (cells,)
+        As an angle of one axle, and the turn by the angles likewise [rad].
+    straight : NDArray[np.bool_], shape (cells,)
+        Where these point straight.
+    by_wheels : bool
+        Whether the wheels tell the yaw rate.
+    """
 
     angle: Array
     turn: Array
     straight: NDArray[np.bool_]
+    by_wheels: bool
+
+    @property
+    def most(self) -> float:
+        """Limit in a window [rad]."""
+        return _OFF_BY_WHEELS if self.by_wheels else OFF
+
+    def straight_ways(self, cells: Cells) -> Array | None:
+        """The angle, NaN but on straight ways, shape (cells,); None for too little."""
+        straight = np.where(self.straight, self.angle, np.nan)
+        return straight if np.count_nonzero(np.isfinite(straight)) * cells.dt >= _LEAST_S else None
+
+    def in_turns(self, cells: Cells) -> Array | None:
+        """The same wherever the machine moves, less what a turn may put in, shape (cells,); None for too little."""
+        if np.count_nonzero(np.isfinite(self.angle)) * cells.dt < _LEAST_S:
+            return None
+        return np.asarray(np.sign(self.angle) * np.maximum(np.abs(self.angle) - _OF_TURN * np.abs(self.turn), 0.0))
 
 
 def _off_angles(cells: Cells) -> _Off | None:
     """How far the machine is off where its angles point; NaN where it is too slow. None without yaw rate, or an axle's angle."""
     geometry, axles = cells.machine.geometry, cells.machine.axles
-    yaw = cells.means("imu.yaw_rate")
-    if geometry is None or not np.isfinite(yaw).any():
+    if geometry is None:
         return None
     ends = _ends(cells.machine)
-    if not axles or len(ends) != 2:
+    yaw = cells.means("imu.yaw_rate")
+    by_wheels = not np.isfinite(yaw).any()
+    if by_wheels:
+        yaw = yaw_by_wheels(cells)
+    if not axles or len(ends) != 2 or not np.isfinite(yaw).any():
         return None
     (first, one), (last, other) = ends.items()
     length, angles, speeds = first - last, cells.axles("phi"), cells.wheels("v")
@@ -101,4 +151,4 @@ def _off_angles(cells: Cells) -> _Off | None:
     turn = np.tan(angle[:, 0]) - np.tan(angle[:, 1])
     with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
         off = np.where(moving, (yaw - bias) / speed * length - turn, np.nan)
-    return _Off(off, turn, np.abs(turn) < _STRAIGHT)
+    return _Off(off, turn, np.abs(turn) < _STRAIGHT, by_wheels)

@@ -115,7 +115,21 @@ def test_an_angle_that_is_off_turns_the_machine() -> None:
     assert healthy.passed
     assert not off.passed
     assert "° off its measured angle" in off.text
-    assert key not in checks_by_part(driven[0], base=True)
+
+
+def test_without_a_yaw_rate_wheels_that_turn_with_the_machine_tell_that_an_angle_is_off() -> None:
+    mission = simulated()
+    left = {w: mission.columns[f"wheel.{w}.v"] for w in ("FL", "RL")}
+    straight = np.abs(mission.columns["steer.front.phi"] - mission.columns["steer.rear.phi"]) < 0.08
+
+    def found(slower: tuple[str, ...], by: float) -> set[Check]:
+        turned = {f"wheel.{w}.v": np.where(straight, by * left[w], left[w]) for w in slower}
+        changed = checks_by_part(replace(mission, columns={**mission.columns, **turned}), base=True)
+        return {check for axle, _, check in changed if axle == "rear"} & {Check.YAW, Check.LASTING_YAW}
+
+    assert found((), 1.0) == set()
+    assert found(("FL", "RL"), 0.9) == {Check.YAW, Check.LASTING_YAW}
+    assert found(("FL",), 0.7) == set()  # one wheel is read wrongly: at the other end both sides are alike
 
 
 def test_an_angle_that_is_off_turns_a_machine_that_never_drives_straight(monkeypatch: pytest.MonkeyPatch) -> None:
