@@ -27,6 +27,7 @@ _BRIDGE_S, _APART_S = 5.0, 30.0
 _BRIEF_S = 0.1
 _NEAR = 20  # samples between runs that follow each other
 _ONE_GAIN = 0.1  # by which gains of one fault may differ
+_NEAR_MEAN = 0.25  # of its mean: standard deviation of a reference that hardly changes
 _ABOUT = 0.05  # of what a gain leaves: as near to it a channel may rest
 _ZERO = 3.0  # times the noise: no reading
 _PLAYS = 3.0  # by which a command must move for a valve with a loss of gain to follow
@@ -101,12 +102,21 @@ def _resting(runs: list[Run], samples: Samples, model: ModeModel, play: float) -
             other, reference, _ = _pairs(near, samples, model)
             power = float(reference @ reference)
             delta = float(reference @ other) / power if power > 0.0 else 0.0
-            share, left = delta * float(x.mean()), min(1.0, abs(delta)) * float(np.std(x))
-            rests = left <= 2 * noise or float(np.ptp(x)) <= _PLAYS * play
+            share = delta * float(x.mean())
+            rests = motion_left(x, delta) <= 2 * noise or float(np.ptp(x)) <= _PLAYS * play
             if rests and abs(float(y.mean()) - share) < max(noise, play, _ABOUT * abs(share)):
                 out[i] = Run(run.start, run.stop, near.row)
                 break
     return out
+
+
+def motion_left(x: Array, share: float) -> float:
+    """Standard deviation of a reference, shape (n,); of one that stays near its mean, what a share of it leaves [unit of x].
+
+    What goes the other way is no share.
+    """
+    moves = float(np.std(x))
+    return moves * min(1.0, share) if share >= 0.0 and moves < _NEAR_MEAN * abs(float(np.mean(x))) else moves
 
 
 def _beside(runs: list[Run]) -> list[Run]:

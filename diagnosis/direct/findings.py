@@ -37,7 +37,7 @@ _SETTLED_LAGS = 5.0  # after a fault a channel returns with its lag
 _CLEAR = 3.0  # times the noise
 _HYSTERESIS, _RESTS_S = 0.025, 10.0  # of the span, off a healthy valve's command, for no longer than this
 _MIDDLE, _MOSTLY = 0.04, 0.98  # of the span: about its middle a valve opens nothing; of the time
-_OPEN_S, _DOUBT, _FAR_OFF = 0.5, 0.05, 0.2  # s; probability of a healthy channel; of the span
+_OPEN_S, _DOUBT, _FAR_OFF = 0.5, 0.05, 0.2  # s; probability that counts for nothing; of the span
 _GROWTH_S = 0.1  # a shorter time of growth is not worth a sentence
 
 
@@ -152,7 +152,8 @@ def finding_of(run: Run, found: IdentifiedPair, limits: Limits) -> Finding | Non
             p[STUCK] = p[INEFFICIENT] = (p[STUCK] + p[INEFFICIENT]) / 2
         if run.row == STUCK:
             epsilon = Epsilon(1.0, 1.0 - share, 1.0)  # all, if it is stuck; else what is not left
-        lines += (alike_sentence(found),)
+        if p[STUCK] > _DOUBT:
+            lines += (alike_sentence(found),)
     shift = max(0, round(found.lag)) if pair.side is Side.ACTUATOR else 0
     named = {run.row: mode.value}  # a gain beyond the table has the probability of the row that it was found by
     noisy = [Hypothesis(pair.side.value, ROWS[run.row].value, within * float(p[run.row]))] if outside else []

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from diagnosis.channels.sample_status import BLIND, PAIR
 from diagnosis.direct.behind_play import gain_behind_play
 from diagnosis.direct.calm import calm_row
-from diagnosis.direct.fault_runs import inner
+from diagnosis.direct.fault_runs import inner, motion_left
 from diagnosis.direct.identification import IdentifiedPair
 from diagnosis.direct.stated_row import not_silent, stated_row, with_lapses
 from diagnosis.estimation.fault_models import (
@@ -39,7 +39,6 @@ _RESTLESS, _RESTLESS_P = 0.1, 0.8  # share of changing news from which a channel
 _OF_PLAY = 0.3  # of its width per rms opening: standard deviation of the gain that a play leaves in simulated valves
 _CALM_P = 0.95  # that a steady row which leaves hardly anything is the fault's
 ZERO = 0.01  # of the span: as far apart may two healthy instruments have their zero
-_NEAR_MEAN = 0.25  # of its mean: standard deviation of a reference that hardly changes
 _NOTHING = 0.05  # of the span, root mean square: a channel that shows more is not silent, however rough its usual noise
 
 
@@ -121,11 +120,9 @@ def run_samples(run: Run, found: IdentifiedPair, min_sat: float = 0.0) -> RunSam
 
 
 def _hardly_moves(y: Array, x: Array, least: float, play: float) -> bool:
-    """Whether a reference moves within a play or by less than `least`; of one that stays near its mean, what a share leaves of the motion counts."""
-    moves, size = float(np.std(x)), abs(float(np.mean(x)))
-    if moves < _NEAR_MEAN * size:
-        moves *= min(1.0, abs(float(x @ y)) / float(x @ x))
-    return moves < least or float(np.ptp(x)) < play
+    """Whether a reference, or the share of it that y is, moves by less than `least`, or the reference within a play."""
+    power = float(x @ x)
+    return motion_left(x, float(x @ y) / power if power > 0.0 else 1.0) < least or float(np.ptp(x)) < play
 
 
 def estimate_run(run: Run, found: IdentifiedPair) -> Estimate | None:
