@@ -177,7 +177,7 @@ def machine_picture(report: ReportDocument) -> Markup:
         else:
             parts.append(_axle(a, 100 + 172 * (extra % 2), bottom + 40 + 48 * (extra // 2), c))
             extra += 1
-    height = bottom + 20 + (48 * ((extra + 1) // 2) + 4 if extra else 0)
+    height = bottom + 30 + (48 * ((extra + 1) // 2) + 4 if extra else 0)
     note = "front at the top" if placed else f"positions not known, {words.parts} in their listed order"
     return Markup(
         '<svg class="machine" viewBox="{x:.0f} 0 {w:.0f} {h:.0f}" role="group" aria-label="{m}, {n}">{p}</svg>'
