@@ -22,6 +22,7 @@ from tests.word_slips import slips
 
 _TOTAL = ("stuck", "no_signal")
 _AT_RISK = 0.75
+_HALF = 0.5  # of ε, from which on a part alone keeps a machine from being cleared
 _LOST = 0.9
 _SPARE_S = 0.05
 
@@ -229,6 +230,9 @@ def _urgency(fault: Mapping[str, Any], report: Mapping[str, Any]) -> Iterator[st
         yield f"cleared although it is stuck or silent with {total:.2f}"
     if "no reason to stop" in fault["advice"] and total >= 1.0 - _AT_RISK:
         yield f"no reason to stop although it is stuck or silent with {total:.2f}"
+    halved = size is not None and size["high"] >= _HALF and fault["mode"] in ("inefficient", "noisy")
+    if "no reason to stop" in fault["advice"] and halved:
+        yield f"no reason to stop although ε̂ may be {size['high']:.2f}, which keeps the machine from being cleared"
     if not high and risk >= _AT_RISK and sure and not brief:
         yield f"stuck, silent or lost is {risk:.2f} probable, and its severity is {fault['severity']}"
 

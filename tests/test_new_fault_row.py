@@ -81,7 +81,7 @@ fault = {"kind": "wheel", "component": "FR", "side": "sensor", "mode": "drifting
 fault |= {"hypotheses": []}
 assert fault_title(fault, HYDRAULIC) == "FR speed sensor drifting, 0.25 m/s r.m.s."
 assert fault_title(fault | {"sat": None}, HYDRAULIC) == "FR speed sensor drifting"
-assert "no reason to stop" in severity_of(finding(Side.SENSOR, drifting, epsilon=0.5), 60.0, LIMITS, HYDRAULIC)[1]
+assert "no reason to stop" in severity_of(finding(Side.SENSOR, drifting, epsilon=0.4), 60.0, LIMITS, HYDRAULIC)[1]
 assert check_of(Kind.WHEEL, "FR", Side.SENSOR, drifting, HYDRAULIC)
 assert parse_fault("FR sensor drifting 30 60").sat_tau_s == 60.0
 try:

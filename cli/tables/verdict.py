@@ -22,6 +22,7 @@ from diagnosis.results.document import PAPER_DEFAULTS, ActionRow, IntervalRow, M
 from diagnosis.results.fault_rows import mode_words
 from diagnosis.results.machine_words import MachineWords, words_of
 from diagnosis.results.size_rows import EpsilonRow, SatRow
+from diagnosis.results.vocabulary import Severity
 from replay.machine.quantities import OPENING
 
 _SHOWN, _FAULTS_NAMED, _ENDLESS = 40, 6, 10_000
@@ -46,7 +47,9 @@ def verdict_parts(report: ReportDocument) -> list[RenderableType]:
     if verdict["actions"]:
         parts += [section("What to do"), _actions(verdict["actions"], report)]
     if report["intervals"]:
-        parts += [section("Faults"), _faults(report["intervals"], words)]
+        remarks = sum(f["severity"] == Severity.INFO for f in report["intervals"])
+        also = f", and {remarks} remark{'s' * (remarks > 1)} (severity info)" if remarks else ""
+        parts += [section(f"Faults{also}"), _faults(report["intervals"], words)]
         rest = len(report["intervals"]) - _SHOWN
         if rest > 0:
             parts.append(text(f"… and {rest} more in the report", "dim"))
@@ -132,7 +135,7 @@ class _Fitting:
 
 def _faults(intervals: Sequence[IntervalRow], words: MachineWords) -> _Fitting:
     """Table of faults; on a narrow terminal without the saturation, on a narrower one without the bounds of ε."""
-    heads = ("", "part", "fault", "time [s]", "ε", "saturation", "p", "severity")
+    heads = ("", "part", "fault", "time [s]", "ε", "saturation", "P(kind)", "severity")
     forms = []
     for left_out, bounds in (((), True), ((_SATURATION,), True), ((_SATURATION,), False)):
         keep = [k for k in range(len(heads)) if k not in left_out]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
 
@@ -127,16 +127,17 @@ def plan(missions: Iterable[MissionSource], options: AuditOptions) -> list[Plann
 
 
 def machine_notes(missions: Iterable[MissionSource], options: AuditOptions) -> tuple[str, ...]:
-    """What the given machine file overrides, one sentence each: machine files beside logs, and folders that are one machine by its id.
+    """What machine files bring about, one sentence each: those that the given one overrides, and folders that an id makes one machine.
 
     Raises
     ------
     ConfigError
         Where the machine file is wrong.
     """
+    missions = list(missions)
     if options.machine is None:
-        return ()
-    missions, notes = list(missions), []
+        return () if options.machine_id else _made_one(missions)
+    notes = []
     own = [
         m.machine_file
         for m in missions
@@ -152,14 +153,32 @@ def machine_notes(missions: Iterable[MissionSource], options: AuditOptions) -> t
             f"-m {options.machine} counts also for {logs} another machine file beside them: {_few(own)}; without -m each "
             "mission has its own, and a machine.toml in the topmost folder stands for the rest"
         )
-    name = "" if options.machine_id else machine_at(str(options.machine)).id
-    folders = [fallback_id(m) for m in missions if not m.machine_id] if name else []
-    if len(set(folders)) > 1:
-        notes.append(
-            f"{options.machine}: its id {name!r} makes one machine of the logs of {len(set(folders))} folders ({_few(folders)}), "
-            "unless the logs name their own; leave the id out where each folder is a machine"
-        )
-    return tuple(notes)
+    given = [replace(m, machine_file=str(options.machine)) for m in missions]
+    return (*notes, *(() if options.machine_id else _made_one(given)))
+
+
+def _made_one(missions: Sequence[MissionSource]) -> tuple[str, ...]:
+    """Ids of machine files that make one machine of several folders, a sentence each; a file that is wrong costs its own missions alone."""
+    files: dict[str, list[str]] = {}
+    folders: dict[str, list[str]] = {}
+    ids: dict[str, str] = {}
+    for m in missions:
+        if m.machine_file is None or m.machine_id:
+            continue
+        if m.machine_file not in ids:
+            try:
+                ids[m.machine_file] = machine_at(m.machine_file).id
+            except ConfigError:
+                ids[m.machine_file] = ""
+        if name := ids[m.machine_file]:
+            files.setdefault(name, []).append(m.machine_file)
+            folders.setdefault(name, []).append(fallback_id(m))
+    return tuple(
+        f"{_few(files[name])}: the id {name!r} makes one machine of the logs of {len(set(own))} folders ({_few(own)}), "
+        "unless the logs name their own; leave the id out, or give each its own, where each folder is a machine"
+        for name, own in folders.items()
+        if len(set(own)) > 1
+    )
 
 
 def _same_file(one: str, other: Path) -> bool:

@@ -7,8 +7,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from diagnosis.decision.severity import halved_words, unanswered
 from diagnosis.decision.short import main_reason, main_state, short_parts, unjudged_axles
-from diagnosis.decision.wording import count_words, join_words, unanswered
+from diagnosis.decision.wording import count_words, join_words
 from diagnosis.results.assessment import Assessment
 from diagnosis.results.clearing import Checked
 from diagnosis.results.detectability import Detectable, Deviation
@@ -26,10 +27,8 @@ from replay.signals.timeline import Timeline
 Part = tuple[str, str]
 
 _OPEN_S, _OPEN_SHARE = 1.0, 0.02  # driving that was not judged and is worth a word
-_HALF = 0.5  # of ε: a part that may have lost so much is no fault to drive on with
 _REASONS = 2  # that the heading names; all of them stand below it
 _EMPTY_S = 1.0  # without any wheel speed
-_NEVER = "at no size"
 _TOLD_S = 10.0  # length of the losses that are told
 
 
@@ -104,12 +103,10 @@ def by_model(assessments: Mapping[Part, Assessment], shown: Sequence[Detectable]
             for r in shown
             if (r.component, r.side.value) in judged and (r.kind, r.side, r.deviation, r.for_s) == about
         ]
-        said += [f"of a {name} {_from_size([r.size for r in rows])}"] if rows else []
+        said += [_from_size(name, [r.size for r in rows])] if rows else []
         sizes_known |= any(r.size for r in rows)
     sizes = (
-        f"A loss in one of them that lasts ten seconds shows in 95 of 100 places where it may begin: {join_words(said)}. "
-        if said
-        else ""
+        f"Wherever in 95 of 100 places a loss of ten seconds may begin, it shows {'; '.join(said)}. " if said else ""
     )
     if said and not sizes_known:
         sizes = "A loss in one of them that lasts only ten seconds need not show, however large. "
@@ -122,22 +119,21 @@ def by_model(assessments: Mapping[Part, Assessment], shown: Sequence[Detectable]
     )
 
 
-def _from_size(sizes: Sequence[float | None]) -> str:
+def _from_size(name: str, sizes: Sequence[float | None]) -> str:
     """From which size on a loss shows of parts of one kind."""
     known = sorted(x for x in sizes if x)
     if not known:
-        return _NEVER
+        return f"on no {name}, however large"
     span = dict.fromkeys(f"{100 * x:.0f}" for x in (known[0], known[-1]))
-    none = f", on {len(sizes) - len(known)} of {len(sizes)} {_NEVER}" if len(known) < len(sizes) else ""
-    return f"from {' to '.join(span)} %{' (by part)' if len(span) > 1 else ''}{none}"
+    size = f"from {' to '.join(span)} % on{' (by part)' if len(span) > 1 else ''}"
+    if len(known) == len(sizes):
+        return f"on every {name} {size}"
+    return f"on {len(known)} of {len(sizes)} {name}s {size}, on the other{'s' if len(sizes) - len(known) > 1 else ''} however large not"
 
 
 def doubt_of(watch: Sequence[FaultInterval], against: Reservations) -> str:
     """Why a mission with faults to watch is not cleared; empty where it is."""
-    out = [
-        f"the {against.words.part_words(f.kind, f.component, f.side)} may not answer" for f in watch if unanswered(f)
-    ]
-    out += [f"the {halved_words(f, against.words)}" for f in watch if is_halved(f)]
+    out = [doubt for _, doubt in sorted(doubts_of(watch, against.words), key=lambda d: not unanswered(d[0]))]
     out = list(dict.fromkeys(out))
     if against.damage:
         out.append("part of the log was left out" if is_left_out(against.damage[0]) else "the log is damaged")
@@ -153,34 +149,28 @@ def doubt_of(watch: Sequence[FaultInterval], against: Reservations) -> str:
     out += dict.fromkeys(event.doubt for event in against.events)
     if against.open:
         out.append(open_words(against.open))
-    rest = len(out) - _REASONS
-    return join_words([*out[:_REASONS], *([count_words(rest, "more reason")] if rest > 0 else [])])
+    return join_words([*out[:_REASONS], *(["more"] if len(out) > _REASONS else [])])
 
 
-def is_halved(fault: FaultInterval) -> bool:
-    """Whether a part that is to be watched may have lost half or more, by the upper bound of ε̂."""
-    if fault.severity not in (Severity.MEDIUM, Severity.LOW) or fault.epsilon is None:
-        return False
-    return (fault.mode.scaled or fault.mode.varying) and fault.epsilon.high >= _HALF
+def doubts_of(faults: Sequence[FaultInterval], words: MachineWords) -> list[tuple[FaultInterval, str]]:
+    """Faults to watch that alone keep a machine from being cleared, each with why: one reason for each fault, in their order."""
+    return [
+        (f, f"the {words.part_words(f.kind, f.component, f.side)} {why}")
+        for f in faults
+        if f.severity in (Severity.MEDIUM, Severity.LOW)
+        and (why := "may not answer" if unanswered(f) else halved_words(f.side, f.mode, f.epsilon))
+    ]
 
 
-def halved_words(fault: FaultInterval, words: MachineWords) -> str:
-    """That it may have lost so much, to follow *the*."""
-    assert fault.epsilon is not None
-    return (
-        f"{words.part_words(fault.kind, fault.component, fault.side)} may have lost {round(100 * fault.epsilon.high)} %"
-    )
+def furthest_first(checks: Sequence[Checked]) -> list[Checked]:
+    """Checks that deviate, the furthest beyond its limit first, then those that the mission does not show."""
+    return sorted(checks, key=lambda c: -1.0 if c.worst is None else c.worst / c.limit, reverse=True)
 
 
 def open_words(checks: Sequence[Checked]) -> str:
-    """Why checks clear nothing, by the one that is furthest beyond its limit and the number of others."""
-    most = max(checks, key=lambda c: np.inf if c.worst is None else c.worst / c.limit)
-    others = len({(c.component, c.check) for c in checks}) - 1
-    return most.text + (
-        f", and {count_words(others, 'more check')} of the all-clear {'is' if others == 1 else 'are'} open"
-        if others
-        else ""
-    )
+    """Why checks clear nothing, by the one that is furthest beyond its limit; the list below the verdict has the others."""
+    others = len({(c.component, c.check) for c in checks}) > 1
+    return furthest_first(checks)[0].text + ("; other checks of the all-clear are open, too" if others else "")
 
 
 def caveats_of(

@@ -29,7 +29,8 @@ def intervals_of(
     found: dict[tuple[str, str, int, int], FaultInterval] = {}
     for (component, _), assessment in assessments.items():
         kind = Kind.STEER if component in machine.axles else Kind.WHEEL
-        for f in assessment.findings:
+        for own in assessment.findings:
+            f = replace(own, epsilon=_bounded(own, kind))
             seconds = (f.stop - f.start) * step_ns * 1e-9
             severity, advice = severity_of(f, seconds, machine.limits, words, kind)
             found[component, f.side, f.start, f.stop] = FaultInterval(
@@ -42,7 +43,7 @@ def intervals_of(
                 stop_s=f.stop * step_ns * 1e-9,
                 start_ns=start_ns + f.start * step_ns,
                 stop_ns=start_ns + f.stop * step_ns,
-                epsilon=_bounded(f, kind),
+                epsilon=f.epsilon,
                 sat=f.sat,
                 probability=f.probability,
                 hypotheses=f.hypotheses,

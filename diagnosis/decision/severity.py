@@ -17,7 +17,7 @@ from collections.abc import Container
 
 from diagnosis.results.assessment import Finding
 from diagnosis.results.machine_words import MachineWords
-from diagnosis.results.result import FaultInterval
+from diagnosis.results.result import Epsilon, FaultInterval
 from diagnosis.results.vocabulary import Kind, Severity, Tier
 from replay.faults import TOTAL, FaultMode, Side
 from replay.machine.config import Limits
@@ -29,7 +29,8 @@ _CERTAIN = 0.99  # probability of any fault from which on even brief noise is wo
 _LOST = 0.9  # ε̂ from which on so little is left that the part is as good as without signal
 _EVEN = 0.5  # that a part delivers nothing usable, from which on that is what is said
 _PROBABLY_TOTAL = 0.75  # that the named side is stuck or without signal, from which on the machine is stopped, ...
-MAY_BE_TOTAL = 0.25  # ... and from which on it is looked at before the machine goes out
+_MAY_BE_TOTAL = 0.25  # ... and from which on it is looked at before the machine goes out
+_HALF = 0.5  # of ε: a part that may have lost so much is no fault to drive on with
 _PARTIAL = (FaultMode.INEFFICIENT, FaultMode.OUTSIDE_TABLE)  # rows of which ε̂ says how much is left
 
 
@@ -44,13 +45,16 @@ def severity_of(
     if brief and (finding.tier is Tier.MODEL or faulty < _CERTAIN):
         by = ", and shown by a model alone" if finding.tier is Tier.MODEL else ", and not certain"
         return Severity.INFO, f"Too short to act on{by}. Compare with the next mission."
-    total = finding.mode.total or risk_of(finding) >= MAY_BE_TOTAL
+    total = finding.mode.total or risk_of(finding) >= _MAY_BE_TOTAL
+    halved = halved_words(finding.side, finding.mode, finding.epsilon)
     if faulty < limits.min_probability:
         if total and finding.side is not Side.SENSOR:
             what = (
                 "Probably a {valve} that does not answer" if risk_of(finding) >= _EVEN else "The {valve} may not answer"
             )
             return Severity.MEDIUM, words.fill(f"{what}: check it before the machine goes out again.")
+        if halved:
+            return Severity.LOW, f"Probable, not certain; but it {halved}: check it before the machine goes out again."
         return Severity.LOW, "Probable, not certain: check it at the next service, and compare with the next mission."
     if total:
         return _severity_of_total(finding, seconds, limits, words, kind)
@@ -60,7 +64,10 @@ def severity_of(
             Severity.MEDIUM,
             "Check scaling and sign of the channel: no fault of the tables gives such a gain.",
         )
-    return Severity.MEDIUM if marked else Severity.LOW, "This alone is no reason to stop; check it before it grows."
+    severity = Severity.MEDIUM if marked else Severity.LOW
+    if halved:
+        return severity, f"It {halved}: check it before the machine goes out again."
+    return severity, "This alone is no reason to stop; check it before it grows."
 
 
 def _severity_of_total(
@@ -99,6 +106,21 @@ def _severity_of_total(
     return Severity.HIGH, (
         f"Stop and repair the sensor: it delivered nothing usable for more than {limits.brief:g} s (Assumption 1)."
     )
+
+
+def halved_words(side: Side, mode: FaultMode, epsilon: Epsilon | None) -> str:
+    """That a part may have lost half or more, by the upper bound of ε̂, or that so much of what it gives may be noise; else empty."""
+    if epsilon is None or epsilon.high < _HALF:
+        return ""
+    if mode.varying:
+        return "may give more noise than signal" if side is Side.SENSOR else "may follow noise more than its command"
+    return f"may have lost {round(100 * epsilon.high)} %" if mode.scaled else ""
+
+
+def unanswered(fault: FaultInterval) -> bool:
+    """Whether a drive may not answer, though that is not certain enough to stop for."""
+    may_be = fault.mode.total or risk_of(fault) >= _MAY_BE_TOTAL
+    return fault.severity is Severity.MEDIUM and may_be and fault.side is not Side.SENSOR
 
 
 def risk_of(finding: Finding | FaultInterval) -> float:

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 
-import numpy as np
-
-from diagnosis.decision.caveats import Reservations, halved_words, is_halved
+from diagnosis.decision.caveats import Reservations, doubts_of, furthest_first
 from diagnosis.decision.short import Part, ToClear, short_parts, unjudged_axles
 from diagnosis.decision.wording import count_words, join_words
 from diagnosis.results.assessed import needed_s
@@ -103,11 +101,13 @@ def to_clear(
                 "diagnose the whole log, with every part (no --start, --end, --wheel)",
             )
         )
-    out += _of_halves(faults, words)
+    out += _of_doubts(faults, words)
     twice = {c for (c, side), a in assessments.items() if a.tier is Tier.DIRECT and side == Side.SENSOR}
     blamed = {k: f for k, c in enumerate(against.open) if (f := _meanwhile(c, faults)) is not None}
-    out += _of_faults([(against.open[k], f) for k, f in blamed.items()], words)
-    out += _of_checks([c for k, c in enumerate(against.open) if k not in blamed], twice)
+    deviating = _of_faults([(against.open[k], f) for k, f in blamed.items()], words)
+    deviating += _of_checks([c for k, c in enumerate(against.open) if k not in blamed], twice)
+    ranks = {check: k for k, check in enumerate(furthest_first(against.open))}
+    out += [point for _, point in sorted(deviating, key=lambda d: ranks[d[0]])]
     steered = [k for k in assessments if k[0] in axles]
     unjudged = [k for k in steered if assessments[k].tier is Tier.NONE]
     at_rest = {k for k, state in against.open_state.items() if state is State.NOT_EXCITED}  # exempt: its checks count
@@ -136,22 +136,26 @@ def _meanwhile(check: Checked, faults: Sequence[FaultInterval]) -> FaultInterval
     return max(counted, key=lambda f: (f.component == check.component, share[f.id]), default=None)
 
 
-def _of_halves(faults: Sequence[FaultInterval], words: MachineWords) -> list[ToClear]:
-    """Faults to watch of which half may be lost."""
+def _of_doubts(faults: Sequence[FaultInterval], words: MachineWords) -> list[ToClear]:
+    """Faults to watch that alone keep the machine from being cleared."""
     return [
         ToClear(
-            f"{f.id}: the {halved_words(f, words)}.",
+            f"{f.id}: {doubt}.",
             f"repair the {words.part_words(f.kind, f.component, f.side)} ({f.id}), then diagnose the next mission",
         )
-        for f in faults
-        if is_halved(f)
+        for f, doubt in doubts_of(faults, words)
     ]
 
 
-def _of_faults(blamed: Sequence[tuple[Checked, FaultInterval]], words: MachineWords) -> list[ToClear]:
-    """Checks that deviate while faults last, or just after, those of one fault together: of each component the furthest beyond its limit."""
+def _of_faults(blamed: Sequence[tuple[Checked, FaultInterval]], words: MachineWords) -> list[tuple[Checked, ToClear]]:
+    """Checks that deviate while faults last, or just after, those of one fault together: of each component the furthest beyond its limit.
+
+    Each with the furthest of its checks.
+    """
     by: dict[tuple[str, str], list[tuple[Checked, FaultInterval]]] = {}
-    for check, fault in sorted(blamed, key=lambda b: -(np.inf if b[0].worst is None else b[0].worst / b[0].limit)):
+    of = dict(blamed)
+    for check in furthest_first(list(of)):
+        fault = of[check]
         mine = by.setdefault((fault.id, _when(check, fault)), [])
         if all(check.component != c.component for c, _ in mine):
             mine.append((check, fault))
@@ -159,12 +163,11 @@ def _of_faults(blamed: Sequence[tuple[Checked, FaultInterval]], words: MachineWo
     for (name, when), mine in by.items():
         fault = mine[0][1]
         part = words.part_words(fault.kind, fault.component, fault.side)
-        out.append(
-            ToClear(
-                f"{when} {name}, which may explain it: {_some([check.text for check, _ in mine])}.",
-                f"repair the {part} ({name}), then diagnose the next mission",
-            )
+        point = ToClear(
+            f"{when} {name}, which may explain it: {_some([check.text for check, _ in mine])}.",
+            f"repair the {part} ({name}), then diagnose the next mission",
         )
+        out.append((mine[0][0], point))
     return out
 
 
@@ -176,15 +179,20 @@ def _when(check: Checked, fault: FaultInterval) -> str:
     return "At the time of" if during else "Just after"
 
 
-def _of_checks(checks: Sequence[Checked], twice: Collection[str]) -> list[ToClear]:
-    """Open checks, of each component that which is furthest beyond its limit; `twice`: components with a second speed in the log."""
-    worst: dict[str, list[Checked]] = {}
-    for c in sorted(checks, key=lambda c: -(np.inf if c.worst is None else c.worst / c.limit)):
-        worst.setdefault(c.component, []).append(c)
+def _of_checks(checks: Sequence[Checked], twice: Collection[str]) -> list[tuple[Checked, ToClear]]:
+    """Open checks, of each component that which is furthest beyond its limit; `twice`: components with a second speed in the log.
+
+    Each with the furthest of its checks.
+    """
+    worst: dict[str, Checked] = {}
+    for c in furthest_first(checks):
+        worst.setdefault(c.component, c)
     alike: dict[str, list[str]] = {}
-    for own in worst.values():
-        first = own[0]
-        texts = alike.setdefault(_act(first, twice), [])
+    leading: dict[str, Checked] = {}
+    for first in worst.values():
+        act = _act(first, twice)
+        leading.setdefault(act, first)
+        texts = alike.setdefault(act, [])
         if first.check is Check.LASTING_RATE and texts:
             continue  # one axle against the other: said of the one is said of both
         twin = next((k for k, t in enumerate(texts) if first.check in _TURNED and _same_but_name(t, first)), None)
@@ -193,7 +201,7 @@ def _of_checks(checks: Sequence[Checked], twice: Collection[str]) -> list[ToClea
         else:  # the yaw rate does not say which axle it is
             other = next(c.component for c in checks if c.text == texts[twin])
             texts[twin] = texts[twin].replace(f" {other} ", f" {other} or {first.component} ", 1)
-    return [ToClear(f"{_sentence(_some(texts))}.", act) for act, texts in alike.items()]
+    return [(leading[act], ToClear(f"{_sentence(_some(texts))}.", act)) for act, texts in alike.items()]
 
 
 def _same_but_name(text: str, check: Checked) -> bool:

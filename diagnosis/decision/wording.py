@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from diagnosis.decision.severity import MAY_BE_TOTAL, risk_of
+from diagnosis.decision.severity import halved_words, unanswered
 from diagnosis.results.candidates import UNCLEAR, candidates, unclear_words
 from diagnosis.results.document import ActionRow
 from diagnosis.results.fault_rows import mode_words
@@ -45,7 +45,7 @@ def _action(n: int, faults: Sequence[FaultInterval], words: MachineWords) -> Act
     """What to do about one part, with its faults worst first."""
     worst = faults[0]
     found = _course(faults)
-    lead = f"{_order(worst)} the {words.part_words(worst.kind, worst.component, worst.side)}"
+    lead = f"{_order(faults)} the {words.part_words(worst.kind, worst.component, worst.side)}"
     return {
         "n": n,
         "text": f"{lead}: {found}.",
@@ -56,19 +56,14 @@ def _action(n: int, faults: Sequence[FaultInterval], words: MachineWords) -> Act
     }
 
 
-def _order(worst: FaultInterval) -> str:
-    """What to do with a part, by its worst fault."""
+def _order(faults: Sequence[FaultInterval]) -> str:
+    """What to do with a part, by its worst fault; before it goes out where one of them alone keeps it from being cleared."""
+    worst = faults[0]
     if worst.severity is Severity.HIGH:
         return "Stop at once and repair" if worst.side is Side.ACTUATOR else "Stop and repair"
-    if unanswered(worst):
+    if unanswered(worst) or any(halved_words(f.side, f.mode, f.epsilon) for f in faults):
         return "Before the machine goes out, check"
     return "Check at the next service" if worst.mode.total else "Check"
-
-
-def unanswered(fault: FaultInterval) -> bool:
-    """Whether a drive may not answer, though that is not certain enough to stop for."""
-    may_be = fault.mode.total or risk_of(fault) >= MAY_BE_TOTAL
-    return fault.severity is Severity.MEDIUM and may_be and fault.side is not Side.SENSOR
 
 
 def _urgency(worst: FaultInterval) -> int:

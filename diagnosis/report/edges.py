@@ -193,8 +193,7 @@ def edge_words(edge: Edge, pair: Pair) -> str:
         else "from the course after it"
     )
     if edge.noise is not None and edge.most < _APART * edge.noise:
-        text = f"No sample of the {time_words(edge.reach)} {window} exceeds the noise: at most {pair.text(edge.most)} {off}"
-        text += _times(edge.most, edge)
+        text = f"No sample of the {time_words(edge.reach)} {window} stands out of the noise: at most {pair.text(edge.most)}{_times(edge.most, edge)} {off}"
     else:
         text = f"{which} faulty sample deviates by {pair.text(size)}{_times(size, edge)} {off}"
         if edge.most > 1.5 * size:

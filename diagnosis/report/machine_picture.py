@@ -125,15 +125,28 @@ def _short(words: str, length: int) -> str:
     return words if len(words) <= length else words[: length - 1] + "…"
 
 
-def machine_picture(report: ReportDocument) -> Markup:
-    """Picture of the machine for a report; wheels stand in a grid where the geometry is not known."""
+def open_axles(report: ReportDocument) -> list[str]:
+    """What keeps axles from being called healthy, in words: in the picture they have a symbol alone."""
+    found = _conditions(report)
+    return [found[a].title for a in report["machine"]["axles"] if found[a].state == State.NOT_ASSESSED]
+
+
+def _conditions(report: ReportDocument) -> dict[str, Condition]:
+    """What the picture says of every wheel and axle, by name."""
     machine, faults, judged = report["machine"], report["intervals"], judged_sides(report)
-    wheels, axles, geometry = machine["wheels"], machine["axles"], machine["geometry"] or {}
-    words = words_of(machine)
     enough = {
         key: "" if side.assessed else "not cleared" if side.long_enough else "judged too briefly"
         for key, side in sides_of(report).items()
     }
+    parts = ((Kind.WHEEL, machine["wheels"]), (Kind.STEER, machine["axles"]))
+    return {c: condition(c, kind, faults, judged, enough, words_of(machine)) for kind, names in parts for c in names}
+
+
+def machine_picture(report: ReportDocument) -> Markup:
+    """Picture of the machine for a report; wheels stand in a grid where the geometry is not known."""
+    machine = report["machine"]
+    wheels, axles, geometry = machine["wheels"], machine["axles"], machine["geometry"] or {}
+    words, conditions = words_of(machine), _conditions(report)
     rows = _rows(wheels, geometry)
     placed = bool(wheels) and all(w in geometry for w in wheels)
     top = 40.0 if placed else 26.0
@@ -153,20 +166,18 @@ def machine_picture(report: ReportDocument) -> Markup:
         y = top + i * _PITCH
         for j, w in enumerate(row):
             centre, outward = _column(j, len(row), wide)
-            parts.append(
-                _wheel(w, centre, y, outward, words.part, condition(w, Kind.WHEEL, faults, judged, enough, words))
-            )
+            parts.append(_wheel(w, centre, y, outward, words.part, conditions[w]))
             if placed:
                 axle_rows.setdefault(geometry[w]["axle"], y + _TYRE_H / 2)
     extra = 0
     for a in axles:
-        c = condition(a, Kind.STEER, faults, judged, enough, words)
+        c = conditions[a]
         if a in axle_rows and not a.endswith("_steer"):
             parts.append(_axle(a, 186, axle_rows[a], c))
         else:
             parts.append(_axle(a, 100 + 172 * (extra % 2), bottom + 40 + 48 * (extra // 2), c))
             extra += 1
-    height = bottom + 20 + (48 * ((extra + 1) // 2) + 4 if extra else 0)
+    height = bottom + 30 + (48 * ((extra + 1) // 2) + 4 if extra else 0)
     note = "front at the top" if placed else f"positions not known, {words.parts} in their listed order"
     return Markup(
         '<svg class="machine" viewBox="{x:.0f} 0 {w:.0f} {h:.0f}" role="group" aria-label="{m}, {n}">{p}</svg>'

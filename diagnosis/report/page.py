@@ -30,13 +30,13 @@ from diagnosis.report.compared_channels import pair_of
 from diagnosis.report.driven_path import driven_path
 from diagnosis.report.evidence import evidence_of
 from diagnosis.report.healthy_lanes import healthy_lanes
-from diagnosis.report.machine_picture import machine_picture
+from diagnosis.report.machine_picture import machine_picture, open_axles
 from diagnosis.report.path_picture import path_picture
 from diagnosis.report.plot_data import Axis, axis_of, blocks_of, channels_of, figures_of, packed_intervals, view, worst
 from diagnosis.report.plot_rows import loop_groups
 from diagnosis.report.previous import previous_section
 from diagnosis.report.rows import Columns, derived
-from diagnosis.report.shown import HEADS, shown_lanes, shown_parts
+from diagnosis.report.shown import HEADS, longer_is_harder, shown_lanes, shown_parts
 from diagnosis.report.thumbnail import thumbnail
 from diagnosis.report.timeline import timeline
 from diagnosis.results.document import IntervalRow, ReportDocument
@@ -160,6 +160,7 @@ def _pictures(
         "shown": {
             "parts": parts,
             "gaps": any(not cell for part in parts for cell in part.cells),
+            "longer": longer_is_harder(report),
             "lanes": shown_lanes(report, duration),
             "heads": HEADS,
         },
@@ -167,6 +168,7 @@ def _pictures(
         "duration": duration,
         "lane_details": healthy_lanes(report),
         "picture": machine_picture(report),
+        "picture_notes": open_axles(report),
         "path": Markup("")
         if path.x is None or path.y is None
         else path_picture(path.x, path.y, *series.place, detailed),

@@ -18,6 +18,7 @@ from diagnosis.report.plot_rows import fault_rows
 from diagnosis.report.rows import Columns, Group, Row, row_json
 from diagnosis.report.tables import machine_name
 from diagnosis.report.units import units_of
+from diagnosis.results.candidates import label_of
 from diagnosis.results.document import IntervalRow, MachineRow, ReportDocument
 from diagnosis.results.fault_rows import LOOKS, state_label
 from diagnosis.results.machine_words import words_of
@@ -180,7 +181,7 @@ def view(
             "component": f["component"],
             "side": f["side"],
             "p": round(f["probability"], 3),
-            "words": state_label(f["mode"], f["side"]).lower(),
+            "words": label_of(f).lower(),
             "severity": f["severity"],
             "title": labels.fault_title(f, words),
             "rows": place[id(figures[f["id"]])],

@@ -76,6 +76,8 @@ class Row:
         Stretches in which what the row shows cannot be known: first and last time [s].
     small : tuple[tuple[float, float], ...]
         Stretches in which the part deviates by less than counts as a fault and was called healthy [s].
+    untold : tuple[tuple[float, float], ...]
+        Stretches in which the part is most probably stuck or without signal, though no fault is stated [s].
     steps : bool
         Whether what it shows holds until it changes: drawn as steps.
     """
@@ -94,6 +96,7 @@ class Row:
     component: str = ""
     unknown: tuple[tuple[float, float], ...] = ()
     small: tuple[tuple[float, float], ...] = ()
+    untold: tuple[tuple[float, float], ...] = ()
     steps: bool = False
 
     def shown(self, columns: Columns) -> list[Row]:
@@ -178,6 +181,8 @@ def row_json(row: Row, index: Mapping[str, int]) -> dict[str, object]:
         data["unknown"] = [list(stretch) for stretch in row.unknown]
     if row.small:
         data["small"] = [list(stretch) for stretch in row.small]
+    if row.untold:
+        data["untold"] = [list(stretch) for stretch in row.untold]
     if row.steps:
         data["steps"] = True
     if row.component:

@@ -69,6 +69,22 @@ def cells_of(report: ReportDocument) -> dict[tuple[str, str], tuple[str, ...]]:
     return {key: _cells(rows) for key, rows in _by_part(report).items()}
 
 
+def longer_is_harder(report: ReportDocument) -> bool:
+    """Whether of some part a loss of ten seconds has to be larger than one of two seconds to be shown."""
+    sizes = [
+        [_needed(rows.get((Deviation.INEFFICIENT, length))) for length in (2.0, 10.0)]
+        for rows in _by_part(report).values()
+    ]
+    return any(short < longer for short, longer in sizes)
+
+
+def _needed(row: DetectabilityRow | None) -> float:
+    """Size from which on a loss shows [1]; infinite where none does, not a number where it was not asked."""
+    if row is None or not row["places"]:
+        return math.nan
+    return math.inf if row["size"] is None else row["size"]
+
+
 _Rows = Mapping[tuple[str, float | None], DetectabilityRow]
 
 

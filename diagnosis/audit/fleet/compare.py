@@ -157,6 +157,7 @@ def _change(
         "kind": f.kind,
         "side": f.side,
         "mode": f.mode,
+        "unclear": f.unclear,
         "severity": f.severity,
         "older": _standing(a),
         "newer": _standing(b),

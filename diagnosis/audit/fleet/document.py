@@ -26,6 +26,7 @@ from diagnosis.audit.fleet.runs import sides_of
 from diagnosis.audit.fleet.trend_types import Axis
 from diagnosis.audit.fleet.trends import PartTrend, trends_of, untold_losses
 from diagnosis.audit.store.outcome import ENDS, READ
+from diagnosis.results.candidates import UNCLEAR
 from diagnosis.results.vocabulary import Verdict
 from replay.version import __version__
 
@@ -205,7 +206,8 @@ def _machine(m: Machine, at: Mapping[str, int]) -> MachineRow:
 def _parts(m: Machine) -> list[PartRow]:
     modes: dict[tuple[str, str], Counter[str]] = {key: Counter() for key in m.parts}
     for run in m.runs:
-        for component, side, mode in {(f.component, s, f.mode) for f in run.faults for s in sides_of(f.side)}:
+        found = {(f.component, s, UNCLEAR if f.unclear else f.mode) for f in run.faults for s in sides_of(f.side)}
+        for component, side, mode in found:
             modes[component, side][mode] += 1
     return [_part(m, *key, modes[key]) for key in m.parts]
 

@@ -107,7 +107,7 @@ class FaultStandingRow(TypedDict):
 
 
 class FaultChangeRow(TypedDict):
-    """A fault in both audits: what became of it, names of what changed, and what is to be said of it."""
+    """A fault in both audits: what became of it, names of what changed, and what is to be said of it; `unclear` as in `FleetFaultRow`."""
 
     outcome: FaultChange
     machine: str
@@ -120,3 +120,4 @@ class FaultChangeRow(TypedDict):
     newer: FaultStandingRow | None
     changes: list[str]
     note: str
+    unclear: NotRequired[bool]

@@ -92,7 +92,7 @@ class CountsRow(TypedDict):
 
 
 class PartRow(TypedDict):
-    """One component and side of a machine: missions that assessed it, the last one among them, and missions by mode."""
+    """One component and side of a machine: missions that assessed it, the last one among them, and missions by mode, or by *faulty, kind unclear*."""
 
     component: str
     side: str

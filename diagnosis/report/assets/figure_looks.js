@@ -135,6 +135,7 @@ class FigureLooks {
     if (row.threshold !== undefined) entries.push([Figure.style("threshold"), "± threshold"]);
     if (row.unknown) entries.push([{ colour: "muted", sign: "▒▒" }, "not identifiable"]);
     if (row.small) entries.push([{ colour: "healthy", sign: "▒▒" }, "healthy: less than counts as a fault"]);
+    if (row.untold) entries.push([{ colour: "stuck", sign: "▒▒" }, "most probably stuck or silent, though no fault is stated"]);
     if (row.level !== undefined) entries.push([Figure.style("threshold"), `limit ${row.level}`]);
     const cut = this.heights(row, curves);
     if (row === this.rows[0] && this.shades.some((s) => s.main && s.detected != null)) entries.push([{ colour: "text", sign: "╎" }, "detected"]);
@@ -198,7 +199,7 @@ class FigureLooks {
   // Intervals of faults behind the panels that show their component, named in the first.
   shade(layout) {
     this.rows.forEach((row, i) => {
-      for (const [stretches, colour] of [[row.unknown, "muted"], [row.small, "healthy"]]) for (const [x0, x1] of stretches || []) layout.shapes.push({ type: "rect", xref: "x", yref: `y${i ? i + 1 : ""} domain`, x0, x1, y0: 0, y1: 1, fillcolor: Figure.colour(colour), opacity: 0.22, line: { width: 0 }, layer: "below" });
+      for (const [stretches, colour] of [[row.unknown, "muted"], [row.small, "healthy"], [row.untold, "stuck"]]) for (const [x0, x1] of stretches || []) layout.shapes.push({ type: "rect", xref: "x", yref: `y${i ? i + 1 : ""} domain`, x0, x1, y0: 0, y1: 1, fillcolor: Figure.colour(colour), opacity: 0.22, line: { width: 0 }, layer: "below" });
     });
     const stored = this.perRow(this.curves).map(Figure.stored), { t0, dt } = Data.view;
     for (const s of this.shades) {

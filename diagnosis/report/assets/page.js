@@ -80,7 +80,7 @@
 
   function robust() {
     Figure.robust = !Figure.robust;
-    for (const f of Object.values(figures)) { f?.release(); f?.redraw(); }
+    for (const f of Object.values(figures)) f?.redraw(); // what is zoomed stays so
     for (const b of all("[data-act=robust]")) b.setAttribute("aria-pressed", String(Figure.robust));
   }
 

@@ -104,8 +104,7 @@ class Pictures {
         const size = `${Now.number(+(value * k).toPrecision(2))}${unit === "1" ? "" : unit === "°" ? unit : ` ${unit.replace("% of opening", "%")}`}`;
         if (w.out || !line) texts.push(name === "u" ? `asked ${size}` : name === "u_applied" ? `${w.drive} ${size}` : size);
       }
-      if (w.out) w.words.replaceChildren(...texts.map((text, i) => { const line = Pictures.svg("tspan", { x: w.words.getAttribute("x"), dy: i ? 15 : 0 }); line.textContent = text; return line; }));
-      else w.words.textContent = texts.join(" · ");
+      w.words.replaceChildren(...texts.map((text, i) => { const line = Pictures.svg("tspan", { x: w.words.getAttribute("x"), dy: i ? (w.out ? 15 : 11) : 0 }); line.textContent = text; return line; }));
     }
   }
 }

@@ -110,7 +110,8 @@ const WhatIf = {
     // As the sentences of the replay have it: some samples on end.
     const beyond = Replay.stretches({ y: w.ratio, t: d.t, dt: d.dt, stride: d.stride }, (i) => Math.abs(w.ratio[i]) > 1).find((s) => s.stop > w.spec.start && s.start < w.spec.stop);
     const late = (s, onset) => { if (!s) return "never beyond it"; const ms = 1000 * (s.start - onset), is = `${Now.number(+Math.abs(ms).toPrecision(3))} ms`; return `beyond it from ${s.start.toFixed(3)} s on, ${Math.abs(ms) < 0.5 ? "from the onset" : ms > 0 ? `${is} after the onset` : `${is} before the onset stated`}`; };
-    return `What if: residual ${size(w.ratio, w.spec)}, ${late(beyond, w.spec.start)}${beyond && d.stride > 1 ? `, to ${Figure.duration(d.dt)}` : ""}. Log: ${size(d.residual.map((v, i) => v / d.threshold[i]), d.f)}, ${late(d.passes, d.f.start)}.${d.plant ? ` Wheel model found here: K = ${Now.number(+d.plant.K.toPrecision(3))} m/s, τ = ${Now.number(+d.plant.tau.toPrecision(2))} s, dead zone ${Now.number(100 * d.plant.dead)} %; it explains ${Now.number(+(100 * d.plant.explains).toPrecision(3))} % of the healthy speed.` : ""}`;
+    const seen = d.f.detected, other = seen !== null && d.passes && Math.abs(seen - d.passes.start) > 2 * d.dt ? ` The fault was detected at ${seen.toFixed(3)} s by its probability, which weighs the readings together; the residual is one of them.` : "";
+    return `What if: residual ${size(w.ratio, w.spec)}, ${late(beyond, w.spec.start)}${beyond && d.stride > 1 ? `, to ${Figure.duration(d.dt)}` : ""}. Log: ${size(d.residual.map((v, i) => v / d.threshold[i]), d.f)}, ${late(d.passes, d.f.start)}.${other}${d.plant ? ` Wheel model found here: K = ${Now.number(+d.plant.K.toPrecision(3))} m/s, τ = ${Now.number(+d.plant.tau.toPrecision(2))} s, dead zone ${Now.number(100 * d.plant.dead)} %; it explains ${Now.number(+(100 * d.plant.explains).toPrecision(3))} % of the healthy speed.` : ""}`;
   },
 };
 

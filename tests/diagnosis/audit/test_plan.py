@@ -52,3 +52,14 @@ def test_the_given_machine_file_counts_for_all_and_says_what_it_overrides(tree: 
     assert machine_notes(found, AuditOptions(tree / "out")) == ()
     one = [m for m in found if m.name == "AX__m"]
     assert machine_notes(one, AuditOptions(tree / "out", tree / "AX/machine.toml")) == ()
+
+
+def test_an_id_in_the_machine_files_of_several_folders_is_said_to_make_them_one_machine(tree: Path) -> None:
+    for place in ("AX", "CX"):
+        (tree / place / "machine.toml").write_text('[machine]\nid = "sample"\n')
+    found = discover([str(tree)]).missions
+    (note,) = machine_notes(found, AuditOptions(tree / "out"))
+    assert "the id 'sample' makes one machine of the logs of 2 folders (AX, CX)" in note
+    assert str(tree / "CX/machine.toml") in note
+    assert machine_notes(found, AuditOptions(tree / "out", machine_id="all of one")) == ()
+    assert machine_notes([m for m in found if m.name != "CX__m"], AuditOptions(tree / "out")) == ()

@@ -195,6 +195,10 @@ def test_faults_to_watch_are_cleared_only_where_all_else_is_ready() -> None:
     half = machine(FR_actuator=assessed(finding(Side.ACTUATOR, FaultMode.INEFFICIENT, epsilon=0.6)))
     assert not verdict(half).cleared
     assert verdict(half).not_cleared == "the FR drive valve may have lost 61 %"
+    assert [f.advice for f in intervals_of(half, MACHINE, HYDRAULIC, 0, STEP)] == [
+        "It may have lost 61 %: check it before the machine goes out again."
+    ]
+    assert str(verdict(half).actions[0]["text"]).startswith("Before the machine goes out, check the FR drive valve")
     assert [x.act for x in verdict(half).to_clear] == ["repair the FR drive valve (F1), then diagnose the next mission"]
     odd = parts | {("FL", "sensor"): replace(parts["FL", "sensor"], unexplained_s=6.0)}
     assert verdict(odd).not_cleared == "a residual is not explained by any fault"
@@ -204,6 +208,24 @@ def test_a_valve_that_may_not_answer_is_not_cleared() -> None:
     got = verdict(machine(FR_actuator=assessed(finding(Side.ACTUATOR, FaultMode.STUCK, p=0.7))))
     assert (got.status, got.cleared, got.not_cleared) == ("watch", False, "the FR drive valve may not answer")
     assert str(got.actions[0]["text"]).startswith("Before the machine goes out, check the FR drive valve")
+    assert [x.reason for x in got.to_clear] == ["F1: the FR drive valve may not answer."]
+
+
+def test_every_reason_against_a_leave_is_in_the_list_once() -> None:
+    parts = machine(
+        FR_actuator=assessed(finding(Side.ACTUATOR, FaultMode.STUCK, p=0.7)),
+        FL_sensor=assessed(finding(Side.SENSOR, FaultMode.INEFFICIENT, epsilon=0.6)),
+        FL_actuator=assessed(finding(Side.ACTUATOR, FaultMode.NOISY, epsilon=0.6)),
+    )
+    got = verdict(parts)
+    first, second = "the FR drive valve may not answer", "the FL drive valve may follow noise more than its command"
+    assert got.not_cleared == f"{first}, {second} and more"
+    reasons = [x.reason.partition(": ")[2] for x in got.to_clear]
+    assert sorted(reasons) == [
+        "the FL drive valve may follow noise more than its command.",
+        "the FL speed sensor may have lost 61 %.",
+        "the FR drive valve may not answer.",
+    ]
 
 
 def test_only_ready_and_watch_are_ever_cleared() -> None:
@@ -239,12 +261,17 @@ def test_a_model_of_this_mission_says_what_it_does_not_show() -> None:
 
     none = (None,) * 4
     (some,) = verdict(parts, model=model, shown=shown((0.37, None, None, None), none)).caveats
-    assert "of a sensor from 37 %, on 1 of 2 at no size" in some
+    assert (
+        "it shows on 1 of 2 sensors from 37 % on, on the other however large not; on no valve, however large." in some
+    )
     (nothing,) = verdict(parts, model=model, shown=shown(none, none)).caveats
     assert "need not show, however large" in nothing
     rows = shown((0.12, 0.31, 0.2, 0.2), (0.4, None, None, 0.4))
     (told,) = verdict(parts, model=model, shown=rows).caveats
-    assert "of a sensor from 12 to 31 % (by part) and of a valve from 40 %, on 1 of 2 at no size" in told
+    assert (
+        "on every sensor from 12 to 31 % on (by part); on 1 of 2 valves from 40 % on, on the other however large not."
+        in told
+    )
     assert verdict(parts, model=replace(model, identified=False)).caveats == ()
     assert verdict(machine(), model=model).caveats == ()
 

@@ -85,3 +85,10 @@ def test_bounds_of_a_loss_by_a_wheels_model_allow_for_the_model() -> None:
         (got,) = intervals_of(parts, MACHINE, HYDRAULIC, 0, STEP)
         assert got.epsilon is not None
         assert (got.epsilon.low, got.epsilon.high) == pytest.approx(bounds)
+
+
+def test_advice_goes_by_the_bounds_that_are_stated() -> None:
+    seen = replace(finding(Side.SENSOR, FaultMode.INEFFICIENT, epsilon=0.39), tier=Tier.MODEL)
+    (got,) = intervals_of(machine(FL_sensor=assessed(seen)), MACHINE, HYDRAULIC, 0, STEP)
+    assert got.epsilon is not None
+    assert got.advice == f"It may have lost {100 * got.epsilon.high:.0f} %: check it before the machine goes out again."

@@ -50,10 +50,29 @@ def test_drive_that_may_be_either_is_treated_as_the_actuator(mode: FaultMode) ->
 @pytest.mark.parametrize("side", list(Side))
 @pytest.mark.parametrize("mode", [FaultMode.INEFFICIENT, FaultMode.NOISY])
 def test_other_rows_are_watched(side: Side, mode: FaultMode) -> None:
-    marked, advice = severity_of(finding(side, mode, epsilon=0.5), 60.0, LIMITS, HYDRAULIC)
+    marked, advice = severity_of(finding(side, mode, epsilon=0.4), 60.0, LIMITS, HYDRAULIC)
     slight, _ = severity_of(finding(side, mode, epsilon=0.15), 60.0, LIMITS, HYDRAULIC)
     assert (marked, slight) == ("medium", "low")
     assert "no reason to stop" in advice
+
+
+@pytest.mark.parametrize(
+    ("side", "mode", "words"),
+    [
+        (Side.SENSOR, FaultMode.INEFFICIENT, "It may have lost 61 %: "),
+        (Side.SENSOR, FaultMode.NOISY, "It may give more noise than signal: "),
+        (Side.ACTUATOR, FaultMode.NOISY, "It may follow noise more than its command: "),
+    ],
+)
+def test_a_part_that_may_have_lost_half_is_checked_before_the_machine_goes_out(
+    side: Side, mode: FaultMode, words: str
+) -> None:
+    severity, advice = severity_of(finding(side, mode, epsilon=0.6), 60.0, LIMITS, HYDRAULIC)
+    assert severity == "medium"
+    assert advice == f"{words}check it before the machine goes out again."
+    severity, advice = severity_of(finding(side, mode, epsilon=0.6, p=0.8), 60.0, LIMITS, HYDRAULIC)
+    assert severity == "low"
+    assert advice.endswith("check it before the machine goes out again.")
 
 
 def test_gain_outside_the_table_is_checked() -> None:
@@ -138,7 +157,7 @@ def test_a_valve_that_may_be_stuck_is_never_said_to_be_no_reason_to_stop(
 ) -> None:
     other = FaultMode.INEFFICIENT if mode is FaultMode.STUCK else mode
     rows = (("actuator", other.value, 0.97 - stuck), ("actuator", "stuck", stuck), ("none", "healthy", 0.03))
-    found = replace(finding(Side.ACTUATOR, mode, epsilon=0.5), hypotheses=tuple(Hypothesis(*row) for row in rows))
+    found = replace(finding(Side.ACTUATOR, mode, epsilon=0.4), hypotheses=tuple(Hypothesis(*row) for row in rows))
     severity, advice = severity_of(found, 10.0, LIMITS, HYDRAULIC)
     assert severity is Severity.MEDIUM
     assert advice.startswith(words)

@@ -46,6 +46,19 @@ def test_what_hides_a_part_is_repaired_first() -> None:
     assert "repair the speed sensor first" in one
 
 
+def test_what_deviates_most_comes_first_and_before_what_is_not_shown() -> None:
+    checks = [
+        Checked(Kind.WHEEL, "FR", Side.SENSOR_OR_ACTUATOR, Check.EXCESS, None, 0.1),
+        Checked(Kind.WHEEL, "FR", Side.SENSOR_OR_ACTUATOR, Check.RESPONSE, 0.2, 0.1, 1.0, 4.0),
+        Checked(Kind.WHEEL, "FL", Side.SENSOR_OR_ACTUATOR, Check.RESPONSE, 0.7, 0.1, 1.0, 4.0),
+    ]
+    (one,) = told(Reservations(open=tuple(checks)))
+    first, second = one.split("; ")[:2]
+    assert "FL" in first
+    assert "FR" in second
+    assert "is 18 % below" in second
+
+
 def test_of_many_open_checks_each_component_has_one_line() -> None:
     checks = [
         Checked(Kind.WHEEL, w, Side.SENSOR_OR_ACTUATOR, check, worst, 0.1, 1.0, 4.0)

@@ -68,7 +68,7 @@ def test_an_onset_that_does_not_show_is_said() -> None:
     columns["wheel.FR.v"][1000:1200] += 0.5
     found, pair = edge("onset", columns)
     assert found is not None
-    assert edge_words(found, pair).startswith("No sample of the 150 ms after exceeds the noise: at most 0.0")
+    assert edge_words(found, pair).startswith("No sample of the 150 ms after stands out of the noise: at most 0.0")
 
 
 def test_a_brief_fault_is_measured_inside_it_alone() -> None:

@@ -3,7 +3,8 @@ from __future__ import annotations
 import numpy as np
 
 from diagnosis.report.compared_channels import pair_of
-from diagnosis.report.plot_rows import course_rows, fault_rows, loop_groups, small_stretches
+from diagnosis.report.evidence_rows import small_stretches, untold_stretches
+from diagnosis.report.plot_rows import course_rows, fault_rows, loop_groups
 from diagnosis.report.rows import derived
 from diagnosis.results.machine_words import HYDRAULIC
 from tests import report_samples as samples
@@ -111,3 +112,12 @@ def test_time_that_deviates_by_less_than_a_fault_is_told_apart_in_the_probabilit
     }
     assert small_stretches("evidence.FR.sensor.", columns) == ((1.0, 3.0), (6.0, 7.0))
     assert small_stretches("evidence.FL.sensor.", columns) == ()
+
+
+def test_what_is_most_probably_stuck_is_never_tinted_as_too_little_for_a_fault() -> None:
+    base = "evidence.RR.actuator."
+    columns = {"t": np.arange(40) * 0.1, f"{base}epsilon": np.zeros(40), f"{base}probability": np.ones(40)}
+    stuck = np.where(np.arange(40) < 20, 1.0, 0.0)
+    columns |= {f"{base}p_stuck": stuck, f"{base}p_inefficient": 1.0 - stuck}
+    assert untold_stretches(base, columns) == ((0.0, 2.0),)
+    assert small_stretches(base, columns) == ((2.0, 4.0),)

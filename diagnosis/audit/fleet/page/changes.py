@@ -9,6 +9,7 @@ from diagnosis.audit.fleet.fault_types import FaultChange, FaultStandingRow
 from diagnosis.audit.fleet.page.shown import Context, ShownBaseline, ShownFaultChange
 from diagnosis.audit.fleet.words import count
 from diagnosis.pages import labels
+from diagnosis.results.candidates import UNCLEAR
 from diagnosis.results.fault_rows import state_label
 from diagnosis.results.machine_words import HYDRAULIC, MachineWords
 
@@ -70,7 +71,7 @@ def _changed(f: ShownFaultChange, words: MachineWords) -> Context:
     return {
         "machine": f["machine"],
         "symbol": labels.known(f["mode"]),
-        "words": f"{words.part_words(f['kind'], f['component'], f['side'])} {state_label(f['mode'], f['side']).lower()}",
+        "words": f"{words.part_words(f['kind'], f['component'], f['side'])} {UNCLEAR if f.get('unclear') else state_label(f['mode'], f['side']).lower()}",
         "older": _standing(f["older"]),
         "newer": _standing(f["newer"]),
         "address": f["address"],

@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import PurePosixPath
 
-from diagnosis.audit.fleet.fleet_types import MachineRow
+from diagnosis.audit.discovery.identity import telling_folder
+from diagnosis.audit.fleet.fleet_types import MachineRow, MissionRow
 from diagnosis.audit.fleet.page.shown import Context, ShownDocument
 from diagnosis.audit.fleet.words import count
 from diagnosis.audit.store.outcome import MissionState
 from diagnosis.decision.wording import join_words
 from diagnosis.pages import labels
 from diagnosis.results.machine_words import words_of
+
+_FOLDERS = 4  # that are named
 
 
 def hours(seconds: float) -> str:
@@ -94,3 +98,19 @@ def blind(machines: Sequence[MachineRow], document: ShownDocument) -> list[Conte
             address = "" if last is None or not last["address"] else last["address"]
             out.append({"label": m["label"], "parts": join_words(parts), "address": address})
     return out
+
+
+def of_folders(machines: Sequence[MachineRow], missions: Sequence[MissionRow]) -> list[str]:
+    """Machines whose logs lie in several folders that may each be a machine, in a sentence each: their id alone makes them one."""
+    out = []
+    for m in machines:
+        own = [*m["missions"], *m["undated"], *m["failed"]]
+        folders = [telling_folder(PurePosixPath(file).parent.parts) for k in own for file in missions[k]["files"][:1]]
+        named = [name for name in dict.fromkeys(folders) if name]
+        if m["id"] and len(named) > 1:
+            rest = f" and {len(named) - _FOLDERS} more" if len(named) > _FOLDERS else ""
+            out.append(
+                f"{m['label']} has logs of {len(named)} folders ({', '.join(named[:_FOLDERS])}{rest}), which its id makes one machine. If each "
+                "folder is a machine, leave the id out of the machine file, or give each its own, and audit again."
+            )
+    return [labels.visible(words) for words in out]

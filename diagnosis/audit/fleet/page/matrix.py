@@ -10,6 +10,7 @@ from markupsafe import Markup
 from diagnosis.audit.fleet.fleet_types import MachineRow, PartRow
 from diagnosis.audit.fleet.page.svg import mark
 from diagnosis.pages import labels
+from diagnosis.results.candidates import UNCLEAR
 from diagnosis.results.fault_rows import state_label
 from diagnosis.results.machine_words import words_of
 from replay.faults import Side
@@ -72,7 +73,7 @@ def _cell(part: PartRow | None, count: int, most: int, judged: bool) -> Markup:
     level = 1 + (_LEVELS - 1) * (count - 1) // max(1, most - 1)
     modes = Markup("").join(
         Markup('<span class="m">{}<b>{}</b><span class="sr"> {}</span></span>').format(
-            mark(labels.known(mode)), n, state_label(mode, part["side"])
+            mark("warning" if mode == UNCLEAR else labels.known(mode)), n, state_label(mode, part["side"])
         )
         for mode, n in sorted(part["modes"].items(), key=lambda p: -p[1])
     )

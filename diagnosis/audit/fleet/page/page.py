@@ -23,7 +23,7 @@ from diagnosis.audit.fleet.listed import machine_words
 from diagnosis.audit.fleet.may_leave import Leave
 from diagnosis.audit.fleet.page import rows
 from diagnosis.audit.fleet.page.changes import changes_of
-from diagnosis.audit.fleet.page.figures import blind, hours, kpis
+from diagnosis.audit.fleet.page.figures import blind, hours, kpis, of_folders
 from diagnosis.audit.fleet.page.matrix import matrix
 from diagnosis.audit.fleet.page.shown import Context, ShownDocument, fault_address, shown
 from diagnosis.audit.fleet.page.svg import LEGEND, mark, sparkline, sprite
@@ -62,7 +62,7 @@ _DEFINITIONS = (
     "Counted: missions with a report. A copy of a log, a log that was not read and one that is not audited yet are missions that "
     "do not count in machines, faults and trends.",
     "Assessed: judged for the seconds that the verdict “ready” takes, and for four fifths of its driving.",
-    "Trend: weighted line through the missions' ε̂ over time, each over its whole mission, while a fault's ε̂ is that of the fault's own time; the spread from mission to mission is estimated with it. "
+    "Trend: weighted line through the missions' ε̂ over time, each over its whole mission, while a fault's ε̂ is that of the fault's own time; it is fitted by least squares, so that a time counts by the square of the speed, opening or angle in it, and a loss of half of the mission may be more or less than half of it; the spread from mission to mission is estimated with it. "
     "Outliers (×) are excluded. A step or bend (↓ ↑ ∠), such as a repair, starts a new line. "
     "The band is its 90 % interval, the bar on the limit the 90 % interval of the crossing.",
     "The limit of ε̂ is the loss from which on a report states a fault to watch. A loss alone is no reason to stop, so a machine with one may go "
@@ -108,6 +108,7 @@ def build_fleet_page(found: FleetDocument) -> str:
         "kpis": kpis(document),
         "baseline": changes_of(document["baseline"], {m["label"]: words_of(m) for m in document["machines"]}),
         "leave": _leave(lists, document),
+        "of_folders": of_folders(document["machines"], document["missions"].as_found),
         "strip": rows.strip_length(len(document["machines"])),
         "machines": [
             _machine(k, m, document, standing[k], own[k], lists[k].leave) for k, m in enumerate(document["machines"])

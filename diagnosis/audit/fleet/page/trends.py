@@ -63,7 +63,7 @@ def course(t: TrendRow, machines: Sequence[MachineRow], unit: str) -> Context:
         least, most = physical(t)
         level = {k: min(max(line["level"][k], least), most) for k in ("value", "low", "high")}
         notes.append(
-            f"over its whole last mission ε̂ was {t['points'][-1][2]:.3f}; the line through all missions is at {level['value']:.3f} now "
+            f"over its whole last mission, fast driving counting more, ε̂ was {t['points'][-1][2]:.3f}; the line through all missions is at {level['value']:.3f} now "
             f"({level['low']:.3f} to {level['high']:.3f}) and changes by {low} to {high} per mission "
             f"({round_to(between)} {unit} apart), 95 %".replace("-", "−")
         )

@@ -5,6 +5,8 @@ from __future__ import annotations
 import base64
 import hashlib
 import re
+import sqlite3
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -140,5 +142,26 @@ def test_a_rise_far_below_its_limit_is_told_as_such_and_the_line_beside_the_last
     assert "no step, and no limit that comes near" in low
     high = page("high", [0.1, 0.2, 0.3, 0.35, 0.4, 0.45], 0.02)
     assert re.search(
-        r"Over its whole last mission ε̂ was 0\.450; the line through all missions is at 0\.\d{3} now", high
+        r"Over its whole last mission, fast driving counting more, ε̂ was 0\.450; the line through all missions is at 0\.\d{3} now",
+        high,
     )
+
+
+def test_an_unclear_kind_is_no_mode_in_the_matrix(tmp_path: Path) -> None:
+    stuck = [Fault("FR", "actuator", "stuck", "medium")]
+    samples.write_store(tmp_path / "fleet.sqlite", [Sample("AX/1", "AX", 1.0, verdict="watch", faults=stuck)])
+    with closing(sqlite3.connect(tmp_path / "fleet.sqlite")) as c, c:
+        c.execute("UPDATE fault SET unclear = 1")
+    found = fleet_json(load_fleet(tmp_path / "fleet.sqlite"))
+    (part,) = (p for p in found["machines"][0]["parts"] if (p["component"], p["side"]) == ("FR", "actuator"))
+    assert part["modes"] == {"faulty, kind unclear": 1}
+    (row,) = matrix(found["machines"]).rows
+    assert any("faulty, kind unclear in 1" in cell for cell in row[1])
+    assert not any("Stuck" in cell for cell in row[1])
+
+
+def test_a_machine_of_several_folders_says_that_its_id_makes_it_one(tmp_path: Path) -> None:
+    both = [Sample(f"{folder}/m", "sample", day) for folder, day in (("AX", 1.0), ("BX", 2.0))]
+    page = build_fleet_page(document(tmp_path, *both))
+    assert "sample has logs of 2 folders (AX, BX), which its id makes one machine." in page
+    assert "which its id makes one machine" not in build_fleet_page(document(tmp_path / "few", *samples.few()))
