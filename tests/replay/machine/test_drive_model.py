@@ -45,7 +45,7 @@ def test_without_drives_nothing_is_written() -> None:
             r"drive\.M\.effort\.offset = '1'; expected a number",
         ),
         (
-            "M = { effort = { offset = 1, slope = 1, between = -1, drift = 1, noise = 1 } }",
+            "M = { effort = { offset = 1, slope = 1, between = -1, drift = 1, noise = 1, slowest = 1, fastest = 2 } }",
             r"drive\.between",
         ),
         (
