@@ -329,9 +329,9 @@ def test_t18_added_noise_against_the_chi_square_law() -> None:
 
 @pytest.mark.parametrize("seconds", [2.0, 10.0, None])
 def test_t19_a_load_that_is_found_in_95_of_100(seconds: float | None) -> None:
-    effort = EffortMap(offset=0.1, slope=0.05, between=0.01, drift=0.001, noise=0.004)
+    effort = EffortMap(offset=0.1, slope=0.05, between=0.01, drift=0.001, noise=0.004, slowest=1.0, fastest=5.0)
     limits, steps = Limits(), np.full(60, 0.3)
-    found = load_powers(LoadTrack(0 * steps, 0 * steps, steps, 100), effort, limits)
+    found = load_powers(LoadTrack(0 * steps, 0 * steps, steps, steps**0, 100), effort, limits)
     (size,) = [p.size for p in found.rows if p.for_s == seconds and p.deviation is Deviation.INEFFICIENT]
     own = 0.01 if seconds is None else np.sqrt(0.004**2 / seconds + 0.001**2 * seconds)
     least = max(least_load(seconds, 0.3, effort, limits), limits.min_epsilon / (1 - limits.min_epsilon) * 0.3)

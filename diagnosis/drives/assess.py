@@ -127,14 +127,15 @@ def _as_far_as_seen(drive: Assessment, limits: Limits) -> Assessment:
     """A drive that is not called healthy where a load that counts could last all through the mission without a trace."""
     assert drive.powers is not None
     (least,) = (r.size for r in drive.powers.rows if r.for_s is None)
-    if least is not None and least <= limits.clear_at:
+    healthy = drive.states == CODE[State.HEALTHY]
+    if not healthy.any() or (least is not None and least <= limits.clear_at):
         return drive
     shows = "in no size" if least is None else f"from {100 * least:.0f} % of the effort on"
     why = (
         f"a load that lasts all through the mission would show {shows} only, and {100 * limits.clear_at:.0f} % count (limits.clear_at); "
         "more effort, as faster driving takes, shows smaller ones"
     )
-    states = np.where(drive.states == CODE[State.HEALTHY], CODE[State.NOT_ASSESSED], drive.states).astype(np.int8)
+    states = np.where(healthy, CODE[State.NOT_ASSESSED], drive.states).astype(np.int8)
     return replace(drive, states=states, reasons={**drive.reasons, State.NOT_ASSESSED: why})
 
 
@@ -166,13 +167,15 @@ def _states(data: DriveData, evidence: _Evidence) -> tuple[NDArray[np.int8], NDA
     """State of every sample of sensor and actuator."""
     samples, load = evidence.pair.samples, evidence.load
     known = np.isfinite(data.y) & np.isfinite(samples.x)
-    loaded = np.ones(data.y.size) if load is None else load.sampled(load.probability, data.y.size)
+    free = np.zeros(data.y.size, np.bool_)  # of extra load
+    if load is not None:
+        free = (load.sampled(load.probability, data.y.size) < 0.5) & (load.sampled(load.covered, data.y.size) > 0.5)
     sensor = np.where(samples.quiet, CODE[State.NOT_EXCITED], CODE[State.HEALTHY]).astype(np.int8)
     sensor[~known & ~samples.quiet & np.isfinite(data.y)] = CODE[State.NOT_ASSESSED]  # the effort is at its limit
     sensor[~np.isfinite(data.y) & (samples.status != SILENT)] = CODE[State.NO_DATA]
     actuator = sensor.copy()
     for states in (actuator,) if data.open_loop else (sensor, actuator):
-        states[(states == CODE[State.HEALTHY]) & ~(loaded < 0.5)] = CODE[State.NOT_ASSESSED]
+        states[(states == CODE[State.HEALTHY]) & ~free] = CODE[State.NOT_ASSESSED]
     for f in (*(f for f in evidence.effort if f.side is not Side.ACTUATOR), *evidence.speed):
         sensor[f.start : f.stop] = CODE[State(f.mode.value)]
     for f in evidence.actuator:
@@ -201,7 +204,7 @@ def _assessments(data: DriveData, evidence: _Evidence, notes: tuple[str, ...]) -
             "expected": load.sampled(load.expected, size),
         }
     step = steps_of([*evidence.sensor, *evidence.actuator], x.size, data.dt)
-    reasons = _reasons(load)
+    reasons = _reasons(data, load)
     sensor, actuator = (
         Assessment(states, reasons, tuple(findings), shown.columns, Tier.DRIVE, notes, closeups=shown.closeups)
         for states, findings, shown in zip(
@@ -214,16 +217,27 @@ def _assessments(data: DriveData, evidence: _Evidence, notes: tuple[str, ...]) -
     return sensor, actuator
 
 
-def _reasons(load: LoadTrack | None) -> dict[State, str]:
+def _reasons(data: DriveData, load: LoadTrack | None) -> dict[State, str]:
     """Why a state that is no judgement was given."""
     return {
         State.NOT_EXCITED: "the drive is neither commanded nor moving",
         State.MASKED: "the {wheel.sensor}, which is needed for it, delivers nothing usable",
         State.NO_DATA: "no samples",
-        State.NOT_ASSESSED: "no effort of healthy missions to compare with"
-        if load is None
-        else "the drive takes more effort than in healthy missions; a sensor that reads low has the same effect",
+        State.NOT_ASSESSED: _why_not_assessed(data, load),
     }
+
+
+def _why_not_assessed(data: DriveData, load: LoadTrack | None) -> str:
+    effort = None if data.model is None else data.model.effort
+    if load is None or effort is None:
+        return "no effort of healthy missions to compare with"
+    beyond, loaded = np.count_nonzero(load.covered == 0.0), np.count_nonzero(load.probability >= 0.5)
+    if beyond > loaded:
+        return (
+            f"healthy missions drove at {effort.slowest:.3g} to {effort.fastest:.3g} {{speed_unit}}; what effort a healthy drive takes at "
+            "other speeds is not known (`mfhca fit` with healthy missions at these speeds finds it)"
+        )
+    return "the drive takes more effort than in healthy missions; a sensor that reads low has the same effect"
 
 
 def _notes(data: DriveData, pair: SpeedPair, controller: InverseController, below: int) -> tuple[str, ...]:

@@ -71,4 +71,13 @@ def identify_effort(records: Sequence[DriveRecord], least_speed: float) -> Effor
     near, far = float(np.median(np.abs(one))) * 1.4826, float(np.median(np.abs(eight))) * 1.4826
     drift = float(np.sqrt(max((far**2 - near**2) / 7, (0.02 * near) ** 2)))
     noise = float(np.sqrt(max((near**2 - drift**2) / 2, (0.1 * near) ** 2)))
-    return EffortMap(float(theta[0]), float(theta[1]), between, float(drift / np.sqrt(STEP_S)), noise)
+    driven = np.concatenate([s for s, _ in missions])
+    return EffortMap(
+        offset=float(theta[0]),
+        slope=float(theta[1]),
+        between=between,
+        drift=float(drift / np.sqrt(STEP_S)),
+        noise=noise,
+        slowest=float(np.min(driven)),
+        fastest=float(np.max(driven)),
+    )

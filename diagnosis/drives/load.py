@@ -7,7 +7,7 @@ as a random walk, the load stays or jumps to another level. Loss of effectivenes
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,6 +36,8 @@ class LoadTrack:
         Expected extra effort [unit of effort].
     expected : Array
         Healthy effort of the step's speed, with the mission's own offset [unit of effort].
+    covered : Array
+        1 where healthy missions drove at the step's speed, 0 where they did not; NaN where nothing is driven.
     length : int
         Samples per step; the last, incomplete step is left out.
     """
@@ -43,6 +45,7 @@ class LoadTrack:
     probability: Array
     level: Array
     expected: Array
+    covered: Array
     length: int
 
     def sampled(self, values: Array, size: int) -> Array:
@@ -70,11 +73,12 @@ def track_load(record: DriveRecord, effort: EffortMap, least_speed: float) -> Lo
         Commanded speed from which the drive is driven [m/s].
     """
     speed, used, length = step_means(record, least_speed)
-    return track_steps(effort.offset + effort.slope * speed, used, effort, length)
+    track = track_steps(effort.offset + effort.slope * speed, used, effort, length)
+    return replace(track, covered=np.where(np.isfinite(speed), effort.covers(speed), np.nan))
 
 
 def track_steps(needed: Array, used: Array, effort: EffortMap, length: int) -> LoadTrack:
-    """The same by steps of one second.
+    """The same by steps of one second, all of them at speeds of healthy missions.
 
     Parameters
     ----------
@@ -88,7 +92,7 @@ def track_steps(needed: Array, used: Array, effort: EffortMap, length: int) -> L
     steps = np.flatnonzero(np.isfinite(needed))
     nan = np.full(needed.size, np.nan)
     if not steps.size:
-        return LoadTrack(nan, nan.copy(), nan.copy(), length)
+        return LoadTrack(nan, nan.copy(), nan.copy(), nan.copy(), length)
     healthy = needed[steps]
     reference = float(np.median(np.abs(healthy)))
     offsets = np.linspace(-3.0, 3.0, _OFFSETS) * max(effort.between, effort.noise)
@@ -121,7 +125,7 @@ def track_steps(needed: Array, used: Array, effort: EffortMap, length: int) -> L
     probability[steps] = 1 - by_level[:, 0]
     level[steps] = by_level @ levels
     expected[steps] = healthy + by_offset @ offsets
-    return LoadTrack(probability, level, expected, length)
+    return LoadTrack(probability, level, expected, np.where(np.isfinite(needed), 1.0, np.nan), length)
 
 
 def _walk(offsets: Array, effort: EffortMap, gap: int) -> Array:

@@ -97,7 +97,8 @@ def sensor_powers(pair: SpeedPair, limits: Limits) -> Powers:
 def load_powers(load: LoadTrack, effort: EffortMap, limits: Limits) -> Powers:
     """Smallest loads, as shares of the effort, that would have been findings.
 
-    What `diagnosis.drives.load` needs without noise, and what noise, drift and the mission's own offset hide of it in 95 of 100 cases.
+    What `diagnosis.drives.load` needs without noise, and what noise, drift and the mission's own offset hide of it in 95 of 100 cases;
+    at speeds of healthy missions alone.
 
     Parameters
     ----------
@@ -108,7 +109,7 @@ def load_powers(load: LoadTrack, effort: EffortMap, limits: Limits) -> Powers:
     limits : Limits
         ``clear_at``, and what a finding needs.
     """
-    known = np.isfinite(load.expected)
+    known = load.covered > 0.5
     driven = np.abs(load.expected[known])
     reference = float(np.median(driven)) if driven.size else np.nan
     rows: list[Power] = []

@@ -6,7 +6,12 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from replay.errors import ConfigError, check_range
+
+_NEARLY = 0.05  # of a speed: means over a second scatter about the one that is commanded
 
 
 @dataclass(frozen=True)
@@ -71,6 +76,8 @@ class EffortMap:
         Random walk of that offset within a mission [unit of effort per √s].
     noise : float
         Standard deviation of the mean over one second [unit of effort].
+    slowest, fastest : float
+        Speeds between which healthy missions drove [m/s].
     """
 
     offset: float
@@ -78,11 +85,21 @@ class EffortMap:
     between: float
     drift: float
     noise: float
+    slowest: float
+    fastest: float
 
     def __post_init__(self) -> None:
         """Check values."""
         for name in ("between", "drift", "noise"):
             check_range(f"drive.{name}", getattr(self, name), 0.0, 1e9, "unit of effort")
+        check_range("drive.slowest", self.slowest, 0.0, 1e9, "m/s")
+        check_range("drive.fastest", self.fastest, self.slowest, 1e9, "m/s")
+
+    def covers(self, speed: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Whether healthy missions drove at speeds |v| [m/s], or nearly so; both of one shape. Beyond them the line is a guess."""
+        return np.asarray(
+            (speed >= (1.0 - _NEARLY) * self.slowest) & (speed <= (1.0 + _NEARLY) * self.fastest), dtype=np.bool_
+        )
 
 
 @dataclass(frozen=True)

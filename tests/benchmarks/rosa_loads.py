@@ -2,7 +2,7 @@
 
 Every run of the RoSA set with a damper (D), diagnosed whole with the model that `rosa.py` fits from the tuning part of the healthy
 runs. Of the time labelled D in which the drive moves: how much its drive is called healthy, which load would have shown at the
-least as the report states it, and whether the machine was cleared. Also how often its speed sensor is blamed. Then loads of just
+least as the report states it, and whether the machine was cleared without a word of the load. Also how often its speed sensor is blamed. Then loads of just
 the stated size, and of `limits.clear_at`, written into the effort of the healthy runs from beginning to end: how much of that
 time the drive is called healthy.
 
@@ -70,11 +70,13 @@ def main() -> None:
                 called += seconds * (s["state"] == "healthy")
         blamed = any(str(i["side"]) == "sensor" and i["severity"] != "info" for i in report["intervals"])
         total, healthy, sensor = total + there, healthy + called, sensor + blamed
-        cleared += report["verdict"]["cleared"]
+        named = any(str(i["side"]) != "sensor" and i["severity"] != "info" for i in report["intervals"])
+        unsaid = report["verdict"]["cleared"] and not named
+        cleared += unsaid
         shows = lasting(report)
         print(
             f"{path.name}: {there:.0f} s of load, called healthy {100 * called / max(there, 1e-9):.0f} %, {report['verdict']['title']}, "
-            f"cleared {report['verdict']['cleared']}, sensor blamed {blamed}; a load over the whole mission shows from "
+            f"cleared {report['verdict']['cleared']}{', load not named' if unsaid else ''}, sensor blamed {blamed}; a load over the whole mission shows from "
             f"{'no size on' if shows is None else f'{100 * shows:.0f} % of the effort on'}",
             flush=True,
         )
@@ -94,7 +96,7 @@ def main() -> None:
         f"{missed['stated']} of {len(stated)}; of limits.clear_at in {missed['counts']} of {len(healthy_runs)}"
     )
     print(
-        f"{len(runs)} runs, {total:.0f} s of load: called healthy {100 * healthy / total:.1f} %; cleared {cleared:.0f}; "
+        f"{len(runs)} runs, {total:.0f} s of load: called healthy {100 * healthy / total:.1f} %; cleared without naming it {cleared:.0f}; "
         f"sensor blamed {sensor:.0f}"
     )
 

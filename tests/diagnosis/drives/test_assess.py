@@ -128,6 +128,14 @@ def test_an_extra_load_bends_and_is_the_drives(model: DriveModel) -> None:
     assert share(sensor, State.HEALTHY, slice(START + 100, STOP - 100)) < 0.05
 
 
+def test_a_drive_faster_than_any_healthy_mission_is_not_assessed(model: DriveModel) -> None:
+    assert model.effort is not None
+    for side in assess_drive(mission(42, speed=1.4 * model.effort.fastest, model=model), LIMITS):
+        assert share(side, State.HEALTHY) == 0.0
+        assert share(side, State.NOT_ASSESSED) > 0.9
+        assert "healthy missions drove at" in side.reasons[State.NOT_ASSESSED]
+
+
 def test_without_healthy_missions_agreement_alone_proves_nothing() -> None:
     sensor, actuator = assess_drive(mission(50), LIMITS)
     assert share(sensor, State.NOT_ASSESSED) == share(actuator, State.NOT_ASSESSED) == 1.0

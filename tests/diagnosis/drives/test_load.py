@@ -16,7 +16,7 @@ from replay.machine.drive_model import EffortMap
 Array = NDArray[np.float64]
 
 DT = 0.02
-MAP = EffortMap(offset=6.0, slope=2.0, between=0.5, drift=0.03, noise=0.1)
+MAP = EffortMap(offset=6.0, slope=2.0, between=0.5, drift=0.03, noise=0.1, slowest=1.0, fastest=4.0)
 
 
 def mission(seed: int, speed: float, offset: float = 0.0, seconds: int = 30) -> DriveRecord:
@@ -42,6 +42,7 @@ def test_the_map_and_the_spread_of_missions_are_found() -> None:
     assert found.slope == pytest.approx(2.0, abs=0.25)
     assert found.between == pytest.approx(float(np.std(own)), rel=0.3)
     assert found.drift < 0.05
+    assert (found.slowest, found.fastest) == pytest.approx((1.0, 4.0), abs=0.1)
 
 
 def test_one_speed_gives_a_line_through_zero() -> None:
@@ -84,6 +85,12 @@ def test_standing_is_left_out() -> None:
     assert np.isfinite(track.sampled(track.probability, 1500)[480:]).all()
 
 
+def test_steps_at_speeds_of_no_healthy_mission_are_not_covered() -> None:
+    slow, fast = mission(5, 4.1), mission(6, 4.4)
+    record = DriveRecord(*(np.concatenate([getattr(r, x) for r in (slow, fast)]) for x in ("y", "command", "u")), DT)
+    assert track_load(record, MAP, 0.1).covered.tolist() == [1.0] * 30 + [0.0] * 30
+
+
 def test_nothing_driven_gives_nothing() -> None:
     record = DriveRecord(np.full(500, np.nan), np.zeros(500), np.zeros(500), DT)
     assert np.isnan(track_load(record, MAP, 0.1).probability).all()
@@ -91,7 +98,7 @@ def test_nothing_driven_gives_nothing() -> None:
 
 def test_without_loads_the_offset_is_a_kalman_smoothers(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(load_module, "_LOADED", 0.0)
-    wide = EffortMap(offset=6.0, slope=2.0, between=0.5, drift=0.1, noise=0.1)
+    wide = EffortMap(offset=6.0, slope=2.0, between=0.5, drift=0.1, noise=0.1, slowest=1.0, fastest=4.0)
     record = mission(5, 2.0, offset=0.5, seconds=20)
     record.u[:] += 0.4 * np.sin(np.arange(record.u.size) * DT / 4)
     speed, effort, _ = step_means(record, 0.1)

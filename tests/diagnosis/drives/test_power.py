@@ -97,7 +97,9 @@ def test_added_noise_is_never_below_the_weakest_state() -> None:
 
 
 @pytest.mark.parametrize("seconds", [2.0, 10.0, None])
-@pytest.mark.parametrize("effort", [EffortMap(0.1, 0.05, 0.01, 0.001, 0.004), EffortMap(0.1, 0.05, 0.02, 0.001, 0.01)])
+@pytest.mark.parametrize(
+    "effort", [EffortMap(0.1, 0.05, 0.01, 0.001, 0.004, 1.0, 5.0), EffortMap(0.1, 0.05, 0.02, 0.001, 0.01, 1.0, 5.0)]
+)
 def test_a_load_of_the_stated_size_is_found_in_95_of_100(effort: EffortMap, seconds: float | None) -> None:
     needed, limits, steps = np.full(120, 0.25), Limits(), 120
     part = slice(0, steps) if seconds is None else slice(40, 40 + round(seconds))

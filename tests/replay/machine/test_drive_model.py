@@ -13,7 +13,7 @@ from replay.machine.toml_file import load_machine
 from replay.machine.toml_text import dump_machine
 
 ECHO = InverseController((0.1, -20.0, 1 / 3), 0, 1.2, 0.05, 0.01, 3.4, 0.63, 0.27, 0.016)
-EFFORT = EffortMap(6.3, 0.07, 1.1, 0.06, 0.17)
+EFFORT = EffortMap(6.3, 0.07, 1.1, 0.06, 0.17, 100.0, 300.0)
 
 
 def load(folder: Path, text: str) -> Machine:
@@ -45,7 +45,7 @@ def test_without_drives_nothing_is_written() -> None:
             r"drive\.M\.effort\.offset = '1'; expected a number",
         ),
         (
-            "M = { effort = { offset = 1, slope = 1, between = -1, drift = 1, noise = 1 } }",
+            "M = { effort = { offset = 1, slope = 1, between = -1, drift = 1, noise = 1, slowest = 1, fastest = 2 } }",
             r"drive\.between",
         ),
         (
