@@ -154,7 +154,8 @@ def test_no_drive_is_called_healthy_without_its_effort() -> None:
     assert "effort" in j.parts["FR"][1].reasons[State.NOT_ASSESSED]
 
 
-def test_what_would_have_shown_is_found_when_it_is_there() -> None:
+@pytest.mark.parametrize("count", campaign([5, 12]))
+def test_what_would_have_shown_is_found_when_it_is_there(count: int) -> None:
     measured, asked, body = speeds(12)
     powers = judged(measured, asked, body).parts["FR"][0].powers
     assert isinstance(powers, Powers)
@@ -164,7 +165,7 @@ def test_what_would_have_shown_is_found_when_it_is_there() -> None:
     rng = np.random.default_rng(2)
     driven = np.flatnonzero(np.abs(asked["FR"][:-400]) > 0.3)
     found = 0
-    places = rng.choice(driven, 12)
+    places = rng.choice(driven, count)
     for start in places:
         y = measured["FR"].copy()
         y[start : start + 200] *= 1.0 - loss.size
