@@ -10,7 +10,6 @@ from diagnosis.direct.onset import refine
 from diagnosis.estimation.fault_models import NOISY, ModeModel
 from diagnosis.estimation.samples import Samples
 from diagnosis.estimation.segments import Run
-from tests.campaigns import campaign
 
 MODEL = ModeModel(noise=0.003, constant_noise=0.003, tolerance=0.005, span=1.0, switch_cost=13.0, dt=0.001)
 N, START, STOP = 12_000, 4000, 8000
@@ -30,7 +29,7 @@ def disturbed(seed: int) -> Samples:
     return Samples.even(y, u, np.full(N, PAIR, dtype=np.int8), np.zeros(N, dtype=np.bool_))
 
 
-@pytest.mark.parametrize("seed", campaign(range(4)))
+@pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize(("early", "late"), [(0, 0), (-400, 700), (500, -300)])
 def test_both_ends_are_found_from_nearby(seed: int, early: int, late: int) -> None:
     got = refine(Run(START + early, STOP + late, NOISY), disturbed(seed), 0.6, MODEL, 0, N)

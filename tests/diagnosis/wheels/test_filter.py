@@ -31,7 +31,6 @@ from diagnosis.wheels.run_kernel import evidence_of_runs
 from diagnosis.wheels.runs import Runs
 from diagnosis.wheels.step_kernel import WheelInput, advance, predict
 from replay.machine.config import WheelPlant
-from tests.campaigns import campaign
 
 RAW, WIDTH, DT = 0.001, 10, 0.01
 WHEEL = WheelFilterModel(
@@ -212,7 +211,7 @@ def rows(y: Array, u: Array, model: JointModel, status: Array | None = None) -> 
 
 
 @pytest.mark.parametrize("flow", [1e9, 0.7], ids=["own supply", "pump at its limit"])
-@pytest.mark.parametrize("seed", campaign(range(2)))
+@pytest.mark.parametrize("seed", range(2))
 def test_healthy_wheels_are_healthy(seed: int, flow: float) -> None:
     u = openings()
     assert_array_equal(rows(noisy(rolled(u, flow), seed), u, machine(flow)), ROW[HEALTHY])
