@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import sys
 from pathlib import Path
@@ -17,12 +18,30 @@ from replay.arrays.kernel_cache import drop_own_stale_kernels
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 sys.dont_write_bytecode = False
 
+# As in the command: looking for cycles after every 700 objects took a third of what collecting the tests takes.
+gc.set_threshold(50_000, 10, 10)
+
 ROOT = Path(__file__).resolve().parent.parent
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """What `--long` adds."""
+    parser.addoption("--long", action="store_true", help="also tests that repeat a proof over many seeds and machines")
 
 
 def pytest_configure() -> None:
     """Let no test run what was compiled from former sources."""
     drop_own_stale_kernels()
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Leave the long tests out where they are not asked for."""
+    if config.getoption("--long"):
+        return
+    left_out = [item for item in items if item.get_closest_marker("long")]
+    if left_out:
+        config.hook.pytest_deselected(items=left_out)
+        items[:] = [item for item in items if not item.get_closest_marker("long")]
 
 
 @pytest.fixture(scope="session")

@@ -14,6 +14,7 @@ import pytest
 from replay.faults import FaultMode, FaultSpec, Side
 
 BENCHMARKS = Path(__file__).parent / "benchmarks"
+pytestmark = pytest.mark.long  # of the campaigns alone: what every run needs of them is in test_all_clear.py
 SEEDS, LENGTH = (501, 504, 508), 40.0
 _A, _B = 8.0, 36.0
 _SPAN = slice(9_000, 36_000)

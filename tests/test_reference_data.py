@@ -25,6 +25,7 @@ from replay.machine.toml_text import dump_machine
 from replay.mission import read_signals
 from replay.signals.signal import Signals
 from replay.signals.timeline import align
+from tests.campaigns import campaign
 
 ROSA = """
 [machine]
@@ -110,7 +111,7 @@ def test_a_disabled_robot_did_not_follow_and_no_wheel_is_blamed(reference_data: 
     assert result.report["verdict"]["title"] == "The machine did not follow its commands"
 
 
-@pytest.mark.parametrize("run", ["Healthy_01", "Healthy_02", "Healthy_03", "Healthy_04"])
+@pytest.mark.parametrize("run", campaign(["Healthy_01", "Healthy_02", "Healthy_03", "Healthy_04"]))
 def test_no_motor_of_a_healthy_arm_is_flagged(reference_data: Path, tmp_path: Path, run: str) -> None:
     result = diagnose([reference_data / "fault_data/dtr_robot_arm" / f"{run}.csv"], machine(ARM, tmp_path))
     assert serious(result) == []
@@ -118,7 +119,7 @@ def test_no_motor_of_a_healthy_arm_is_flagged(reference_data: Path, tmp_path: Pa
 
 
 @pytest.mark.parametrize("motor", [1, 2, 3, 4])
-@pytest.mark.parametrize("run", [1, 2, 3, 4])
+@pytest.mark.parametrize("run", campaign([1, 2, 3, 4]))
 def test_the_stuck_motor_of_the_arm_is_found(reference_data: Path, tmp_path: Path, motor: int, run: int) -> None:
     log = reference_data / "fault_data/dtr_robot_arm" / f"Motor_{motor}_Stuck_{run:02d}.csv"
     result = diagnose([log], machine(ARM, tmp_path))
@@ -136,7 +137,7 @@ def healthy_run(reference_data: Path, number: int) -> pd.DataFrame:
     return frame[inside].reset_index(drop=True)
 
 
-@pytest.mark.parametrize("number", [106, 130])
+@pytest.mark.parametrize("number", campaign([106, 130]))
 @pytest.mark.parametrize("mode", ["none", "stuck", "no_signal", "inefficient", "noisy"])
 def test_faults_put_into_a_real_motors_sensor_are_found(
     reference_data: Path, tmp_path: Path, number: int, mode: str

@@ -16,7 +16,7 @@ def target_of(commands: Array, parts: tuple[Array, Array], limit: float, delay: 
     Parameters
     ----------
     commands : Array, shape (cells, k)
-        What the target is put together from.
+        What the target is put together from, without NaN.
     parts : tuple[Array, Array], each of shape (k,)
         Weight of each column, and the largest part of the target that it makes [m/s].
     limit : float
@@ -25,7 +25,7 @@ def target_of(commands: Array, parts: tuple[Array, Array], limit: float, delay: 
         Dead time [cells].
     """
     weights, bounds = parts
-    target = np.clip(np.clip(np.nan_to_num(commands) * weights, -bounds, bounds).sum(axis=1), -limit, limit)
+    target = np.clip(np.clip(commands * weights, -bounds, bounds).sum(axis=1), -limit, limit)
     return np.asarray(np.interp(np.arange(target.size) - delay, np.arange(target.size), target))
 
 

@@ -97,7 +97,7 @@ class Response(NamedTuple):
         """
         h = cell * dt
         around = max(1, round(_TIMING_S / h))
-        target = target_of(commands, (self.weights, self.bounds), self.limit, self.delay / h)
+        target = target_of(np.nan_to_num(commands), (self.weights, self.bounds), self.limit, self.delay / h)
         low = np.minimum(self.low, _moving(target, around, np.minimum)) - self.noise
         high = np.maximum(self.high, _moving(target, around, np.maximum)) + self.noise
         return np.repeat(low, cell)[:size], np.repeat(high, cell)[:size]

@@ -29,6 +29,7 @@ from replay.signals.signal import Signal, Signals
 from replay.signals.timeline import align
 from replay.simulation.options import EvidenceLevel, SimulatedMission, SimulationOptions
 from replay.simulation.run import simulate_mission
+from tests.campaigns import campaign
 
 PAPER = haulotte()
 FAULTS = (
@@ -99,7 +100,7 @@ def test_injected_faults_are_found() -> None:
     assert report["verdict"]["status"] == "stop"
 
 
-@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("seed", campaign([1, 2]))
 def test_healthy_mission_at_full_rate_is_ready(seed: int) -> None:
     healthy = simulated(faults=(), seconds=20.0, rate_hz=1000.0, seed=seed)
     got = diagnose_mission(in_memory(healthy), PAPER).report

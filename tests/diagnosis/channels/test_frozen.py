@@ -14,6 +14,7 @@ from replay.machine.config import haulotte
 from replay.signals.signal import Signal, Signals
 from replay.simulation.options import SimulationOptions
 from replay.simulation.run import simulate_mission
+from tests.campaigns import campaign
 
 DT, SIZE = 0.01, 3000
 
@@ -58,7 +59,7 @@ def test_zero_is_sure_only_where_noise_would_show() -> None:
     assert set(noisy.states) == {CODE[State.NO_SIGNAL]}
 
 
-@pytest.mark.parametrize("seed", [30, 31])
+@pytest.mark.parametrize("seed", campaign([30, 31]))
 def test_a_sensor_that_is_dead_all_the_time_stops_the_machine(seed: int) -> None:
     fault = FaultSpec("FR", Side.SENSOR, FaultMode.STUCK, 0.0, 60.0, 1.0, float("nan"), 0.0)
     options = SimulationOptions(

@@ -12,6 +12,7 @@ from diagnosis.pipeline import diagnose_signals
 from replay.faults import FaultMode, FaultSpec, Side
 from replay.machine.config import haulotte
 from replay.simulation.options import SimulatedMission
+from tests.campaigns import campaign
 from tests.diagnosis.clearing.missions import LENGTH, in_cells, signals_of, simulated
 
 EDIT = Callable[[SimulatedMission], SimulatedMission]
@@ -48,7 +49,7 @@ def test_a_wrong_sign_unit_or_place_is_told(edit: EDIT, words: str) -> None:
     assert len(others) <= 1
 
 
-@pytest.mark.parametrize("seed", [5, 6, 7])
+@pytest.mark.parametrize("seed", campaign([5, 6, 7]))
 def test_healthy_missions_and_faults_of_parts_are_not_the_files(seed: int) -> None:
     assert mapping_hints(in_cells(simulated(seed=seed), base=True)) == ()
     for fault in (

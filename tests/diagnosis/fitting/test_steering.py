@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -26,6 +27,7 @@ from replay.simulation.structures import StructureOptions
 KNOWN = AxlePlant(4.0, 4.4, 0.02, 0.025, 0.05, 0.001, 0.25, None, 0.01, 0.3, 0.06, 0.05, 0.05, 1e-3, 1e-3, 5e-3, 1e-4)
 
 
+@cache
 def timeline(seed: int) -> Timeline:
     """A healthy mission of one machine with dead bands, two gains and play in its steering."""
     options = SimulationOptions(

@@ -13,6 +13,7 @@ from diagnosis.results.assessment import CODE, Finding
 from diagnosis.results.detectability import Deviation, Powers
 from replay.faults import FaultMode, Side, State
 from replay.machine.config import Limits
+from tests.campaigns import campaign
 from tests.diagnosis.response.robot import DT, TRACK, WHEELS, commands, followers_of, geometry, robot_of, speeds
 
 Array = NDArray[np.float64]
@@ -53,7 +54,7 @@ def put(y: Array, kind: str) -> Array:
     return y
 
 
-@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("seed", campaign([1, 2, 3]))
 def test_a_healthy_robot_raises_nothing_and_is_judged_nearly_all_the_time(seed: int) -> None:
     j = judged(*speeds(seed))
     assert findings(j) == []
@@ -62,7 +63,7 @@ def test_a_healthy_robot_raises_nothing_and_is_judged_nearly_all_the_time(seed: 
 
 
 @pytest.mark.parametrize("kind", ["no_signal", "stuck", "inefficient", "noisy", "spikes"])
-@pytest.mark.parametrize("seed", [4, 5])
+@pytest.mark.parametrize("seed", campaign([4, 5]))
 def test_a_fault_of_ten_seconds_is_found_at_its_wheel_and_its_side_left_open_where_20_hz_do_not_tell_it(
     kind: str, seed: int
 ) -> None:
@@ -125,7 +126,7 @@ def test_a_scale_over_the_whole_mission_is_not_called_healthy(scale: float) -> N
     assert share(j, "FR", State.HEALTHY) > 0.9
 
 
-@pytest.mark.parametrize("seed", [1, 3])
+@pytest.mark.parametrize("seed", campaign([1, 3]))
 def test_half_a_speed_that_turns_of_which_nothing_is_logged_would_hide_is_not_called_healthy(seed: int) -> None:
     v, turn = commands(seed)
     measured, asked, _ = robot_of(v, 2.0 * turn, seed, ("FR", "FL"))
@@ -153,7 +154,8 @@ def test_no_drive_is_called_healthy_without_its_effort() -> None:
     assert "effort" in j.parts["FR"][1].reasons[State.NOT_ASSESSED]
 
 
-def test_what_would_have_shown_is_found_when_it_is_there() -> None:
+@pytest.mark.parametrize("count", campaign([5, 12]))
+def test_what_would_have_shown_is_found_when_it_is_there(count: int) -> None:
     measured, asked, body = speeds(12)
     powers = judged(measured, asked, body).parts["FR"][0].powers
     assert isinstance(powers, Powers)
@@ -163,7 +165,7 @@ def test_what_would_have_shown_is_found_when_it_is_there() -> None:
     rng = np.random.default_rng(2)
     driven = np.flatnonzero(np.abs(asked["FR"][:-400]) > 0.3)
     found = 0
-    places = rng.choice(driven, 12)
+    places = rng.choice(driven, count)
     for start in places:
         y = measured["FR"].copy()
         y[start : start + 200] *= 1.0 - loss.size

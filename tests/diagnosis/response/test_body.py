@@ -16,6 +16,7 @@ from diagnosis.response.models import BLOCK_S
 from diagnosis.results.assessment import CODE
 from replay.faults import FaultMode, Side, State
 from replay.machine.config import Limits
+from tests.campaigns import campaign
 from tests.diagnosis.response.robot import DT, TRACK, followers_of, geometry, speeds
 
 Array = NDArray[np.float64]
@@ -61,7 +62,7 @@ def found(j: Judgement) -> list[tuple[str, Side, FaultMode]]:
     return [(w, f.side, f.mode) for w, (sensor, _) in j.parts.items() for f in sensor.findings]
 
 
-@pytest.mark.parametrize("seed", [21, 22, 23])
+@pytest.mark.parametrize("seed", campaign([21, 22, 23]))
 def test_a_single_drive_at_half_its_speed_is_told_by_the_speed_over_ground(seed: int) -> None:
     measured, asked, _ = speeds(seed, ("FR",))
     sensor = ground(measured, seed)
@@ -72,7 +73,7 @@ def test_a_single_drive_at_half_its_speed_is_told_by_the_speed_over_ground(seed:
     assert (wheel, side, mode) == ("FR", Side.SENSOR, FaultMode.INEFFICIENT)
 
 
-@pytest.mark.parametrize("seed", [24, 25, 26])
+@pytest.mark.parametrize("seed", campaign([24, 25, 26]))
 def test_without_commands_the_wheel_that_differs_from_the_body_is_blamed(seed: int) -> None:
     measured, asked, body = speeds(seed, ("FR", "FL"))
     yaw, sensor = turning(measured, "FR", "FL"), odometry(measured, seed)

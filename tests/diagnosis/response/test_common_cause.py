@@ -12,6 +12,7 @@ from diagnosis.response.channel import samples_of, without_holds
 from diagnosis.results.assessment import Finding
 from replay.faults import FaultMode, Side
 from replay.machine.config import Limits
+from tests.campaigns import campaign
 from tests.diagnosis.response.robot import DT, TRACK, followers_of, geometry, speeds
 
 Array = NDArray[np.float64]
@@ -45,7 +46,7 @@ def test_a_stop_of_the_machine_in_the_middle_of_a_sensors_fault_blames_no_other_
     assert any(f.mode is FaultMode(kind) for _, _, f in told)
 
 
-@pytest.mark.parametrize("seed", [21, 24])
+@pytest.mark.parametrize("seed", campaign([21, 24]))
 def test_of_two_wheels_the_one_that_stands_with_the_machine_is_not_blamed_for_a_shift_of_the_other(seed: int) -> None:
     measured, asked, body = speeds(seed, ("FR", "FL"))
     fault, stop = span(60, 85), span(66, 73)
@@ -104,7 +105,7 @@ def test_a_value_that_is_held_for_long_is_no_answer_to_a_command() -> None:
     assert np.isfinite(without_holds(y, samples_of(y, np.ones(400, np.bool_)), DT)).all()
 
 
-@pytest.mark.parametrize("seed", [2, 8])
+@pytest.mark.parametrize("seed", campaign([2, 8]))
 def test_a_wheel_that_stands_for_most_of_the_mission_is_told_and_not_the_one_beside_it(seed: int) -> None:
     """Nothing is left of its own answer to the command, and the other wheel of its side differs from it just as much."""
     measured, asked, body = speeds(seed)

@@ -13,6 +13,7 @@ from diagnosis.response.kernel import follow
 from diagnosis.results.assessment import Finding
 from replay.machine.config import Limits
 from replay.machine.geometry import Geometry, WheelGeometry
+from tests.campaigns import campaign
 
 Array = NDArray[np.float64]
 
@@ -60,13 +61,13 @@ class Skidding:
 
 
 @pytest.mark.parametrize("yaw", [True, False])
-@pytest.mark.parametrize("seed", [1, 2, 3, 4])
+@pytest.mark.parametrize("seed", campaign([1, 2, 3, 4]))
 def test_a_healthy_robot_that_skids_is_not_blamed(seed: int, yaw: bool) -> None:
     assert Skidding(seed).told(yaw=yaw) == []
 
 
 @pytest.mark.parametrize("wheel", PAIR)
-@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("seed", campaign([1, 2, 3]))
 def test_a_wheel_that_reads_half_of_its_speed_is_told_although_the_robot_skids(seed: int, wheel: str) -> None:
     robot = Skidding(seed)
     robot.measured[wheel][SPELL] *= 0.5

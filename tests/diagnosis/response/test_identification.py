@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from diagnosis.response.following import followed
 from diagnosis.response.identification import Response, as_another, identify_response
+from tests.campaigns import campaign
 
 Array = NDArray[np.float64]
 
@@ -38,7 +39,7 @@ def found(seed: int) -> tuple[Array, Array, Response]:
     return commands, y, response
 
 
-@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("seed", campaign([1, 2, 3]))
 def test_limits_of_driving_and_turning_are_found(seed: int) -> None:
     _, y, response = found(seed)
     assert response.bounds[1] == pytest.approx(BOUNDS[1], rel=0.1)

@@ -12,6 +12,7 @@ from diagnosis.response.assess import Judgement, assess_response
 from diagnosis.results.assessment import CODE
 from replay.faults import FaultMode, Side, State
 from replay.machine.config import Limits
+from tests.campaigns import campaign
 from tests.diagnosis.response.robot import DT, followers_of, geometry, speeds
 
 Array = NDArray[np.float64]
@@ -38,7 +39,7 @@ def positions(measured: dict[str, Array]) -> dict[str, Array]:
     return out
 
 
-@pytest.mark.parametrize("seed", [41, 42, 43, 44])
+@pytest.mark.parametrize("seed", campaign([41, 42, 43, 44]))
 @pytest.mark.parametrize("factor", [0.5, 1.5])
 def test_a_speed_that_leaves_its_own_position_is_the_sensors_fault(seed: int, factor: float) -> None:
     measured, asked, body = speeds(seed, ("FR", "FL"))
@@ -52,7 +53,7 @@ def test_a_speed_that_leaves_its_own_position_is_the_sensors_fault(seed: int, fa
     assert any("the position of its joint" in e for e in finding.evidence)
 
 
-@pytest.mark.parametrize("seed", [41, 42])
+@pytest.mark.parametrize("seed", campaign([41, 42]))
 def test_an_encoder_that_fails_in_both_channels_may_as_well_be_a_jammed_wheel(seed: int) -> None:
     measured, asked, body = speeds(seed)
     rolled = positions(measured)

@@ -15,6 +15,7 @@ from diagnosis.results.assessment import Finding
 from diagnosis.results.detectability import Deviation
 from replay.faults import FaultMode, Side
 from replay.machine.config import Limits
+from tests.campaigns import campaign
 from tests.diagnosis.response.robot import DT, TRACK, followers_of, geometry, speeds
 
 Array = NDArray[np.float64]
@@ -40,7 +41,7 @@ def late(y: Array, delay: float) -> Array:
 
 
 @pytest.mark.parametrize("delay", [0.8, 0.9])
-@pytest.mark.parametrize("seed", [31, 32, 33])
+@pytest.mark.parametrize("seed", campaign([31, 32, 33]))
 def test_a_late_speed_is_named_with_its_delay_and_blames_no_other_wheel(seed: int, delay: float) -> None:
     measured, asked, body = speeds(seed)
     measured["RL"] = late(measured["RL"], delay)

@@ -15,6 +15,7 @@ from diagnosis.results.assessment import Finding
 from replay.faults import FaultMode
 from replay.machine.config import Limits
 from replay.machine.geometry import Geometry, WheelGeometry
+from tests.campaigns import campaign
 
 Array = NDArray[np.float64]
 
@@ -58,12 +59,12 @@ def told(measured: dict[str, Array], body: Array) -> list[tuple[str, Finding]]:
     return [(w, f) for w, sides in parts.items() for side in sides for f in side.findings]
 
 
-@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("seed", campaign([1, 2, 3]))
 def test_a_healthy_robot_that_stops_and_goes_is_not_blamed(seed: int) -> None:
     assert told(*drive(seed)) == []
 
 
-@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("seed", campaign([1, 2, 3]))
 def test_half_of_a_speed_shows_although_half_of_nothing_is_nothing(seed: int) -> None:
     measured, body = drive(seed)
     spell = slice(round(30.0 / DT), round(42.0 / DT))
@@ -73,7 +74,7 @@ def test_half_of_a_speed_shows_although_half_of_nothing_is_nothing(seed: int) ->
     assert any(f.mode is FaultMode.INEFFICIENT and f.start < spell.stop and spell.start < f.stop for _, f in found)
 
 
-@pytest.mark.parametrize("seed", [4, 5])
+@pytest.mark.parametrize("seed", campaign([4, 5]))
 def test_noise_of_most_of_the_fast_driving_is_no_habit_where_the_other_wheel_has_none(seed: int) -> None:
     measured, body = drive(seed, slice(round(45.0 / DT), round(65.0 / DT)))
     spell = slice(round(50.0 / DT), round(63.0 / DT))

@@ -13,6 +13,7 @@ from diagnosis.response.kernel import follow
 from diagnosis.results.assessment import CODE, Finding
 from replay.faults import FaultMode, State
 from replay.machine.config import Limits
+from tests.campaigns import campaign
 from tests.diagnosis.response.robot import DT, TRACK, WHEELS, commands, followers_of, geometry, speeds
 
 Array = NDArray[np.float64]
@@ -35,7 +36,7 @@ def yaw_of(measured: dict[str, Array], seed: int) -> Array:
 
 
 @pytest.mark.parametrize("fault", ["dead", "frozen", "half", "shifted"])
-@pytest.mark.parametrize("seed", [3, 8])
+@pytest.mark.parametrize("seed", campaign([3, 8]))
 def test_no_wheel_is_blamed_for_a_wrong_yaw_rate(fault: str, seed: int) -> None:
     measured, _, _ = speeds(seed, PAIR)
     yaw = yaw_of(measured, seed)
@@ -59,7 +60,7 @@ def test_a_wheel_that_reads_half_of_its_speed_is_told_beside_the_yaw_rate(wheel:
 
 
 @pytest.mark.parametrize("shift", [0.3, -0.3])
-@pytest.mark.parametrize("seed", [3, 11])
+@pytest.mark.parametrize("seed", campaign([3, 11]))
 def test_a_shifted_wheel_that_its_command_contradicts_too_is_not_the_gyros_fault(shift: float, seed: int) -> None:
     measured, asked, body = speeds(seed, PAIR)
     yaw = yaw_of(measured, seed)
@@ -91,12 +92,12 @@ def straight(seed: int, wheels: tuple[str, ...]) -> dict[str, Array]:
 
 
 @pytest.mark.parametrize("wheels", [PAIR, WHEELS])
-@pytest.mark.parametrize("seed", [3, 8, 11, 12])
+@pytest.mark.parametrize("seed", campaign([3, 8, 11, 12]))
 def test_a_curve_that_nothing_in_the_log_tells_is_no_wheels_fault(seed: int, wheels: tuple[str, ...]) -> None:
     assert told_without_turns(straight(seed, wheels), seed, wheels) == []
 
 
-@pytest.mark.parametrize("seed", [3, 8])
+@pytest.mark.parametrize("seed", campaign([3, 8]))
 def test_a_wheel_that_is_dead_is_told_where_turns_are_not(seed: int) -> None:
     measured = straight(seed, PAIR)
     measured["R"][SPELL] = 0.0
@@ -110,7 +111,7 @@ def healthy_anywhere(measured: dict[str, Array], yaw: Array, seed: int) -> list[
     return [bool((sensor.states == CODE[State.HEALTHY]).any()) for sensor, _ in parts]
 
 
-@pytest.mark.parametrize("seed", [3, 8])
+@pytest.mark.parametrize("seed", campaign([3, 8]))
 def test_nothing_healthy_is_said_of_sides_that_are_exchanged(seed: int) -> None:
     measured, _, _ = speeds(seed, PAIR)
     yaw = yaw_of(measured, seed)
@@ -118,7 +119,7 @@ def test_nothing_healthy_is_said_of_sides_that_are_exchanged(seed: int) -> None:
     assert healthy_anywhere({left: measured[right], right: measured[left]}, yaw, seed) == [False, False]
 
 
-@pytest.mark.parametrize("seed", [3, 8])
+@pytest.mark.parametrize("seed", campaign([3, 8]))
 def test_a_gyro_with_the_other_sign_says_nothing_against_wheels_that_do_as_they_are_told(seed: int) -> None:
     measured, _, _ = speeds(seed, PAIR)
     assert healthy_anywhere(measured, -yaw_of(measured, seed), seed) == [True, True]

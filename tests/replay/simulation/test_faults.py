@@ -15,6 +15,7 @@ from replay.faults import FaultMode, FaultSpec, Side
 from replay.simulation.options import SimulatedMission, SimulationOptions
 from replay.simulation.run import simulate_mission
 from replay.truth import read_truth, write_truth
+from tests.campaigns import campaign
 
 NAN = float("nan")
 LSB = 2500 / 4096 / 60 * np.pi * 0.854 / 17.7
@@ -175,7 +176,7 @@ def test_the_papers_mission_has_its_faults() -> None:
     assert len(truth.slip) > 0
 
 
-@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("seed", campaign(range(5)))
 def test_random_faults_do_not_overlap_on_one_side_and_cover_the_tables(seed: int) -> None:
     options = SimulationOptions(scenario="random", rate_hz=50, seed=seed, steering_faults=True)
     intervals = simulate_mission(options).truth.intervals

@@ -12,6 +12,7 @@ from replay.simulation.random_structures import random_structure, stiffest_loop
 from replay.simulation.structure import DRIVES, SPEED_SENSORS, Structure
 from replay.simulation.structures import StructureOptions
 from replay.simulation.variation import varied_options
+from tests.campaigns import campaign
 
 MANY = [random_structure(seed) for seed in range(300)]
 EFFECTS: dict[str, Callable[[Structure], bool]] = {
@@ -70,7 +71,7 @@ def test_a_proportional_loop_rings_beyond_the_stiffest_gain() -> None:
     assert 0.7 * 3.0 / 2.5 < stiffest_loop(structure) < 3.0 / 2.5
 
 
-@pytest.mark.parametrize("seed", [2, 11, 34])
+@pytest.mark.parametrize("seed", campaign([2, 11, 34]))
 def test_random_machines_follow_their_commands(seed: int) -> None:
     options = SimulationOptions(scenario="healthy", seed=seed, duration_s=40.0, rate_hz=250.0, evidence="base")
     mission = run.simulate_mission(

@@ -11,6 +11,7 @@ import pytest
 from replay.errors import ConfigError
 from replay.simulation.run import simulate_mission
 from replay.simulation.variation import RANGES, varied_options
+from tests.campaigns import campaign
 
 SEEDS = {"tuning": range(60), "reporting": range(2000, 2060)}
 
@@ -52,7 +53,7 @@ def test_draws_fill_their_ranges(kind: Any) -> None:
     assert 0 < sum(o.drop_share > 0 for o in made) < len(made)
 
 
-@pytest.mark.parametrize("seed", [2003, 2011, 2027])
+@pytest.mark.parametrize("seed", campaign([2003, 2011, 2027]))
 def test_healthy_varied_machines_follow_their_commands(seed: int) -> None:
     options = varied_options(seed, kind="reporting", scenario="healthy", duration_s=60.0)
     mission = simulate_mission(options)
