@@ -38,6 +38,8 @@ class Cells:
         When a fault of a component is stated, by component [s].
     carried : Mapping[str, float]
         Share of its speed that the ground gives a wheel whose valve is dead, by wheel, as far as a model of the mission says it [1].
+    may_carry : float
+        What it may give every wheel all the same [1].
     """
 
     timeline: Timeline
@@ -45,6 +47,7 @@ class Cells:
     machine: Machine
     stated: Mapping[str, Sequence[tuple[float, float]]] = field(default_factory=dict)
     carried: Mapping[str, float] = field(default_factory=dict)
+    may_carry: float = 0.0
     _kept: dict[str, Any] = field(default_factory=dict, repr=False, compare=False)
 
     @cached_property

@@ -50,7 +50,8 @@ def cells_of(
     plants = () if model is None or not model.reliable else model.plants
     held = {w: p.grip for w, p in zip(machine.wheels, plants, strict=False) if p is not None and p.grip is not None}
     carried = {w: grip / (1.0 + grip) for w, grip in held.items()}
-    return Cells(timeline, replay, machine, stated, carried, {} if kept is None else kept)
+    may_carry = 0.0 if model is None else model.may_hold
+    return Cells(timeline, replay, machine, stated, carried, may_carry, {} if kept is None else kept)
 
 
 def checks_of(cells: Cells, words: MachineWords) -> tuple[Checked, ...]:

@@ -85,7 +85,8 @@ def wheel_checks(cells: Cells, clear_at: float) -> Iterator[Checked]:
             yield worst(cells, (*about, Side.ACTUATOR, Check.SECOND_MEASUREMENT), behind[:, i], limit, apart=True)
         if wheel in cells.carried and not any(twice[i]) and _known(command[:, i]):
             limit = most_carried(limits[i].below, clear_at)
-            yield Checked(*about, Side.ACTUATOR, Check.CARRIED, cells.carried[wheel], limit)
+            most = max(cells.carried[wheel], cells.may_carry)
+            yield Checked(*about, Side.ACTUATOR, Check.CARRIED, most, limit)
         # where an opening is no speed, what it gives says nothing of a wheel whose sides are both measured twice
         if _known(used[:, i]) and speed.shape[1] > OTHERS and (tells or not all(twice[i])):
             own = limits[i]

@@ -31,6 +31,8 @@ class WheelModelFit:
         The figures in words.
     identified : bool
         Whether a wheel's model comes from this mission rather than from the machine file.
+    may_hold : float
+        Share of its speed that the ground may give a wheel although its model is free of the ground [1].
     """
 
     plants: tuple[WheelPlant | None, ...]
@@ -39,3 +41,4 @@ class WheelModelFit:
     reliable: bool
     note: str
     identified: bool = True
+    may_hold: float = 0.0

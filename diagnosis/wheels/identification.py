@@ -55,7 +55,7 @@ def identified(drive: Drive, machine: Machine, given: dict[int, WheelPlant]) -> 
         f"{100 * found.typical:.1f} %"
         + ("." if reliable else f": too uncertain to judge gains by (limit {100 * _MOST_MISFIT:.0f} %).")
     )
-    return WheelModelFit(plants, found.misfit, found.windows, reliable, note)
+    return WheelModelFit(plants, found.misfit, found.windows, reliable, note, may_hold=found.may_hold)
 
 
 def identify(

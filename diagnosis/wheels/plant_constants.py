@@ -38,12 +38,15 @@ class PlantFit:
         The same of the median window.
     windows : int
         Windows in which a wheel drives.
+    may_hold : float
+        Share of its speed that the ground may give a wheel although the wheels are taken as free of it [1].
     """
 
     plants: tuple[WheelPlant | None, ...]
     misfit: float
     typical: float
     windows: int
+    may_hold: float = 0.0
 
 
 @dataclass(frozen=True)

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from diagnosis.wheels.plant_constants import PlantFit, Trial, penalty, plants_of
 from diagnosis.wheels.plant_windows import Drive, usual_driving, windows_of
 from diagnosis.wheels.robust_fit import Trimmed, misfits, solve, trimmed
+from diagnosis.wheels.valve_map import RAMPS
 
 _LAGS = (0.02, 0.05, 0.12, 0.3, 0.7)
 _PLAYS = (0.0, 0.005, 0.01, 0.015, 0.02, 0.03, 0.04)
@@ -25,6 +26,7 @@ _LEAST_WINDOWS = 24
 _BETTER = 0.97
 _HELD_SHARE = 0.8
 _FREE_ENOUGH = 1.3  # of the misfit with the body: below, the wheels run free of it
+_RATHER = 0.75  # of the misfit's square without the body: below, the ground may hold the wheels all the same
 _WIDER, _WIDER_STEPS = 5.0, 4
 
 
@@ -48,14 +50,16 @@ def identify_plants(
     free = _search(drives, span, share, _FREE_LAGS, None)
     if free is None:
         return None
-    best = free
+    best, may_hold = free, 0.0
     known = any(np.isfinite(d.body).any() for d in drives)
     if coupling != "free" and known:
         # the body explains a wheel with a dead valve too: only windows that obey their openings may show the tyres
         held = _search(drives, span, _HELD_SHARE, _LAGS, free.found.chosen)
         if held is not None and (coupling == "ground" or free.found.score > _FREE_ENOUGH**2 * held.found.score):
             best = _widened(drives, held, span)
-    return plants_of(drives, best, span, healthy=share > 0.5)
+        elif held is not None and held.found.score < _RATHER * free.found.score:
+            may_hold = float(np.clip(held.found.values[RAMPS], 0.0, 1.0))
+    return replace(plants_of(drives, best, span, healthy=share > 0.5), may_hold=may_hold)
 
 
 def _search(
