@@ -12,7 +12,7 @@ from cli.terminal.command import Quiet, Verbose, terminal_of
 from cli.terminal.console import Terminal
 from cli.terminal.options import Json, Logs, MachineFile
 from diagnosis.api.inputs import check_output, machine_of, mission_paths
-from diagnosis.api.saved_results import result_file
+from diagnosis.api.saved_results import result_file, saved_report
 from replay.errors import ConfigError, OutputError
 from replay.progress import Progress, Stage
 
@@ -90,6 +90,12 @@ def _check(request: ExportRequest) -> None:
         raise ConfigError("--no-diagnostics: nothing is left to write; add --loop or --log")
     if output.suffix.lower() != ".mcap":
         raise ConfigError(f"{output}: the file is MCAP; give it a name that ends in .mcap")
+    for path in request.paths:
+        if saved_report(path) is not None:
+            raise ConfigError(
+                f"{path}: is a saved result, and its messages are written beside the log: "
+                f"mfhca export LOG -o {output} --result {path}"
+            )
     check_output([output], request.paths)
     if output.is_file() and output.stat().st_size and not request.force:
         from diagnosis.clips.export import is_own

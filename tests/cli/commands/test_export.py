@@ -81,3 +81,13 @@ def test_a_log_is_never_replaced(mission_log: Path, capsys: pytest.CaptureFixtur
     before = mission_log.read_bytes()
     assert run(["export", str(mission_log), "-o", str(mission_log), "--force"]) == 2
     assert mission_log.read_bytes() == before
+
+
+def test_a_report_in_place_of_its_log_is_told_how_to_be_given(
+    result: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "r.mcap"
+    for saved in (result, result / "report.json"):
+        assert run(["export", str(saved), "-o", str(out)]) == 2
+        assert f"mfhca export LOG -o {out} --result {saved}" in capsys.readouterr().err.replace("\n", " ")
+    assert not out.exists()
