@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from diagnosis.wheels import plant_identification
 from diagnosis.wheels.plant_constants import PlantFit
 from diagnosis.wheels.plant_identification import identify_plants
 from diagnosis.wheels.plant_windows import Drive
@@ -111,6 +112,14 @@ def test_wheels_off_the_ground_are_found_to_be_free(tau: float, play: float) -> 
             play, abs=0.0151
         )  # a play of 2 % trades off against lag and dead band in the air
     assert fit.misfit < 0.04
+    assert fit.may_hold < 0.5
+
+
+def test_wheels_that_fit_better_held_may_be_held(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(plant_identification, "_FREE_ENOUGH", 100.0)
+    fit = found(driven(2.5, 0.3, PLAY))
+    assert all(p is not None and p.grip == 0.0 for p in fit.plants)
+    assert fit.may_hold == pytest.approx(2.5 / 3.5, abs=0.1)
 
 
 def test_wheels_on_the_ground_show_their_grip() -> None:
