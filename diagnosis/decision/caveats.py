@@ -105,9 +105,7 @@ def by_model(assessments: Mapping[Part, Assessment], shown: Sequence[Detectable]
         ]
         said += [_from_size(name, [r.size for r in rows])] if rows else []
         sizes_known |= any(r.size for r in rows)
-    sizes = (
-        f"Wherever in 95 of 100 places a loss of ten seconds may begin, it shows {'; '.join(said)}. " if said else ""
-    )
+    sizes = f"A loss of ten seconds shows, in 95 of 100 places where it may begin, {'; '.join(said)}. " if said else ""
     if said and not sizes_known:
         sizes = "A loss in one of them that lasts only ten seconds need not show, however large. "
     return (
@@ -128,7 +126,7 @@ def _from_size(name: str, sizes: Sequence[float | None]) -> str:
     size = f"from {' to '.join(span)} % on{' (by part)' if len(span) > 1 else ''}"
     if len(known) == len(sizes):
         return f"on every {name} {size}"
-    return f"on {len(known)} of {len(sizes)} {name}s {size}, on the other{'s' if len(sizes) - len(known) > 1 else ''} however large not"
+    return f"on {len(known)} of {len(sizes)} {name}s {size}, on the other{'s' if len(sizes) - len(known) > 1 else ''} at no size"
 
 
 def doubt_of(watch: Sequence[FaultInterval], against: Reservations) -> str:
