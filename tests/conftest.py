@@ -8,11 +8,16 @@ import sys
 from pathlib import Path
 
 import pytest
+from hypothesis import settings
 
 # As in the command: threads of the linear algebra spin while they wait, and its products are small. Before numpy is imported.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 from replay.arrays.kernel_cache import drop_own_stale_kernels
+
+# Examples are not timed: other work on the machine, such as compiling, would fail them.
+settings.register_profile("untimed", deadline=None)
+settings.load_profile("untimed")
 
 # Many commands and children are started: bytecode is kept, or each would compile everything that it imports once more.
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)

@@ -13,7 +13,7 @@ Array = NDArray[np.float64]
 
 # From tuning missions, by `python tests/benchmarks/calibrate_direct.py`: share of findings that are not what they seem, and
 # the length at which half of those in a log too slow for its commands are.
-_LAPSE, _COARSE_S = 0.01, 1.7
+_LAPSE, _COARSE_S = 0.01, 1.9
 _CLEARLY = 2.0  # times as probable as the path's row, from which on another one is stated
 _MAJORITY = 0.5  # of the probability: a fault is called by it
 
@@ -55,7 +55,7 @@ def with_lapses(p: Array, row: int, side: Side, seconds: float | None) -> Array:
     """
     kept = 1.0 - _LAPSE
     if seconds is not None:
-        kept *= seconds**2 / (seconds**2 + _COARSE_S**2)
+        kept *= seconds**4 / (seconds**4 + _COARSE_S**4)
     out = p.copy()
     others = [r for r in codes_of(side) if r not in (HEALTHY, row)]
     share = 1.0 / len(others)

@@ -64,7 +64,7 @@ def with_one_cause(findings: Sequence[Finding], measured: Measured) -> list[Find
         common = None  # what changed between two pieces may have changed anyhow
     for pieces in clusters:
         near = pieces
-        cause = replace(common, start=None) if common is not None else _cause_of(near, measured)
+        cause = replace(common, start=None, stop=None) if common is not None else _cause_of(near, measured)
         lost = all(f.mode is FaultMode.INEFFICIENT for f in near)
         wide = _as_far_as_it_shows(near, out[-1].stop if out else 0, measured) if lost else near
         offset = _cause_of(wide, measured) if wide != near else None
@@ -125,7 +125,7 @@ def _cause_of(near: Sequence[Finding], measured: Measured) -> Cause | None:
         return None
     off = np.abs(y - x)
     big = np.flatnonzero(off > max(_BEYOND * measured.noise, _MARKED * float(np.sqrt(np.mean(off**2)))))
-    part = slice(big[0], big[-1] + 1) if big.size else slice(0, 0)
+    part = _lasting_part(big, at, measured)
     cause = _explanation(y, x, at, measured)
     if cause is not None and (cause.alone or all(f.mode.varying for f in near)):
         k = _lasting(big, at, measured)
@@ -138,7 +138,9 @@ def _cause_of(near: Sequence[Finding], measured: Measured) -> Cause | None:
     if not least <= at[part].size < _MOSTLY * at.size:
         return None
     cause = _explanation(y[part], x[part], at[part], measured)  # a piece that began too early hides what it is
-    return replace(cause, start=int(at[part][0])) if cause is not None and cause.alone and not cause.changes else None
+    if cause is None or not cause.alone or cause.changes:
+        return None
+    return replace(cause, start=int(at[part][0]), stop=int(at[part][-1]) + 1)
 
 
 def _rests(y: Array, piece: NDArray[np.intp], measured: Measured) -> bool:
@@ -160,6 +162,13 @@ def _lasting(big: NDArray[np.intp], at: NDArray[np.intp], measured: Measured) ->
     there = np.searchsorted(at, at[big] + _EARLY_S / measured.dt) - big
     lasts = big[2 * ahead > there]
     return int(lasts[0]) if lasts.size else 0
+
+
+def _lasting_part(big: NDArray[np.intp], at: NDArray[np.intp], measured: Measured) -> slice:
+    """Places from the first of the large deviations that no move of a moment makes to the last one; none without one."""
+    first = _lasting(big, at, measured)
+    last = at.size - 1 - _lasting(at.size - 1 - big[::-1], at[-1] - at[::-1], measured)
+    return slice(first, last + 1) if big.size else slice(0, 0)
 
 
 def _from_where_it_shows(cause: Cause, off: Array, x: Array, at: NDArray[np.intp], k: int, measured: Measured) -> Cause:
@@ -262,7 +271,7 @@ def _joined(near: Sequence[Finding], cause: Cause) -> Finding:
     return replace(
         longest,
         start=start,
-        stop=max(f.stop for f in near),
+        stop=max(f.stop for f in near) if cause.stop is None else cause.stop,
         mode=cause.mode,
         probability=p,
         hypotheses=(named, *sorted(others, key=lambda h: -h.p)),

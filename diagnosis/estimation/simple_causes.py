@@ -74,8 +74,8 @@ class Cause:
         Whether it changes with time; whether it is a delay.
     alone, clear : bool
         Whether no other one explains as much; whether none of another row does but such as change likewise.
-    start : int or None
-        Step where it begins, if later than the pieces.
+    start, stop : int or None
+        Step where it begins, if later than the pieces, and the one after its last, if earlier.
     """
 
     mode: FaultMode
@@ -88,6 +88,7 @@ class Cause:
     alone: bool = True
     clear: bool = True
     start: int | None = None
+    stop: int | None = None
 
 
 def causes(y: Array, x: Array, at: NDArray[np.intp], measured: Measured) -> Iterator[Cause]:

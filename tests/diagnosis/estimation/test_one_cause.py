@@ -133,6 +133,19 @@ def test_a_piece_that_began_too_early_does_not_hide_a_loss() -> None:
     assert found.start == pytest.approx(1600, abs=60)
 
 
+def test_a_piece_that_ended_too_late_does_not_hide_an_offset() -> None:
+    """Behind it the quick moves of a moment are as large."""
+    there = (T >= 12.0) & (T < 20.0)
+
+    def change(x: Array) -> Array:
+        return x + 0.12 * there + 0.1 * ((T > 25.0) & (T < 25.05))
+
+    (found,) = with_one_cause(pieces([(1000, 3600, FaultMode.NOISY)]), measured(change))
+    assert found.mode is FaultMode.OUTSIDE_TABLE
+    assert "an offset" in found.evidence[0]
+    assert (found.start, found.stop) == (pytest.approx(1200, abs=3), pytest.approx(2000, abs=3))
+
+
 def test_noise_beside_a_loss_is_noise() -> None:
     disturbed = 0.015 * np.convolve(RNG.standard_normal(SIZE), np.exp(-np.arange(200) / 40.0), "same") / 4.5
     near = pieces(((1000, 2400, FaultMode.NOISY),))
