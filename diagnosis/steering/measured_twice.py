@@ -32,6 +32,11 @@ _EDGE = 0.15  # of a finding
 _LOSES, _IT_IS = 0.1, 0.85  # of its gain, from which it is a loss; probability of what a measured opening shows
 _SHIFTED = 0.5  # of the loss, from which a zero is no matter of how it changes
 _SHOWN = "The measured opening moves with its command: {gain:.2f} of it, {zero:+.1f}{{percent}} off."
+_STANDS = "The measured opening stays at {place:+.1f}{{percent}}."
+_IN_MIDDLE, _BESIDE = (
+    0.02,
+    0.04,
+)  # of full opening: as far off its zero a valve without signal rests, and further off a stuck one
 _BY_MODEL = "times as probable with"  # says what the model of the axle took it for
 _CONSTANT = "The command hardly moved meanwhile: a {valve} that is off by a constant would look the same."
 
@@ -91,7 +96,7 @@ def _as_it_opens(
         y, x = (z[inner][pairs[2][inner]] for z in pairs[:2])
         moves = f.mode.total and x.size >= _FEW and min(np.std(x), np.std(y)) >= _MOTION
         if not moves or float(np.corrcoef(x, y)[0, 1]) < _FOLLOWS:
-            kept.append(f)
+            kept.append(_by_its_place(f, y) if f.mode.total and x.size >= _FEW else f)
             continue
         gain = float(np.cov(x, y)[0, 1] / np.var(x, ddof=1))
         zero = float(np.mean(y) - gain * np.mean(x))
@@ -118,6 +123,22 @@ def _as_it_opens(
     return SideFindings(tuple(kept), tuple(open_))
 
 
+def _by_its_place(finding: Finding, opening: Array) -> Finding:
+    """A valve that stands still, by where it does: about its middle it has no signal, elsewhere it is stuck. `opening` of shape (n,) [fraction]."""
+    middle = float(np.median(opening))
+    mode = (
+        FaultMode.NO_SIGNAL if abs(middle) < _IN_MIDDLE else FaultMode.STUCK if abs(middle) > _BESIDE else finding.mode
+    )
+    if mode is finding.mode:
+        return finding
+    other = {finding.mode.value: mode.value, mode.value: finding.mode.value}
+    named = tuple(
+        replace(h, mode=other.get(h.mode, h.mode)) if h.side == finding.side else h for h in finding.hypotheses
+    )
+    evidence = (_STANDS.format(place=100.0 * middle), *(e for e in finding.evidence if _BY_MODEL not in e))
+    return replace(finding, mode=mode, hypotheses=named, evidence=evidence)
+
+
 def _or_all_off(findings: Sequence[Finding], command: Array, *, losses: bool = False) -> tuple[Finding, ...]:
     """A valve's findings, those beside a command [fraction], shape (n,), that stays where it is as `_or_off` has them; `losses`: also of gain."""
 
@@ -137,7 +158,7 @@ def _or_off(finding: Finding) -> Finding:
 
 
 def _rests(command: Array) -> bool:
-    """Whether a command stays where it is but for the beginning: the loop then rests behind a valve that is off by as much."""
+    """Whether a command stays where it is but for both ends: the loop then rests behind a valve that is off by as much."""
     known = command[np.isfinite(command)]
-    known = known[known.size // 4 :]
+    known = known[known.size // 4 : known.size - round(_EDGE * known.size)]
     return bool(known.size and np.std(known) < max(_STEADY * abs(float(np.mean(known))), _HARDLY))

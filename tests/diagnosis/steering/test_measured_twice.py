@@ -82,6 +82,20 @@ def test_a_valve_that_stays_where_it_is_stays_stuck(at: float, mode: FaultMode) 
     assert finding.probability == 1.0
 
 
+@pytest.mark.parametrize(
+    ("at", "said", "mode"),
+    [
+        (0.006, FaultMode.STUCK, FaultMode.NO_SIGNAL),
+        (0.1, FaultMode.NO_SIGNAL, FaultMode.STUCK),
+        (0.03, FaultMode.STUCK, FaultMode.STUCK),
+    ],
+)
+def test_a_valve_that_stands_still_is_called_by_where_it_does(at: float, said: FaultMode, mode: FaultMode) -> None:
+    (finding,) = told(np.full(SIZE, at), said).findings
+    assert finding.mode is mode
+    assert (finding.probability, {h.mode for h in finding.hypotheses}) == (1.0, {mode.value})
+
+
 def test_beside_a_command_that_rests_a_share_may_be_a_constant_that_is_missing() -> None:
     after = told(np.full(SIZE, 0.1), FaultMode.INEFFICIENT, np.full(SIZE, 0.2))
     assert {h.mode: h.p for h in after.findings[0].hypotheses} == {"inefficient": 0.5, "outside_table": 0.5}
