@@ -58,6 +58,8 @@ slope = 2.0
 between = 0.1
 drift = 0.1
 noise = 0.1
+slowest = 0.1
+fastest = 1.5
 [limits]
 brief = 1.0
 clear_at = 0.25

@@ -238,7 +238,7 @@ def test_an_id_in_the_machine_file_for_logs_of_several_folders_is_said(
     ]
     assert run([*words, "--json"]) == 0
     shown = capsys.readouterr()
-    assert shown.err.count("its id 'H7' makes one machine of the logs of 2 folders (AX-1, AX-2)") == 1
+    assert shown.err.count("the id 'H7' makes one machine of the logs of 2 folders (AX-1, AX-2)") == 1
     assert len(json.loads(shown.out)["problems"]) == 1
     assert run([*words, "--machine-id", "H7", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["problems"] == []
