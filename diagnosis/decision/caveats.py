@@ -147,7 +147,7 @@ def doubt_of(watch: Sequence[FaultInterval], against: Reservations) -> str:
     out += dict.fromkeys(event.doubt for event in against.events)
     if against.open:
         out.append(open_words(against.open))
-    return join_words([*out[:_REASONS], *(["more"] if len(out) > _REASONS else [])])
+    return join_words(out[:_REASONS]) + ("; more below" if len(out) > _REASONS else "")
 
 
 def doubts_of(faults: Sequence[FaultInterval], words: MachineWords) -> list[tuple[FaultInterval, str]]:
@@ -239,7 +239,7 @@ def _most_open(
     return [
         f"{against.words.part_words(Kind.WHEEL, *most)}: {open_s[most]:.1f} s of its {driven[most]:.1f} s of {against.words.moving} were not judged"
         + (f" ({reason})" if reason else "")
-        + f"; this is the most of all parts{' judged long enough' if against.short else ''}."
+        + f"; this is the most of all parts of {against.words.part}s{' judged long enough' if against.short else ''}."
         " The timeline shows when."
     ]
 

@@ -128,7 +128,9 @@ def _meanwhile(check: Checked, faults: Sequence[FaultInterval]) -> FaultInterval
     """
     start, stop = check.start_s, check.stop_s
     if start is None or stop is None:
-        return None
+        steered = [f for f in faults if f.kind is Kind.STEER and f.severity is not Severity.INFO]
+        against = check.check is Check.LASTING_RATE  # one axle against the other: a fault of either
+        return max(steered, key=lambda f: f.stop_s - f.start_s, default=None) if against else None
     share = {f.id: share_covered(start, stop, (f.start_s, f.stop_s)) for f in faults if f.severity is not Severity.INFO}
     counted = [f for f in faults if share.get(f.id, 0.0) >= MAY_EXPLAIN]
     if check.check is Check.JUMP:
@@ -173,8 +175,8 @@ def _of_faults(blamed: Sequence[tuple[Checked, FaultInterval]], words: MachineWo
 
 def _when(check: Checked, fault: FaultInterval) -> str:
     """How a check's window lies to a fault that may explain it."""
-    assert check.start_s is not None
-    assert check.stop_s is not None
+    if check.start_s is None or check.stop_s is None:
+        return "In a mission with"
     during = lasts_in(check.start_s, check.stop_s, (fault.start_s, fault.stop_s))
     return "At the time of" if during else "Just after"
 

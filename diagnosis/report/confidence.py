@@ -79,6 +79,7 @@ def _judged_words(share: float, moving: str) -> str:
     return f"{_share(share)} of its {moving} was judged"
 
 
+_WORTH_A_WORD = 0.05  # probability of an alternative
 _OF_A_FAULT = re.compile(r"F\d+: ")
 
 
@@ -128,12 +129,16 @@ def _cleared(report: ReportDocument) -> list[tuple[str, str]]:
     if "to_clear" not in report["verdict"]:
         return []
     verdict, components = report["verdict"], {row["component"] for row in report["coverage"]}
-    faulty = {
+    faults = [f for f in report["intervals"] if f["severity"] != Severity.INFO]
+    faulty: set[tuple[str, str]] = {(f["component"], s) for f in faults for s in Side(f["side"]).sides}
+    faulty |= {  # parts that a fault may be of as well
         (f["component"], s)
-        for f in report["intervals"]
-        if f["severity"] != Severity.INFO
-        for s in Side(f["side"]).sides
+        for f in faults
+        for h in f["hypotheses"]
+        if h["mode"] != State.HEALTHY and h["side"] in set(Side) and h["p"] >= _WORTH_A_WORD
+        for s in Side(h["side"]).sides
     }
+    faulty |= {(row["component"], row["side"]) for row in report["detectability"]["rows"] if row["size"] == 0.0}
     named: set[tuple[str, str]] = set()
     for row in verdict["to_clear"]:
         if _OF_A_FAULT.match(row["reason"]):

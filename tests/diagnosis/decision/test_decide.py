@@ -219,7 +219,7 @@ def test_every_reason_against_a_leave_is_in_the_list_once() -> None:
     )
     got = verdict(parts)
     first, second = "the FR drive valve may not answer", "the FL drive valve may follow noise more than its command"
-    assert got.not_cleared == f"{first}, {second} and more"
+    assert got.not_cleared == f"{first} and {second}; more below"
     reasons = [x.reason.partition(": ")[2] for x in got.to_clear]
     assert sorted(reasons) == [
         "the FL drive valve may follow noise more than its command.",
@@ -294,9 +294,9 @@ def test_the_worst_open_time_is_named_truly() -> None:
     driven = dict.fromkeys(parts, 60.0)
     decided = dict.fromkeys(parts, 60.0) | {("FL", "sensor"): 50.0}
     only = decide((), parts, decided, AXLES, LIMITS, (), HYDRAULIC, driving_s=driven)
-    assert any("10.0 s of its 60.0 s" in c and "this is the most of all parts." in c for c in only.caveats)
+    assert any("10.0 s of its 60.0 s" in c and "this is the most of all parts of wheels." in c for c in only.caveats)
     worse = decide((), parts, decided | {("FR", "sensor"): 20.0}, AXLES, LIMITS, (), HYDRAULIC, driving_s=driven)
-    assert any("FL" in c and "this is the most of all parts judged long enough." in c for c in worse.caveats)
+    assert any("FL" in c and "this is the most of all parts of wheels judged long enough." in c for c in worse.caveats)
 
 
 def test_a_short_drive_is_the_reason_not_the_standstill() -> None:

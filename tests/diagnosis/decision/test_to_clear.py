@@ -84,6 +84,16 @@ def test_what_deviates_while_a_fault_lasts_is_told_as_its_possible_doing() -> No
         assert "F1" not in row.reason + row.act
 
 
+def test_one_axle_against_the_other_over_the_mission_may_be_the_doing_of_a_fault_of_either() -> None:
+    parts = {("rear", "actuator"): assessed(finding(Side.ACTUATOR, FaultMode.INEFFICIENT, 1000, 3000, epsilon=0.6))}
+    faults = intervals_of(parts, haulotte(), HYDRAULIC, 0, 1_000_000)
+    front = Checked(Kind.STEER, "front", Side.SENSOR_OR_ACTUATOR, Check.LASTING_RATE, 0.3, 0.17)
+    rows = to_clear(Reservations(open=(front,)), PARTS, {}, {}, [], Limits(), faults)
+    (row,) = (r for r in rows if "steering rate" in r.reason)
+    assert row.reason.startswith("In a mission with F1, which may explain it: the steering rate of the front axle")
+    assert "rear steering valve (F1)" in row.act
+
+
 def test_what_deviates_after_a_fault_is_told_so_and_an_angle_that_jumps_then_is_not_its_doing() -> None:
     parts = {("RR", "actuator"): assessed(finding(Side.ACTUATOR, FaultMode.STUCK, 1000, 3000))}
     faults = intervals_of(parts, haulotte(), HYDRAULIC, 0, 1_000_000)

@@ -125,6 +125,14 @@ def test_parts_that_were_judged_and_those_that_were_cleared_are_counted_apart() 
     assert judged(samples.report_with(coverage=rows, intervals=[watched], verdict=about)) == (
         "4 of 4 parts judged, 3 cleared"
     )
+    either = [
+        {"side": "sensor", "mode": "inefficient", "p": 0.6},
+        {"side": "actuator", "mode": "inefficient", "p": 0.35},
+    ]
+    unclear = watched | {"hypotheses": either}
+    assert judged(samples.report_with(coverage=rows, intervals=[unclear], verdict=about)) == (
+        "4 of 4 parts judged, 2 cleared"  # the valve may be it as well
+    )
     about["to_clear"] = [{"reason": "The speed of FL per opening is 30 % below the others'.", "act": "lift it"}]
     assert judged(samples.report_with(coverage=rows, intervals=[watched], verdict=about)) == (
         "4 of 4 parts judged, 1 cleared"
