@@ -96,7 +96,8 @@ def _as_it_opens(
         y, x = (z[inner][pairs[2][inner]] for z in pairs[:2])
         moves = f.mode.total and x.size >= _FEW and min(np.std(x), np.std(y)) >= _MOTION
         if not moves or float(np.corrcoef(x, y)[0, 1]) < _FOLLOWS:
-            kept.append(_by_its_place(f, y) if f.mode.total and x.size >= _FEW else f)
+            still = f.mode.total and x.size >= _FEW and float(np.std(y)) < _MOTION
+            kept.append(_by_its_place(f, y) if still else f)
             continue
         gain = float(np.cov(x, y)[0, 1] / np.var(x, ddof=1))
         zero = float(np.mean(y) - gain * np.mean(x))
