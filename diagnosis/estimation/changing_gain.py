@@ -73,9 +73,12 @@ def as_changing_gain(finding: Finding, measured: Measured) -> Finding:
         f"this leaves {100 * left:.0f} % of the deviation's power."
     )
     figures = tuple(e for e in finding.evidence if e.startswith("Residual,") or "times as probable" in e)
+    start = at[before] if before else finding.start
+    known = finding.detected is not None and finding.detected >= start  # what raised it before was none of it
     return replace(
         finding,
-        start=at[before] if before else finding.start,
+        start=start,
+        detected=finding.detected if known else None,
         mode=FaultMode.INEFFICIENT,
         probability=p,
         hypotheses=(*named, noise),

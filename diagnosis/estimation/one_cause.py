@@ -265,13 +265,14 @@ def _joined(near: Sequence[Finding], cause: Cause) -> Finding:
         others.append(Hypothesis(longest.side.value, FaultMode.OUTSIDE_TABLE.value, offset))
     named = Hypothesis(longest.side.value, cause.mode.value, p)
     start = near[0].start if cause.start is None else cause.start
-    raised = [f.detected for f in near if f.detected is not None and f.detected >= start]
+    stop = max(f.stop for f in near) if cause.stop is None else cause.stop
+    raised = [f.detected for f in near if f.detected is not None and start <= f.detected < stop]
     figures = tuple(e for e in longest.evidence if e.startswith(("Residual,", "Over ")) or "times as probable" in e)
     pieces = f"This alone leaves {100 * cause.left:.0f} % of the deviation's power over {len(near)} pieces that were found one after the other."
     return replace(
         longest,
         start=start,
-        stop=max(f.stop for f in near) if cause.stop is None else cause.stop,
+        stop=stop,
         mode=cause.mode,
         probability=p,
         hypotheses=(named, *sorted(others, key=lambda h: -h.p)),

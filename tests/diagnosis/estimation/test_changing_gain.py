@@ -25,7 +25,7 @@ def told(y: Array, x: Array = COMMAND, mode: FaultMode = FaultMode.NOISY) -> Fin
     y = y + 0.003 * np.random.default_rng(3).standard_normal(SIZE)
     measured = Measured(y, x, np.ones(SIZE, np.bool_), DT, ("opening", "command"), "1", 0.003, 0.02)
     row = (Hypothesis(Side.ACTUATOR.value, mode.value, 0.98),)
-    finding = Finding(0, SIZE, Side.ACTUATOR, mode, 0.98, row, Epsilon(0.05, 0.0, 0.2), None, (), Tier.DIRECT)
+    finding = Finding(0, SIZE, Side.ACTUATOR, mode, 0.98, row, Epsilon(0.05, 0.0, 0.2), None, (), Tier.DIRECT, 3)
     return as_changing_gain(finding, measured)
 
 
@@ -42,6 +42,7 @@ def test_it_begins_where_a_share_is_lost() -> None:
     after = told(np.where(TIME > 8.0, 0.65, 1.02) * COMMAND)
     assert after.mode is FaultMode.INEFFICIENT
     assert 7.0 <= after.start * DT <= 8.5
+    assert after.detected is None  # what was seen before was none of it
     assert after.epsilon is not None
     assert after.epsilon.low < 0.35 < after.epsilon.high
 
