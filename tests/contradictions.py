@@ -21,7 +21,7 @@ from tests.plot_contradictions import of_faults, of_states
 from tests.word_slips import slips
 
 _TOTAL = ("stuck", "no_signal")
-_AT_RISK = 0.75
+_AT_RISK, _ROUNDED = 0.75, 1e-6
 _HALF = 0.5  # of ε, from which on a part alone keeps a machine from being cleared
 _LOST = 0.9
 _SPARE_S = 0.05
@@ -233,7 +233,7 @@ def _urgency(fault: Mapping[str, Any], report: Mapping[str, Any]) -> Iterator[st
     halved = size is not None and size["high"] >= _HALF and fault["mode"] in ("inefficient", "noisy")
     if "no reason to stop" in fault["advice"] and halved:
         yield f"no reason to stop although ε̂ may be {size['high']:.2f}, which keeps the machine from being cleared"
-    if not high and risk >= _AT_RISK and sure and not brief:
+    if not high and risk > _AT_RISK + _ROUNDED and sure and not brief:
         yield f"stuck, silent or lost is {risk:.2f} probable, and its severity is {fault['severity']}"
 
 
