@@ -23,6 +23,8 @@ _OF_COMMANDS = (OPENING, "fraction")
 EPSILON = ("epsilon", "epsilon_low", "epsilon_high")
 SAT = ("sat", "sat_low", "sat_high")
 
+_HARDLY = 0.1  # of a fault's probability: columns whose mean is less do not show it
+
 
 def size_columns(
     report: ReportDocument, t: NDArray[np.floating], step: float, parts: frozenset[tuple[str, str]]
@@ -100,7 +102,8 @@ def known_probability(
 ) -> dict[str, NDArray[Any]]:
     """The columns ``evidence.<component>.<side>.probability`` without what was not decided, which is NaN; see `size_columns`.
 
-    A fault of either side, which may rest on other evidence than these columns, has half of its probability on each at least.
+    A fault of either side, which may rest on other evidence than these columns, has half of its probability on each at least; one that
+    these columns hardly show rests on other evidence as well, and has its own.
 
     Columns and `t` [s] of shape (n,).
     """
@@ -117,9 +120,11 @@ def known_probability(
             if fault["component"] == component and side in Side(fault["side"]).sides:
                 rows = _rows(t, step, fault["start_s"], fault["stop_s"])
                 known[rows] = True
+                faulty = 1.0 - sum(h["p"] for h in fault["hypotheses"] if h["mode"] == State.HEALTHY)
                 if fault["side"] == Side.SENSOR_OR_ACTUATOR:
-                    faulty = 1.0 - sum(h["p"] for h in fault["hypotheses"] if h["mode"] == State.HEALTHY)
                     values[rows] = np.fmax(values[rows], 0.5 * faulty)
+                elif np.mean(np.nan_to_num(values[rows])) < _HARDLY * faulty:
+                    values[rows] = np.fmax(values[rows], faulty)
         out[name] = np.where(known, values, values.dtype.type(np.nan))
     return out
 

@@ -65,6 +65,16 @@ def test_no_probability_is_shown_of_what_was_not_decided() -> None:
     assert np.isfinite(shown[name]).nonzero()[0].tolist() == [*range(100), *range(400, 600)]
 
 
+def test_a_fault_that_rests_on_other_evidence_has_its_own_probability() -> None:
+    hypotheses = [{"side": "sensor", "mode": "stuck", "p": 0.6}, {"side": "none", "mode": "healthy", "p": 0.4}]
+    fault = samples.fault(mode="stuck", start_s=20.0, stop_s=30.0, probability=0.6, hypotheses=hypotheses)
+    report = samples.report_with() | {"intervals": [fault], "states": [state("stuck", 20.0, 30.0)]}
+    name = "evidence.FR.sensor.probability"
+    for shown, told in ((0.0, 0.6), (0.8, 0.8)):
+        found = known_probability(report, T, 0.1, {name: np.full(1000, shown, np.float32)})  # type: ignore[arg-type]
+        np.testing.assert_allclose(found[name][200:300], told)
+
+
 def test_rows_that_were_weighed_over_a_whole_fault_have_its_probabilities_during_it_alone() -> None:
     hypotheses = [
         {"side": "sensor", "mode": "stuck", "p": 0.7},
