@@ -140,7 +140,9 @@ def _cause_of(near: Sequence[Finding], measured: Measured) -> Cause | None:
     cause = _explanation(y[part], x[part], at[part], measured)  # a piece that began too early hides what it is
     if cause is None or not cause.alone or cause.changes:
         return None
-    return replace(cause, start=int(at[part][0]), stop=int(at[part][-1]) + 1)
+    behind = (y - x)[part.stop :]
+    healthy = not behind.size or power(behind, measured) <= (_BEYOND * measured.noise) ** 2
+    return replace(cause, start=int(at[part][0]), stop=int(at[part][-1]) + 1 if healthy else None)
 
 
 def _rests(y: Array, piece: NDArray[np.intp], measured: Measured) -> bool:

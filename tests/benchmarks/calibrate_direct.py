@@ -1,6 +1,6 @@
 """How often findings of direct evidence are right, by stated probability and length: `python tests/benchmarks/calibrate_direct.py`.
 
-Tuning missions alone. `_LAPSE` and `_COARSE_S` of `diagnosis.direct.isolation` follow from the last two columns: the share of
+Tuning missions alone. `_LAPSE` and `_COARSE_S` of `diagnosis.direct.stated_row` follow from the last two columns: the share of
 findings at the raw rate that are not what they seem, and the length at which half of the valve findings in a log too slow
 for its commands are.
 """

@@ -146,6 +146,14 @@ def test_a_piece_that_ended_too_late_does_not_hide_an_offset() -> None:
     assert (found.start, found.stop) == (pytest.approx(1200, abs=3), pytest.approx(2000, abs=3))
 
 
+def test_what_still_deviates_behind_an_offset_is_not_left_out() -> None:
+    there = (T >= 12.0) & (T < 20.0)
+    (found,) = with_one_cause(
+        pieces([(1000, 3600, FaultMode.NOISY)]), measured(lambda x: np.where(T >= 22.0, 0.94 * x, x) + 0.12 * there)
+    )
+    assert found.stop == 3600
+
+
 def test_noise_beside_a_loss_is_noise() -> None:
     disturbed = 0.015 * np.convolve(RNG.standard_normal(SIZE), np.exp(-np.arange(200) / 40.0), "same") / 4.5
     near = pieces(((1000, 2400, FaultMode.NOISY),))
