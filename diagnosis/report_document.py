@@ -21,6 +21,7 @@ from diagnosis.decision.decide import Decision, decide
 from diagnosis.decision.intervals import intervals_of, spans_of
 from diagnosis.decision.scale import Scale, scale_of
 from diagnosis.decision.wording import join_words
+from diagnosis.results.assessed import AT_TIMES, CUT
 from diagnosis.results.assessment import CODE
 from diagnosis.results.clearing import Checked, clearing_rows
 from diagnosis.results.detectability import Detectability, detectability_table
@@ -199,6 +200,7 @@ def _decision(
         misplaced=judged.places,
         open_state=open_state,
         shown=judged.detectable.rows,
+        end_s=judged.mission.timeline.size * judged.mission.timeline.dt,
     )
 
 
@@ -213,7 +215,7 @@ def _scope(judged: Judged) -> tuple[str, ...]:
     unjudged = [axle.removesuffix("_steer") for axle in machine.axles if _unjudged(judged.found, axle)]
     out += [f"the {join_words(unjudged)} steering was not judged"] if unjudged else []
     out += [
-        f"for {missing * line.dt:.1f} s of {line.size * line.dt:.1f} s, without data, the {axle.removesuffix('_steer')} steering was not judged"
+        f"{AT_TIMES}{missing * line.dt:.1f} s of {line.size * line.dt:.1f} s, without data, the {axle.removesuffix('_steer')} steering was not judged"
         for axle in machine.axles
         if not _unjudged(judged.found, axle) and (missing := _without_data(judged.found, axle)) > _MISSING * line.size
     ]
@@ -221,7 +223,7 @@ def _scope(judged: Judged) -> tuple[str, ...]:
     rest = (judged.recorded.last_ns - line.start_ns) * 1e-9 - line.size * line.dt
     if max(cut, rest) > _CUT_S:
         out.append(
-            f"only {line.size * line.dt:.1f} s of {(judged.recorded.last_ns - judged.recorded.first_ns) * 1e-9:.1f} s of the log were judged"
+            f"{CUT}{line.size * line.dt:.1f} s of {(judged.recorded.last_ns - judged.recorded.first_ns) * 1e-9:.1f} s of the log were judged"
         )
     return tuple(out)
 

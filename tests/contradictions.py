@@ -1,4 +1,4 @@
-"""Statements of one result that cannot all be true: verdict, severity, hypotheses, advice, sizes, times, states, words."""
+"""Statements of one result that cannot all be true: verdict, severity, hypotheses, advice, sizes, times, states, words, page."""
 
 from __future__ import annotations
 
@@ -17,6 +17,7 @@ from diagnosis.results.machine_words import HYDRAULIC
 from diagnosis.results.vocabulary import Severity
 from replay.machine.quantities import OPENING
 from tests.clearing_contradictions import of_checks, of_coverage
+from tests.page_contradictions import of_page
 from tests.plot_contradictions import of_faults, of_states
 from tests.word_slips import slips
 
@@ -45,6 +46,7 @@ def contradictions(report: Mapping[str, Any], columns: Mapping[str, NDArray[Any]
         *_terminal(report),
         *of_coverage(report),
         *of_checks(report),
+        *of_page(report),
         *slips(report),
     ]
     for fault in report["intervals"]:

@@ -1,9 +1,10 @@
-"""No result says two things that cannot both be true: missions with many faults, and the checker itself."""
+"""No result and no fleet says two things that cannot both be true: missions with many faults, fleets, and the checkers themselves."""
 
 from __future__ import annotations
 
 import copy
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,10 @@ import orjson
 import pytest
 from numpy.typing import NDArray
 
+from diagnosis.audit.fleet.fleet_types import FleetDocument
+from diagnosis.audit.fleet_files import fleet_json, load_fleet
 from diagnosis.pipeline import diagnose_mission
+from diagnosis.results.vocabulary import Verdict
 from replay.log.source_options import SignalSource
 from replay.machine.config import haulotte
 from replay.mission import Mission
@@ -19,7 +23,9 @@ from replay.signals.signal import Signal, Signals
 from replay.signals.timeline import align
 from replay.simulation.options import EvidenceLevel, SimulationOptions
 from replay.simulation.run import simulate_mission
+from tests import fleet_samples as samples
 from tests.contradictions import contradictions
+from tests.fleet_contradictions import fleet_contradictions
 
 Document = dict[str, Any]
 Columns = dict[str, NDArray[Any]]
@@ -104,8 +110,53 @@ def _moment(d: Document) -> None:
     d["verdict"]["to_clear"].append({"reason": reason, "act": "repair it"})
 
 
+def _not_judged(d: Document) -> None:
+    d["verdict"]["title"] = "No fault found, not all parts judged"
+    for row in d["coverage"]:
+        row["decided_driving_s"], row["tier"] = row["driving_s"] + 20.0, "direct"
+        row["driving_s"] += 20.0
+
+
+def _lasting(d: Document) -> None:
+    d["verdict"]["text"] += " It lasts to the end of the log."
+    for f in d["intervals"]:
+        f["stop_s"] = min(f["stop_s"], d["log"]["duration_s"] - 3.0)
+
+
+def _in_both(d: Document) -> None:
+    side = {
+        "tier": "model",
+        "driving_s": 44.5,
+        "decided_s": 44.5,
+        "judged_s": 44.5,
+        "assessed": True,
+        "shown": True,
+        "long_enough": True,
+    }
+    row = {"component": "RL", "kind": "wheel", "side": "sensor", "older": side, "newer": side, "change": "lost"}
+    d["previous"] = {"coverage": [row]}
+
+
+def _two_remedies(d: Document) -> None:
+    at_rest = "steer from stop to stop twice at standstill, and watch whether the axle follows"
+    d["verdict"]["to_clear"] += [
+        {
+            "reason": "Front steering valve: this mission leaves the check “against its second measurement” open.",
+            "act": at_rest,
+        },
+        {
+            "reason": "Not judged: front steering valve (steered too little).",
+            "act": "steer from stop to stop several times while driving",
+        },
+    ]
+
+
 @pytest.mark.parametrize(
-    "spoil", [_calm, _advice, _minority, _size, _late, _softer, _healthy, _untold, _sum, _unmoved, _moment]
+    "spoil",
+    [
+        *(_calm, _advice, _minority, _size, _late, _softer, _healthy, _untold, _sum, _unmoved, _moment),
+        *(_not_judged, _lasting, _in_both, _two_remedies),
+    ],
 )
 def test_a_spoilt_result_is_seen(result: tuple[Document, Columns], spoil: Callable[[Document], None]) -> None:
     document, _ = result
@@ -155,3 +206,36 @@ def test_plots_that_show_something_else_than_the_findings_are_seen(
     changed = dict(columns)
     spoil(document, changed)
     assert contradictions(document, changed) != []
+
+
+@pytest.fixture(scope="module")
+def fleet(tmp_path_factory: pytest.TempPathFactory) -> FleetDocument:
+    folder = tmp_path_factory.mktemp("fleet")
+    return fleet_json(load_fleet(samples.write_store(folder / "fleet.sqlite", samples.few())))
+
+
+@pytest.mark.parametrize("missions", [samples.few, samples.hostile])
+def test_fleets_do_not_contradict_themselves(tmp_path: Path, missions: Callable[[], list[samples.Sample]]) -> None:
+    document = fleet_json(load_fleet(samples.write_store(tmp_path / "fleet.sqlite", missions())))
+    assert fleet_contradictions(document) == []
+
+
+def _two_states(d: FleetDocument) -> None:
+    next(m for m in d["machines"] if m["verdict"] == "ready")["verdict"] = Verdict.NOT_ASSESSED
+
+
+def _other_number(d: FleetDocument) -> None:
+    d["verdict"]["title"] = "3 of 8 machines must not go out, 4 may go out, 1 must be checked first"
+
+
+def _other_list(d: FleetDocument) -> None:
+    label = next(m["label"] for m in d["machines"] if m["verdict"] == "ready")
+    d["verdict"]["text"].append(f"Must not go out (4): {label}.")
+
+
+@pytest.mark.parametrize("spoil", [_two_states, _other_number, _other_list])
+def test_a_spoilt_fleet_is_seen(fleet: FleetDocument, spoil: Callable[[FleetDocument], None]) -> None:
+    assert fleet_contradictions(fleet) == []
+    changed = copy.deepcopy(fleet)
+    spoil(changed)
+    assert fleet_contradictions(changed) != []

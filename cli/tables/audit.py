@@ -13,9 +13,8 @@ from rich.text import Text
 
 from cli.tables.layout import bullets, key_values, section, table, text
 from cli.tables.looks import verdict_style
-from diagnosis.audit.fleet.may_leave import Leave
 from diagnosis.audit.store.outcome import ENDS, READ, MissionState
-from diagnosis.results.vocabulary import Verdict
+from diagnosis.results.vocabulary import Leave, Verdict
 
 if TYPE_CHECKING:
     from diagnosis.audit.discovery.discover import Discovery
@@ -27,7 +26,7 @@ if TYPE_CHECKING:
 SCHEMA = "mfhca-audit/1"
 _VERDICTS = (Verdict.STOP, Verdict.WATCH, Verdict.READY, Verdict.NOT_ASSESSED)
 _WORST_FIRST = (MissionState.CRASHED, MissionState.OUT_OF_MEMORY, MissionState.TIMEOUT, MissionState.UNREADABLE)
-_LEAVES = {Leave.MUST_NOT: Verdict.STOP, Leave.NOT_KNOWN: Verdict.NOT_ASSESSED, Leave.MAY: Verdict.READY}
+_LEAVES = {Leave.MUST_NOT: Verdict.STOP, Leave.CHECK: Verdict.NOT_ASSESSED, Leave.MAY: Verdict.READY}
 _SHOWN, _MACHINES, _FAULTS = 10, 20, 2
 _NAMED = 5  # missions
 
@@ -97,7 +96,7 @@ def _copies(ends: Sequence[Ending]) -> list[list[str]]:
 
 
 def leave_parts(machines: Sequence[ListedMachine]) -> list[RenderableType]:
-    """Which machines must not go out, of which that is not known, and which may: why, and by which mission."""
+    """Which machines must not go out, which must be checked first, and which may: why, and by which mission."""
     parts: list[RenderableType] = []
     for leave, verdict in _LEAVES.items():
         mine = [m for m in machines if m.leave == leave]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
-from diagnosis.results.assessed import needed_s
+from diagnosis.results.assessed import is_cut, is_judged
 from diagnosis.results.comparison_document import CoverageStep
 from diagnosis.results.document import ReportDocument
 from diagnosis.results.vocabulary import Kind, Tier
@@ -50,7 +50,7 @@ class SideCoverage:
     def words(self) -> str:
         """How far it was judged, to follow *was*."""
         if self.tier is Tier.NONE:
-            return "not assessed"
+            return "not judged"
         return f"judged for {self.decided_s:.1f} s of {self.driving_s:.1f} s driving" + (
             "" if self.assessed else ", which is too little" if self.shown else ", and not cleared"
         )
@@ -59,11 +59,11 @@ class SideCoverage:
     def short_words(self) -> str:
         """How little it was judged, to follow *was*: not, hardly (less than half of the driving) or partly."""
         if self.tier is Tier.NONE or not self.judged_s:
-            return "not assessed"
+            return "not judged"
         if not self.shown:
             return "not cleared"
         much = "hardly" if self.decided_s < _HARDLY * self.driving_s else "only partly"
-        return f"{much} assessed ({self.decided_s:.1f} of {self.driving_s:.1f} s of driving)"
+        return f"{much} judged ({self.decided_s:.1f} of {self.driving_s:.1f} s of driving)"
 
 
 @dataclass(frozen=True)
@@ -85,13 +85,13 @@ def sides_of(report: ReportDocument) -> dict[Part, SideCoverage]:
     """Coverage of a report by component and side."""
     least = report["limits"]["min_assessed"]
     open_ = {(c["component"], s) for c in report["clearing"] if not c["passed"] for s in Side(c["side"]).sides}
-    whole = not report["verdict"]["scope"]
+    whole = not is_cut(report["verdict"]["scope"])
     out: dict[Part, SideCoverage] = {}
     for row in report["coverage"]:
         judged = sum(v for k, v in row["seconds"].items() if k in DECIDED)
         decided, driving, tier = row["decided_driving_s"], row["driving_s"], row["tier"]
         shown = whole and (row["component"], row["side"]) not in open_
-        long_enough = tier is not Tier.NONE and decided >= needed_s(driving, least)
+        long_enough = tier is not Tier.NONE and is_judged(decided, driving, least)
         assessed = shown and long_enough
         out[row["component"], row["side"]] = SideCoverage(tier, driving, decided, judged, assessed, shown, long_enough)
     return out

@@ -9,11 +9,12 @@ from diagnosis.comparison.coverage import SideCoverage
 from diagnosis.decision.wording import join_words
 from diagnosis.results.comparison_document import Change, Status, Trend
 from diagnosis.results.document import IntervalRow, ReportDocument, StateRow
+from diagnosis.results.ending import HEALTHY_S, healthy_after
 from diagnosis.results.fault_rows import mode_words
 from diagnosis.results.size_rows import EpsilonRow
 from diagnosis.results.vocabulary import Kind, Severity, Tier
 from diagnosis.results.wheel_model import RESOLUTION
-from replay.faults import FaultMode, Side, State
+from replay.faults import FaultMode, Side
 
 _LONGER, _LEAST_S = 2.0, 1.0
 _LEAST_EPSILON = 0.05  # bounds are those of one mission; the same fault differs more from mission to mission
@@ -133,17 +134,8 @@ def _found(
         epsilon=epsilon,
         probability=first["probability"],
         tier=max((f["tier"] for f in faults), key=lambda tier: tier.strength),
-        recovered=_recovered(key, min(f["stop_s"] for f in faults), states),
+        recovered=healthy_after(*key[:2], min(f["stop_s"] for f in faults), states) >= HEALTHY_S,
     )
-
-
-def _recovered(key: tuple[str, Side, FaultMode], after_s: float, states: Sequence[StateRow]) -> bool:
-    """Whether every side of a part was healthy for a second or more of the same mission behind a time [s]."""
-    healthy = dict.fromkeys(_keys(*key[:2]), 0.0)
-    for row in states:
-        if (row["component"], row["side"]) in healthy and row["state"] == State.HEALTHY:
-            healthy[row["component"], Side(row["side"])] += max(0.0, row["stop_s"] - max(after_s, row["start_s"]))
-    return min(healthy.values()) >= _LEAST_S
 
 
 def _keys(component: str, side: Side) -> list[tuple[str, Side]]:

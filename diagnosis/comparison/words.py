@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
-from diagnosis.results.comparison_document import Change, CoverageChangeRow
+from diagnosis.results.comparison_document import Change, CoverageChangeRow, SideCoverageRow
+from diagnosis.results.durations import seconds_words
 from diagnosis.results.vocabulary import Tier
 
 OUTCOMES: dict[str, str] = {
@@ -42,7 +43,7 @@ def headline(counts: Mapping[str, int]) -> str:
 
 def times(count: int, seconds: float) -> str:
     """Number and whole time of faults. Time in s."""
-    return (f"{count}×, " if count > 1 else "") + (f"{seconds * 1e3:.0f} ms" if seconds < 1 else f"{seconds:.1f} s")
+    return (f"{count}×, " if count > 1 else "") + seconds_words(seconds)
 
 
 def coverage_words(change: CoverageChangeRow) -> str:
@@ -52,13 +53,31 @@ def coverage_words(change: CoverageChangeRow) -> str:
         for side in (change["older"], change["newer"])
     )
     if change["change"] == "lost":
-        if change["newer"] is not None and not change["newer"]["shown"]:
-            return "no longer cleared"
-        return "no longer long enough" if now else "no longer assessed"
+        if _checks_alone(change["newer"]):
+            return "a check is open now"
+        return "no longer judged long enough" if now else "no longer judged"
     if change["change"] == "gained":
-        if change["older"] is not None and not change["older"]["shown"]:
-            return "cleared now"
-        return "long enough now" if before else "assessed now"
+        if _checks_alone(change["older"]):
+            return "its checks pass now"
+        return "judged long enough now" if before else "judged now"
     if any(side is not None and side["assessed"] for side in (change["older"], change["newer"])):
         return ""
-    return "long enough in neither" if before or now else "assessed in neither"
+    return "judged long enough in neither" if before or now else "judged in neither"
+
+
+def coverage_head(changes: Sequence[CoverageChangeRow]) -> str:
+    """Heading of parts that count as assessed in one of two missions alone: for how long they were judged, or for their checks."""
+    checks = [_checks_alone(side) for c in changes for side in (c["older"], c["newer"])]
+    if not any(checks):
+        return "Judged long enough in one mission only"
+    both = all(_checks_alone(c["older"]) or _checks_alone(c["newer"]) for c in changes)
+    return (
+        "Judged in both missions, its checks passed in one only"
+        if both
+        else "Judged long enough, or its checks passed, in one mission only"
+    )
+
+
+def _checks_alone(side: SideCoverageRow | None) -> bool:
+    """Whether a part was judged long enough and is not cleared for its checks, or for a mission that was cut."""
+    return side is not None and side["long_enough"] and not side["shown"]

@@ -6,12 +6,14 @@ the tool does not know them.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 from diagnosis.results.machine_words import MachineWords
+from diagnosis.results.result import Hypothesis
 from diagnosis.results.vocabulary import Kind
 from replay.faults import FaultMode, Side
 
+_MAY_BE = 0.15  # probability of a row of the other part that is worth a check
 _STUCK, _NO_SIGNAL, _INEFFICIENT, _NOISY = (
     FaultMode.STUCK,
     FaultMode.NO_SIGNAL,
@@ -80,6 +82,36 @@ _EITHER = (
     "First tell the two apart: command a slow motion and watch the {part}. If it moves and the reading does not follow, the sensor is "
     "faulty; if it does not move, the {valve} is. "
 )
+
+
+def check_of_all(
+    kind: Kind,
+    component: str,
+    side: Side,
+    mode: FaultMode,
+    hypotheses: Sequence[Hypothesis],
+    words: MachineWords,
+    own: Mapping[str, str] | None = None,
+) -> str:
+    """How to check one part with one fault, and then the other part where that may well be the faulty one.
+
+    Parameters
+    ----------
+    kind, component, side, mode, words, own
+        As for `check_of`.
+    hypotheses : Sequence[Hypothesis]
+        Its explanations with their probabilities.
+    """
+    first = check_of(kind, component, side, mode, words, own)
+    beside = {s.value for s in Side.SENSOR_OR_ACTUATOR.sides if s not in side.sides}
+    others = [h for h in hypotheses if h.side in beside and h.p >= _MAY_BE]
+    if not others:
+        return first
+    worst = max(others, key=lambda h: h.p)
+    other, p = Side(worst.side), sum(h.p for h in others if h.side == worst.side)
+    name = words.part_words(kind, component, other)
+    second = check_of(kind, component, other, FaultMode(worst.mode), words, own)
+    return f"{first} If that is in order: the {name} may be it as well ({100 * p:.0f} %). {second}"
 
 
 def check_of(

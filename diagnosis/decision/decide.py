@@ -17,14 +17,17 @@ from diagnosis.decision.caveats import (
     open_words,
     smallest_loads,
 )
+from diagnosis.decision.endings import endings_of
 from diagnosis.decision.short import ToClear, exempt_axles
 from diagnosis.decision.to_clear import to_clear
-from diagnosis.decision.wording import actions_of, count_faults, join_words, misplaced_words, seconds_words, sentence_of
-from diagnosis.results.assessed import needed_s
+from diagnosis.decision.wording import actions_of, count_faults, join_words, misplaced_words, sentence_of
+from diagnosis.results.assessed import AT_TIMES, CUT, is_judged
 from diagnosis.results.assessment import STATES, Assessment
 from diagnosis.results.clearing import Check, Checked
 from diagnosis.results.detectability import Detectable
 from diagnosis.results.document import ActionRow, VerdictRow
+from diagnosis.results.durations import seconds_words
+from diagnosis.results.ending import Ending
 from diagnosis.results.left_out import only_left_out
 from diagnosis.results.machine_event import MachineEvent
 from diagnosis.results.machine_words import MachineWords
@@ -112,6 +115,7 @@ def decide(
     misplaced: Sequence[str] = (),
     open_state: Mapping[Part, State] | None = None,
     shown: Sequence[Detectable] = (),
+    end_s: float | None = None,
 ) -> Decision:
     """Give the verdict.
 
@@ -155,6 +159,8 @@ def decide(
         The commonest state of each part that is no judgement, while driving.
     shown : Sequence[Detectable]
         What the mission would have shown.
+    end_s : float or None
+        End of the log [s]; None: not known.
     """
     driven = driving_s or {}
     against = _reservations(assessments, decided_s, driven, axles, limits, damage, model)
@@ -171,7 +177,9 @@ def decide(
         open_state=open_state or {},
     )
     open_points = to_clear(against, assessments, decided_s, driven, axles, limits, intervals)
-    found = _with_faults(intervals, against) or _without_faults(assessments, decided_s, axles, against)
+    found = _with_faults(intervals, against, endings_of(intervals, assessments, end_s)) or _without_faults(
+        assessments, decided_s, axles, against
+    )
     if found.status is Verdict.NOT_ASSESSED and open_points and not against.misplaced:  # which says it itself
         found = replace(found, text=f"{found.text} To clear it: {open_points[0].act}.")
     said = found.title == _SENSORS_ALONE  # which parts are not judged, and why
@@ -218,7 +226,7 @@ def _reservations(
     wheels = [part for part in assessments if part[0] not in axles]
     own_model = _modelled(assessments) and model is not None and model.identified
     return Reservations(
-        short=tuple(p for p in wheels if decided_s.get(p, 0.0) < needed_s(driven.get(p, 0.0), limits.min_assessed)),
+        short=tuple(p for p in wheels if not is_judged(decided_s.get(p, 0.0), driven.get(p, 0.0), limits.min_assessed)),
         unexplained=tuple(
             p
             for p, a in assessments.items()
@@ -238,19 +246,21 @@ def _modelled(assessments: Mapping[Part, Assessment]) -> bool:
     return any(a.tier is Tier.MODEL for a in assessments.values())
 
 
-def _with_faults(intervals: Sequence[FaultInterval], against: Reservations) -> Decision | None:
+def _with_faults(
+    intervals: Sequence[FaultInterval], against: Reservations, endings: Mapping[str, Ending]
+) -> Decision | None:
     """The verdict where a fault is worth an action."""
     stop = [f for f in intervals if f.severity is Severity.HIGH]
     watch = [f for f in intervals if f.severity in (Severity.MEDIUM, Severity.LOW)]
     first = "".join(f"{misplaced_words(m)} " for m in against.misplaced[:1])
     if stop:
-        return Decision(Verdict.STOP, count_faults(stop, watch), first + sentence_of(intervals, against.words))
+        return Decision(Verdict.STOP, count_faults(stop, watch), first + sentence_of(intervals, against.words, endings))
     if watch:
         doubt = doubt_of(watch, against)
         return Decision(
             Verdict.WATCH,
             count_faults((), watch),
-            first + sentence_of(intervals, against.words),
+            first + sentence_of(intervals, against.words, endings),
             cleared=not doubt,
             not_cleared=doubt,
         )
@@ -300,7 +310,9 @@ def _without_faults(
         return Decision(Verdict.NOT_ASSESSED, title, text)
     if against.scope:
         text = f"No fault was found, but {join_words(list(against.scope))}."
-        return Decision(Verdict.NOT_ASSESSED, "No fault found, not all judged", text)
+        at_times = all(reason.startswith((CUT, AT_TIMES)) for reason in against.scope)
+        title = f"No fault found, not {'the whole mission' if at_times else 'all parts'} judged"
+        return Decision(Verdict.NOT_ASSESSED, title, text)
     if against.open:
         text = f"No fault was identified, but this mission does not exclude one: {open_words(against.open)}."
         return Decision(Verdict.NOT_ASSESSED, "No fault found, not cleared", text)

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from diagnosis.decision.advice import check_of
+from diagnosis.decision.advice import check_of_all
 from diagnosis.decision.severity import severity_of
 from diagnosis.results.assessment import STATES, Assessment, Finding
 from diagnosis.results.machine_words import MachineWords
@@ -49,7 +49,7 @@ def intervals_of(
                 hypotheses=f.hypotheses,
                 severity=severity,
                 advice=advice,
-                check=check_of(kind, component, f.side, f.mode, words, machine.advice),
+                check=check_of_all(kind, component, f.side, f.mode, f.hypotheses, words, machine.advice),
                 evidence=f.evidence,
                 tier=f.tier,
                 detected_s=None if f.detected is None else f.detected * step_ns * 1e-9,

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from diagnosis.decision.wording import join_words
-from diagnosis.results.assessed import needed_s
+from diagnosis.results.assessed import is_judged, needed_s
 from diagnosis.results.assessment import STATES, Assessment
 from diagnosis.results.machine_words import MachineWords
 from diagnosis.results.vocabulary import Kind, Tier
@@ -106,9 +106,9 @@ def unjudged_axles(axles: Sequence[Part], assessments: Mapping[Part, Assessment]
     act = (
         "log steer.<part>.phi and steer.<part>.u, and steer from stop to stop twice while driving"
         if reason.endswith(_NOT_LOGGED)
-        else "steer from stop to stop twice while the log runs"
+        else "steer from stop to stop twice at standstill and several times while driving, with the log running"
     )
-    return ToClear(f"Not assessed: {who} ({reason}).", act)
+    return ToClear(f"Not judged: {who} ({reason}).", act)
 
 
 def exempt_axles(
@@ -143,7 +143,7 @@ def exempt_axles(
     part = [
         p
         for p in assessments
-        if p[0] in axles and p in driven and decided_s.get(p, 0.0) < needed_s(driven[p], limits.min_assessed)
+        if p[0] in axles and p in driven and not is_judged(decided_s.get(p, 0.0), driven[p], limits.min_assessed)
     ]
     if not part:
         return ()

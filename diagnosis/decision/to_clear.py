@@ -7,7 +7,7 @@ from collections.abc import Collection, Mapping, Sequence
 from diagnosis.decision.caveats import Reservations, doubts_of, furthest_first
 from diagnosis.decision.short import Part, ToClear, short_parts, unjudged_axles
 from diagnosis.decision.wording import count_words, join_words
-from diagnosis.results.assessed import needed_s
+from diagnosis.results.assessed import is_judged
 from diagnosis.results.assessment import Assessment
 from diagnosis.results.clearing import MAY_EXPLAIN, Check, Checked, lasts_in, share_covered
 from diagnosis.results.left_out import is_left_out
@@ -19,6 +19,7 @@ from replay.machine.config import Limits
 
 _STEERING = "steering was not judged"
 _NAMED = 2  # open checks
+_STEER = "steer from stop to stop twice at standstill, and watch whether the axle follows"
 _STEERED = (Check.STILL, Check.RATE, Check.LASTING_RATE)
 _TURNED = (Check.YAW, Check.LASTING_YAW)
 
@@ -102,23 +103,30 @@ def to_clear(
             )
         )
     out += _of_doubts(faults, words)
-    twice = {c for (c, side), a in assessments.items() if a.tier is Tier.DIRECT and side == Side.SENSOR}
-    blamed = {k: f for k, c in enumerate(against.open) if (f := _meanwhile(c, faults)) is not None}
-    deviating = _of_faults([(against.open[k], f) for k, f in blamed.items()], words)
-    deviating += _of_checks([c for k, c in enumerate(against.open) if k not in blamed], twice)
-    ranks = {check: k for k, check in enumerate(furthest_first(against.open))}
-    out += [point for _, point in sorted(deviating, key=lambda d: ranks[d[0]])]
     steered = [k for k in assessments if k[0] in axles]
     unjudged = [k for k in steered if assessments[k].tier is Tier.NONE]
     at_rest = {k for k, state in against.open_state.items() if state is State.NOT_EXCITED}  # exempt: its checks count
     brief = [k for k in steered if k not in {*unjudged, *at_rest} and _brief(k, decided_s, driven, limits)]
+    twice = {c for (c, side), a in assessments.items() if a.tier is Tier.DIRECT and side == Side.SENSOR}
+    blamed = {k: f for k, c in enumerate(against.open) if (f := _meanwhile(c, faults)) is not None}
+    deviating = _of_faults([(against.open[k], f) for k, f in blamed.items()], words)
+    told = {component for component, _ in (*unjudged, *brief)}  # what has them judged lets their checks pass
+    left = [c for k, c in enumerate(against.open) if k not in blamed]
+    deviating += _of_checks([c for c in left if c.component not in told or not _asks_for_steering(c, twice)], twice)
+    ranks = {check: k for k, check in enumerate(furthest_first(against.open))}
+    out += [point for _, point in sorted(deviating, key=lambda d: ranks[d[0]])]
     out += short_parts(brief, assessments, decided_s, driven, limits, words, Kind.STEER, open_state=against.open_state)
     return tuple(out + ([unjudged_axles(unjudged, assessments, words)] if unjudged else []))
 
 
+def _asks_for_steering(check: Checked, twice: Collection[str]) -> bool:
+    """Whether a check is open for want of steering alone: nothing deviates, and steering would let it pass."""
+    return check.worst is None and _act(check, twice) == _STEER
+
+
 def _brief(part: Part, decided_s: Mapping[Part, float], driven: Mapping[Part, float], limits: Limits) -> bool:
     """Whether a part of an axle was judged for less than a part of a wheel must be."""
-    return part in driven and decided_s.get(part, 0.0) < needed_s(driven[part], limits.min_assessed)
+    return part in driven and not is_judged(decided_s.get(part, 0.0), driven[part], limits.min_assessed)
 
 
 def _meanwhile(check: Checked, faults: Sequence[FaultInterval]) -> FaultInterval | None:
@@ -229,7 +237,7 @@ def _act(check: Checked, twice: Collection[str]) -> str:
             f"steer.{check.component}.phi_true and .u_applied (second measurements)"
         )
     if check.check in _STEERED or check.kind == Kind.STEER:
-        return "steer from stop to stop twice at standstill, and watch whether the axle follows"
+        return _STEER
     if check.check is Check.CARRIED:
         return (
             f"log wheel.<part>.u_applied (the {words.drive}'s own measurement), or lift the machine, give every {words.part} the same "

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from diagnosis.decision.severity import halved_words, unanswered
 from diagnosis.results.candidates import UNCLEAR, candidates, unclear_words
 from diagnosis.results.document import ActionRow
+from diagnosis.results.durations import seconds_words
+from diagnosis.results.ending import Ending
 from diagnosis.results.fault_rows import mode_words
 from diagnosis.results.machine_words import MachineWords
 from diagnosis.results.result import FaultInterval
@@ -130,25 +132,38 @@ def _lost(faults: Sequence[FaultInterval]) -> str:
     return f" ({' to '.join(span)} % lost{course}{bounds})"
 
 
-def sentence_of(faults: Sequence[FaultInterval], words: MachineWords) -> str:
-    """The most urgent three parts in one sentence, in the order of the actions; of a machine to stop those that it is stopped for."""
+def sentence_of(
+    faults: Sequence[FaultInterval], words: MachineWords, endings: Mapping[str, Ending] | None = None
+) -> str:
+    """The most urgent three parts in one sentence, in the order of the actions; of a machine to stop those that it is stopped for.
+
+    `endings` has how each fault ends by its name: what is not seen to end *has been*, what ended *was*.
+    """
     parts = _by_part(faults)
     high = [f for f in parts if f[0].severity is Severity.HIGH]
     which = " to repair" if 0 < len(high) < len(parts) else ""
     parts = high or parts
-    said = [f"the {words.part_words(f[0].kind, f[0].component, f[0].side)} was {_summary(f)}" for f in parts[:_NAMED]]
-    text = "; ".join(said) if any(len(f) > 1 for f in parts[:_NAMED]) else join_words(said)
+    said = [
+        f"the {words.part_words(f[0].kind, f[0].component, f[0].side)} {_was(f, endings or {})}" for f in parts[:_NAMED]
+    ]
+    apart = any(len(f) > 1 or _course_of(f, endings or {}) is not Ending.ENDED for f in parts[:_NAMED])
+    text = "; ".join(said) if apart else join_words(said)
     rest = len(parts) - _NAMED
     more = f"; {count_words(rest, 'more part')}{which} {'is' if rest == 1 else 'are'} listed below" if rest > 0 else ""
     return text[0].upper() + text[1:] + more + "."
 
 
-def seconds_words(value: float) -> str:
-    """A duration [s] as shown: ``140 ms``, ``6.4 s``, ``3.4 min``; the pages say the same."""
-    value = round(value, 6)  # which a difference of times may miss by its last digit
-    if value < 120:
-        return f"{value * 1e3:.0f} ms" if value < 1 else f"{value:.1f} s"
-    return f"{value / 60:.1f} min" if value < 7200 else f"{value / 3600:.1f} h"
+def _was(faults: Sequence[FaultInterval], endings: Mapping[str, Ending]) -> str:
+    """What one part was, or has been where that is not seen to end."""
+    ending = _course_of(faults, endings)
+    if ending is Ending.ENDED:
+        return f"was {_summary(faults)}"
+    return f"has been {_summary(faults)}, {'to the end of the log' if ending is Ending.LASTS else 'and was not seen to end'}"
+
+
+def _course_of(faults: Sequence[FaultInterval], endings: Mapping[str, Ending]) -> Ending:
+    """How the last of one part's faults ends."""
+    return endings.get(max(faults, key=lambda f: f.stop_s).id, Ending.ENDED)
 
 
 def count_words(n: int, word: str) -> str:

@@ -14,6 +14,7 @@ from markupsafe import Markup
 
 from diagnosis.results.candidates import candidates_of, unclear_words
 from diagnosis.results.document import IntervalRow
+from diagnosis.results.durations import seconds_words
 from diagnosis.results.fault_rows import LOOKS, row_of, state_label
 from diagnosis.results.machine_words import MachineWords
 from diagnosis.results.size_rows import EpsilonRow
@@ -82,14 +83,7 @@ def clock(seconds: float, digits: int = 0) -> str:
 
 def span(seconds: float) -> str:
     """Length of time with a unit that suits it. Length in s."""
-    seconds = round(seconds, 6)  # which a difference of times may miss by its last digit
-    if seconds < 1:
-        return f"{seconds * 1e3:.0f} ms"
-    if seconds < 120:
-        return f"{seconds:.1f} s"
-    if seconds < 7200:
-        return f"{seconds / 60:.1f} min"
-    return f"{seconds / 3600:.1f} h"
+    return seconds_words(seconds)
 
 
 def number(value: object, digits: int = 3) -> str:

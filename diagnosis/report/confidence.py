@@ -5,21 +5,17 @@ from __future__ import annotations
 import re
 
 from diagnosis.comparison.coverage import SideCoverage, sides_of
-from diagnosis.results.document import IntervalRow, ReportDocument, VerdictRow
+from diagnosis.results.document import IntervalRow, ReportDocument, ToClearRow, VerdictRow
 from diagnosis.results.fault_rows import state_label
 from diagnosis.results.machine_words import words_of
-from diagnosis.results.vocabulary import Kind, Severity, Tier, Verdict
+from diagnosis.results.vocabulary import Kind, Leave, Severity, Tier, Verdict
 from replay.faults import Side, State
 
 _WORDS = ((0.99, "Practically certain"), (0.9, "Very likely"), (0.7, "Likely"))
 _OPEN, _TIE = 0.9, 1e-3
 _NOTHING, _MOSTLY = 0.005, 0.5  # of the driving: judged for so little that it is none, and for most of it
 _UNLIKE = 0.1  # of the driving: sides that were judged for shares so far apart are told one by one
-_ANSWERS = {
-    Verdict.STOP: "must not go out before repair",
-    Verdict.READY: "",
-    Verdict.NOT_ASSESSED: "whether it may go out is not known",
-}
+_ANSWERS = {Verdict.STOP: f"{Leave.MUST_NOT} before repair", Verdict.READY: "", Verdict.NOT_ASSESSED: Leave.CHECK.value}
 
 
 def percent(p: float) -> str:
@@ -80,7 +76,8 @@ def _judged_words(share: float, moving: str) -> str:
 
 
 _WORTH_A_WORD = 0.05  # probability of an alternative
-_OF_A_FAULT = re.compile(r"F\d+: ")
+#: Begins a reason that is a fault's own, which the verdict's actions say.
+OF_A_FAULT = re.compile(r"F\d+: ")
 
 
 def _likely(p: float) -> str:
@@ -96,7 +93,11 @@ def judged(report: ReportDocument) -> str:
     short = [part for part, s in sides.items() if not s.long_enough]
     if not sides:
         return ""
-    out = [f"{len(sides) - len(short)} of {len(sides)} parts judged, {len(_cleared(report)) or 'none'} cleared"]
+    cleared = len(_cleared(report))
+    many = str(cleared) if cleared else "none"
+    out = [
+        f"{len(sides) - len(short)} of {len(sides)} parts judged, {many} cleared{'' if cleared else _why_none(report)}"
+    ]
     for how, some in (("not judged long enough:", True), ("not judged:", False)):
         told = [
             words.listed(kind, mine)
@@ -114,21 +115,39 @@ def judged(report: ReportDocument) -> str:
 
 
 def judged_means(report: ReportDocument) -> str:
-    """What *judged* and *cleared* mean in `judged`; empty where it says nothing."""
+    """What *judged*, *cleared* and *open* mean on the page; empty where nothing is judged."""
     if not sides_of(report):
         return ""
     moving = words_of(report["machine"]).moving
     return (
         f"Judged: decided, healthy or faulty, for at least {report['limits']['min_assessed']:g} s and four fifths of the part’s {moving}. "
-        "Cleared: judged, without a fault, every check of the all-clear passed, and named in nothing that is open."
+        "Cleared: judged, without a fault, every check of the all-clear passed, and named in nothing that is open. "
+        "Open, or not assessed: this mission does not tell whether it is healthy."
     )
+
+
+def _why_none(report: ReportDocument) -> str:
+    """Why no part is cleared, to follow *none cleared*."""
+    rows = report["verdict"].get("to_clear")
+    if rows is None:
+        return ", for this report does not say what is open"
+    whole = next((row["reason"] for row in rows if not _named(row, report)), "")
+    if whole:
+        return f": {whole[:1].lower()}{whole[1:].rstrip('.')}"
+    return ", for each has a fault or is named in what is open" if rows else ", for each has a fault or an open check"
+
+
+def _named(row: ToClearRow, report: ReportDocument) -> set[str]:
+    """Components that an open point names."""
+    components = {r["component"] for r in report["coverage"]}
+    return {c for c in components if re.search(rf"(?<!\w){re.escape(c.removesuffix('_steer'))}(?!\w)", row["reason"])}
 
 
 def _cleared(report: ReportDocument) -> list[tuple[str, str]]:
     """Parts that were judged and of which nothing is open; none where something is open that names no part, or that is not said."""
     if "to_clear" not in report["verdict"]:
         return []
-    verdict, components = report["verdict"], {row["component"] for row in report["coverage"]}
+    verdict = report["verdict"]
     faults = [f for f in report["intervals"] if f["severity"] != Severity.INFO]
     faulty: set[tuple[str, str]] = {(f["component"], s) for f in faults for s in Side(f["side"]).sides}
     faulty |= {  # parts that a fault may be of as well
@@ -141,11 +160,9 @@ def _cleared(report: ReportDocument) -> list[tuple[str, str]]:
     faulty |= {(row["component"], row["side"]) for row in report["detectability"]["rows"] if row["size"] == 0.0}
     named: set[tuple[str, str]] = set()
     for row in verdict["to_clear"]:
-        if _OF_A_FAULT.match(row["reason"]):
+        if OF_A_FAULT.match(row["reason"]):
             continue  # its part is among the faulty ones
-        mine = {
-            c for c in components if re.search(rf"(?<!\w){re.escape(c.removesuffix('_steer'))}(?!\w)", row["reason"])
-        }
+        mine = _named(row, report)
         if not mine:
             return []
         named |= {(c, s) for c in mine for s in _sides_named(row["reason"], c, report)}
@@ -203,8 +220,21 @@ def headline(report: ReportDocument) -> tuple[str, str]:
     if status is not Verdict.WATCH:
         return status.label, _ANSWERS[status]
     if not verdict["cleared"]:
-        return status.label, f"not cleared: {verdict['not_cleared']}"
-    return "Ready, with faults to watch", "may go out"
+        return status.label, f"{Leave.CHECK}: {verdict['not_cleared']}"
+    return "Ready, with faults to watch", Leave.MAY.value
+
+
+def going_out(report: ReportDocument) -> tuple[str, str]:
+    """Whether the machine may go out again: *Yes* or *No*, and what belongs to it, to follow that word."""
+    status = Verdict(report["verdict"]["status"])
+    if holds_open(report) and status is not Verdict.STOP:
+        return "No", ", not before the fleet page says so: a fault of an earlier mission is open"
+    if status is Verdict.STOP:
+        return "No", ", not before repair"
+    if not may_go_out(report["verdict"]):
+        why = report["verdict"]["not_cleared"]
+        return "No", f", not before it was checked{': ' if why else ''}{why}"
+    return "Yes", "; the faults to watch are no reason to keep it in" if status is Verdict.WATCH else ""
 
 
 def may_go_out(verdict: VerdictRow) -> bool:

@@ -49,7 +49,10 @@ _ASSETS = Path(__file__).parent / "assets"
 _STYLES = (_ASSETS / "evidence.css", _ASSETS / "explorer.css", _ASSETS / "reading.css", _ASSETS / "print.css")
 _FIRST = _ASSETS / "data.js"
 #: Scripts that a page holds packed, and expands when it is opened.
-_MAIN = tuple(_ASSETS / name for name in ("figure_looks.js", "plot.js", "export.js", "explorer.js", "page.js"))
+_MAIN = tuple(
+    _ASSETS / name
+    for name in ("figure_looks.js", "plot.js", "export.js", "explorer.js", "sight.js", "address.js", "page.js")
+)
 #: Scripts that it expands when its first plot is drawn.
 _LATER = tuple(
     _ASSETS / name for name in ("reading.js", "pictures.js", "lanes.js", "replay.js", "views.js", "whatif.js")

@@ -21,6 +21,7 @@ _WIDTH = 360.0
 _EDGE_HEIGHT, _COURSE_HEIGHT = 176.0, 98.0
 _HEAD = 17.0
 _SCALES = 44.0
+_LETTER = 6.2  # width of one of bold words, at most
 _STRETCHES = 150
 #: Class of the line by the part that a curve plays; see `Trace`.
 _STYLES = {"measured": "m", "reference": "r"}
@@ -75,7 +76,11 @@ def _detected(edge: Edge, fault: IntervalRow, frame: Frame) -> Markup:
     words = f"detected +{time_words(delay)}" if delay > 0 else "detected at once"
     if frame.x[0] <= at <= frame.x[1]:
         place = float(frame.px(at))
-        return frame.line(at, "det") + label(place + 4, frame.top - 5, words, "beg b")
+        room = place + 4 + _LETTER * len(words) <= _WIDTH
+        words_at = (
+            label(place + 4, frame.top - 5, words, "beg b") if room else label(place - 4, frame.top + 9, words, "fin b")
+        )
+        return frame.line(at, "det") + words_at
     if edge.name == "onset" and at > 0:
         return label(frame.right, frame.top - 5, words + " →", "fin b")
     return Markup("")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from diagnosis.comparison.words import CHANGES, OUTCOMES, SIGNS, coverage_words, times
+from diagnosis.comparison.words import CHANGES, OUTCOMES, SIGNS, coverage_head, coverage_words, times
 from diagnosis.pages import labels
 from diagnosis.report.judged_parts import kind_of
 from diagnosis.report.tables import Context
@@ -48,6 +48,7 @@ def previous_section(report: ReportDocument) -> Context | None:
         "short": ", ".join(short) or "no fault in either",
         "faults": [_row(c, words) for c in found["faults"]],
         "coverage": [_coverage(c, words) for c in found["coverage"]],
+        "coverage_head": coverage_head(found["coverage"]),
         "loss": [_loss(x, report["machine"]) for x in found["loss"] if _differs(x)],
         "same_loss": sum(not _differs(x) for x in found["loss"]),
         "notes": found["notes"],
@@ -109,7 +110,9 @@ def _judged(side: SideCoverageRow | None) -> str:
         return "not in the result"
     if side["tier"] == Tier.NONE:
         return "no evidence"
-    return f"{side['decided_s']:.1f} of {side['driving_s']:.1f} s driving"
+    return f"{side['decided_s']:.1f} of {side['driving_s']:.1f} s driving" + (
+        ", a check open" if not side["shown"] else ""
+    )
 
 
 def _differs(x: LossChangeRow) -> bool:

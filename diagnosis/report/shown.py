@@ -108,7 +108,7 @@ def _cell(row: DetectabilityRow | None) -> str:
     size, unit = row["size"], row["unit"]
     if not unit:
         share = row["share"] or 0.0
-        return "found" if share >= 0.95 else f"{100 * share:.0f} % of the time"
+        return "found" if share >= 0.95 else f"found in {100 * share:.0f} %" if share >= 0.005 else "never found"
     if size is None:
         return "not shown"
     if not size:

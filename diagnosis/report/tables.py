@@ -10,6 +10,8 @@ from markupsafe import Markup
 
 from diagnosis.pages.labels import UNDATED_NS, clock, mode_legend, number, sat_text, utc, utc_mark
 from diagnosis.report.confidence import (
+    OF_A_FAULT,
+    going_out,
     headline,
     holds_open,
     judged,
@@ -29,6 +31,7 @@ from diagnosis.report.data_tables import (
     signal_row,
 )
 from diagnosis.report.edges import time_words
+from diagnosis.report.fault_times import when_words
 from diagnosis.report.judged_parts import judged_sides
 from diagnosis.results.candidates import label_of
 from diagnosis.results.document import (
@@ -109,14 +112,14 @@ def context(report: ReportDocument, duration: float) -> Context:
 
 def _verdict(report: ReportDocument) -> Context:
     verdict = report["verdict"]
-    words, answer = headline(report)
+    words, _ = headline(report)
     blocked = holds_open(report) and may_go_out(verdict)
     faults = {f["id"]: f for f in report["intervals"]}
     return {
         "state": (Verdict.NOT_ASSESSED if blocked else Verdict(verdict["status"])).symbol,
         "words": words,
         "steered": bool(report["machine"]["axles"]),
-        "answer": answer,
+        "going_out": going_out(report),
         "sure": "" if verdict["actions"] else sure_of_verdict(report),
         "title": verdict["title"] or words,
         "text": verdict["text"],
@@ -171,9 +174,13 @@ def other_caveats(verdict: VerdictRow) -> list[str]:
 
 
 def clearing_sentences(verdict: VerdictRow) -> list[tuple[str, str]]:
-    """What keeps the machine from being cleared and what would clear it, but for what the verdict's own sentences say."""
+    """What keeps the machine from being cleared and what would clear it, but for what the verdict's own sentences and actions say."""
     text = verdict["text"]
-    rows = [row for row in verdict.get("to_clear", []) if not _said(row, text)]
+    rows = [
+        r
+        for r in verdict.get("to_clear", [])
+        if not _said(r, text) and not (verdict["actions"] and OF_A_FAULT.match(r["reason"]))
+    ]
     return [(_begun(row["reason"]), "" if row["act"] in text else row["act"]) for row in rows]
 
 
@@ -222,6 +229,7 @@ def _action(action: ActionRow, intervals: Mapping[str, IntervalRow], report: Rep
         "state": first["mode"] if first else "warning",
         "severity": action["severity"],
         "sure": sure_of(first, report) if first else "",
+        "when": when_words(first, report) if first else "",
     }
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from diagnosis.results.assessed import needed_s
+from diagnosis.results.assessed import is_judged
 from diagnosis.results.document import ReportDocument
 from diagnosis.results.vocabulary import Tier, Verdict
 from replay.machine.config import Limits
@@ -57,7 +57,7 @@ def _doubt(report: ReportDocument) -> str:
     wheels = [row for row in report["coverage"] if row["component"] not in report["machine"]["axles"]]
     least = report["limits"]["min_assessed"]
     short = sum(
-        row["tier"] is Tier.NONE or row["decided_driving_s"] < needed_s(row["driving_s"], least) for row in wheels
+        row["tier"] is Tier.NONE or not is_judged(row["decided_driving_s"], row["driving_s"], least) for row in wheels
     )
     if short:
         return f"{short} part{'s were' if short > 1 else ' was'} not judged long enough"

@@ -18,7 +18,7 @@ class MachineEvent:
     text : str
         One sentence, or two.
     doubt : str
-        Why a mission with faults to watch is not cleared; continues "not cleared: …".
+        Why a mission with faults to watch is not cleared; continues "check before it goes out: …".
     act : str
         What to do before a mission may be judged again.
     model : bool

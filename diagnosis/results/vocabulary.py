@@ -68,6 +68,14 @@ _VERDICT_WORDS = {
 }
 
 
+class Leave(StrEnum):
+    """Whether a machine may go out; what the data cannot show is to be checked first."""
+
+    MUST_NOT = "must not go out"
+    CHECK = "check before it goes out"
+    MAY = "may go out"
+
+
 class Tier(StrEnum):
     """Kind of evidence behind a judgement; the strongest first."""
 

@@ -1,9 +1,10 @@
 """Results that contradict themselves, over hundreds of missions: `python tests/benchmarks/contradictions.py --count 6`.
 
-Five kinds of data: the simulator's scenarios and machines of other structures, in every tier; the machines of other physics beside
+Six kinds of data: the simulator's scenarios and machines of other structures, in every tier; the machines of other physics beside
 this file, with every sort of trouble; ordinary robots set up as `config init` does; the reference data's foreign plant; real robots
-and arms as they are, and with faults written into them. Each result is read by `tests.contradictions`:
-verdict, title, hypotheses, severity, advice, sizes, times, states and the terminal's words must agree. Ends with 1 where one
+and arms as they are, and with faults written into them; made-up fleets. Each result is read by `tests.contradictions`:
+verdict, title, hypotheses, severity, advice, sizes, times, states, the page's and the terminal's words must agree; each fleet by
+`tests.fleet_contradictions`: lists, states, headline, table and page. Ends with 1 where one
 does not. Seeds from 2000 on. The real logs and the plant lie where ``MFHCA_REFERENCE_DATA`` says; without them they are left out.
 """
 
@@ -32,6 +33,8 @@ from ordinary_robots.machines import KINDS
 from troubles import troubles
 from variation import recorded_signals
 
+from diagnosis.audit.fleet.fleet_types import FleetDocument
+from diagnosis.audit.fleet_files import fleet_json, load_fleet
 from diagnosis.pipeline import diagnose, diagnose_mission, diagnose_signals
 from diagnosis.results.result import MissionResult
 from replay.errors import MfhcaError
@@ -42,7 +45,9 @@ from replay.signals.timeline import align
 from replay.simulation.options import SimulationOptions
 from replay.simulation.run import simulate_mission
 from replay.simulation.structures import STRUCTURE_NAMES, StructureOptions
+from tests import fleet_samples
 from tests.contradictions import contradictions
+from tests.fleet_contradictions import fleet_contradictions
 
 TIERS = ("base", "spool", "direct")
 Named = tuple[str, MissionResult]
@@ -123,6 +128,35 @@ def foreign(count: int, first: int) -> Iterator[Named]:
             yield f"foreign {5200 + first + k} {tier}", diagnose_mission(mission, machine)
 
 
+def fleets(count: int, first: int) -> Iterator[tuple[str, FleetDocument]]:
+    """Fleets of three machines with missions of every kind."""
+    parts = fleet_samples.PARTS
+    for k in range(20 * count):
+        rng = np.random.default_rng(first + k)
+        missions = []
+        for n in range(int(rng.integers(4, 14))):
+            faults = [
+                fleet_samples.Fault(
+                    *parts[rng.integers(len(parts))],
+                    str(rng.choice(["stuck", "inefficient", "noisy"])),
+                    str(rng.choice(["high", "medium", "low"])),
+                    tuple(np.sort(rng.uniform(0.0, 1.0, 3))[[1, 0, 2]].tolist()),
+                    float(rng.choice([10.0, 2515.0])),
+                )
+                for _ in range(int(rng.choice([0, 0, 0, 1, 2])))
+            ]
+            worst = "stop" if any(f.severity == "high" for f in faults) else "watch" if faults else ""
+            verdict = worst or str(rng.choice(["ready", "not_assessed"], p=[0.8, 0.2]))
+            blind = [p for p in parts if rng.random() < 0.2] if verdict == "not_assessed" else []
+            state = str(rng.choice(["ok", "unreadable"], p=[0.95, 0.05]))
+            day = float(n) if rng.random() < 0.9 else None
+            machine = f"HX-{rng.integers(3)}"
+            missions.append(fleet_samples.Sample(f"{n}", machine, day, state, verdict, faults, {}, blind))
+        with tempfile.TemporaryDirectory() as folder:
+            store = fleet_samples.write_store(Path(folder) / "fleet.sqlite", missions)
+            yield f"fleet {first + k}", fleet_json(load_fleet(store))
+
+
 def real(count: int, first: int) -> Iterator[Named]:
     """Robots as they are and with faults, the disabled one, and arms."""
     folder = robots.data_folder()
@@ -151,7 +185,9 @@ def main() -> None:
     parser.add_argument("--count", type=int, default=6)
     parser.add_argument("--first", type=int, default=2000, help="first seed, to run many results in parts")
     parser.add_argument(
-        "--only", nargs="*", help="kinds of data: simulated, other physics, ordinary robots, foreign plant, real"
+        "--only",
+        nargs="*",
+        help="kinds of data: simulated, other physics, ordinary robots, foreign plant, real, fleets",
     )
     asked = parser.parse_args()
     count = asked.count
@@ -181,6 +217,14 @@ def main() -> None:
             for text in found:
                 print(f"{name}: {text}", flush=True)
         print(f"{kind}: {results[kind]} results, {wrong[kind]} contradict themselves", flush=True)
+    if not asked.only or "fleets" in asked.only:
+        for name, document in fleets(count, asked.first):
+            results["fleets"] += 1
+            told = fleet_contradictions(document)
+            wrong["fleets"] += bool(told)
+            for text in told:
+                print(f"{name}: {text}", flush=True)
+        print(f"fleets: {results['fleets']} results, {wrong['fleets']} contradict themselves", flush=True)
     print(f"all: {sum(results.values())} results, {sum(wrong.values())} contradict themselves")
     if left_out:
         print(left_out)

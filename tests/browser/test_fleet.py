@@ -86,7 +86,7 @@ def test_no_breach_of_any_rule(open_page: OPEN, axe: str, name: str, width: int,
 def test_everything_can_be_read_without_scripts(open_page: OPEN) -> None:
     page = open_page("few", script=False, theme="dark")
     expect(page.get_by_role("heading", level=1)).to_have_text(
-        "1 of 6 machines must not go out, 4 may go out, of 1 it is not known"
+        "1 of 6 machines must not go out, 4 may go out, 1 must be checked first"
     )
     expect(page.locator("#machines tbody tr")).to_have_count(6)
     expect(page.locator("#find")).to_be_hidden()

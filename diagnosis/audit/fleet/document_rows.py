@@ -122,6 +122,7 @@ def _fault(f: FoundFault) -> MissionFaultRow:
         "epsilon": bounds_row(f.epsilon),
         "probability": six_digits(f.probability),
         "unclear": f.unclear,
+        "lasting": f.lasting,
     }
 
 

@@ -78,7 +78,7 @@ class FleetFaultRow(TypedDict):
 
 
 class MissionFaultRow(TypedDict):
-    """One fault of one mission."""
+    """One fault of one mission; `lasting`: to the end of its log (absent before)."""
 
     id: str
     component: str
@@ -90,6 +90,7 @@ class MissionFaultRow(TypedDict):
     epsilon: BoundsRow | None
     probability: float
     unclear: NotRequired[bool]
+    lasting: NotRequired[bool]
 
 
 class FaultStandingRow(TypedDict):

@@ -1,4 +1,4 @@
-"""Which machines may go out, which must not, and of which that is not known: each with why and the mission that says so."""
+"""Which machines may go out, which must not, and which must be checked first: each with why and the mission that says so."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from diagnosis.audit.fleet.fault_types import FleetFaultRow
 from diagnosis.audit.fleet.fleet_types import FleetDocument, MachineRow, MissionRow
-from diagnosis.audit.fleet.may_leave import Leave, is_lost, leave_of
+from diagnosis.audit.fleet.may_leave import is_lost, leave_of
 from diagnosis.audit.fleet.page.figures import unassessed
 from diagnosis.audit.fleet.page.rows import fault_words
 from diagnosis.audit.fleet.runs import sides_of
@@ -17,14 +17,14 @@ from diagnosis.audit.fleet.trend_types import TrendRow
 from diagnosis.audit.fleet.words import count, open_words
 from diagnosis.decision.wording import join_words
 from diagnosis.results.machine_words import words_of
-from diagnosis.results.vocabulary import Severity, Verdict
+from diagnosis.results.vocabulary import Leave, Severity, Verdict
 from replay.faults import FaultMode
 
 #: Statuses of faults that do not stand.
 GONE = ("past", "repaired")
 _FAULTS = 2
 _PARTS = 4
-_DAMAGE = "the log is damaged: "
+_DAMAGE, _BRIEF = "the log is damaged: ", "not judged long enough"
 
 
 @dataclass(frozen=True)
@@ -76,7 +76,7 @@ def lists_of(document: FleetDocument) -> tuple[Left, ...]:
         lost = any(is_lost(t["points"][-1][3], t["limit"]) for t in untold)
         leave = leave_of(m["verdict"], m["cleared"], m["unjudged"], lost=lost)
         place, reason = _why(leave, m, standing[k], document["missions"], rising[k])
-        reason = _with_losses(leave, m, reason, untold) + _blind(m)
+        reason = _with_blind(_with_losses(leave, m, reason, untold), m)
         if leave is not Leave.MAY and any(f["open"] and f["since"] for f in standing[k]) and _ready(m, document):
             reason += "; its newest report judges its own mission alone"
         name = "" if place is None else document["missions"][place]["name"]
@@ -108,12 +108,7 @@ def _with_losses(leave: Leave, m: MachineRow, reason: str, untold: Sequence[Tren
             f"{part} lost {100 * value:.0f} % over the whole of its last mission, beyond the limit of {100 * t['limit']:.0f} %{bounds}"
         )
     losses = "; ".join(said)
-    if (
-        leave is Leave.NOT_KNOWN
-        and m["verdict"] in (Verdict.READY, Verdict.WATCH)
-        and not m["unjudged"]
-        and m["cleared"]
-    ):
+    if leave is Leave.CHECK and m["verdict"] in (Verdict.READY, Verdict.WATCH) and not m["unjudged"] and m["cleared"]:
         return f"{losses}, though no fault was stated in it: check the part"
     return f"{reason}; {losses}"
 
@@ -167,12 +162,15 @@ def _lost(mission: MissionRow) -> str:
     return f"; it is no longer there: put it back, or leave it out with mfhca audit --forget {shlex.quote(mission['name'])}"
 
 
-def _blind(m: MachineRow) -> str:
-    """Parts that the machine's last mission did not judge, or not for long enough, which stand beside the leave that it gives; empty where there is none."""
+def _with_blind(reason: str, m: MachineRow) -> str:
+    """A reason with the parts that the machine's last mission did not judge, or not for long enough."""
     parts = unassessed(m)
+    if not parts:
+        return reason
     rest = f" and {count(len(parts) - _PARTS, 'more part')}" if len(parts) > _PARTS else ""
     named = ", ".join(parts[:_PARTS]) if rest else join_words(parts)
-    return f"; not judged long enough: {named}{rest}" if parts else ""
+    said = reason.casefold() == _BRIEF  # the reason itself, which lacks the names
+    return f"{reason if said else f'{reason}; {_BRIEF}'}: {named}{rest}"
 
 
 def _said(mission: MissionRow) -> str:

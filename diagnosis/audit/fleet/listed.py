@@ -8,11 +8,10 @@ from dataclasses import dataclass
 from diagnosis.audit.fleet.fault_types import FleetFaultRow
 from diagnosis.audit.fleet.fleet_types import FleetDocument, MachineRow
 from diagnosis.audit.fleet.leave import GONE, lists_of
-from diagnosis.audit.fleet.may_leave import Leave
 from diagnosis.audit.fleet.page.rows import fault_words
 from diagnosis.audit.fleet.words import open_words
 from diagnosis.results.machine_words import words_of
-from diagnosis.results.vocabulary import Verdict
+from diagnosis.results.vocabulary import Leave, Verdict
 
 
 @dataclass(frozen=True)

@@ -223,7 +223,7 @@ class Machine:
         if trailing and len(trailing) < len(self.dated):
             last = range(len(self.dated) - len(trailing), len(self.dated))
             seen = any(column[k] for column in self._assessed.values() for k in last)
-            how = "showed no fault, but not all parts were judged" if seen else "could not be assessed"
+            how = "showed no fault, but did not clear the machine" if seen else "could not be judged"
             missions = "mission" if len(trailing) == 1 else f"{len(trailing)} missions"
             out.append(f"its last {missions} {how}")
         if self.undated:

@@ -2,17 +2,7 @@
 
 from __future__ import annotations
 
-from enum import StrEnum
-
-from diagnosis.results.vocabulary import Verdict
-
-
-class Leave(StrEnum):
-    """Whether a machine may go out."""
-
-    MUST_NOT = "must not go out"
-    NOT_KNOWN = "not known whether it may go out"
-    MAY = "may go out"
+from diagnosis.results.vocabulary import Leave, Verdict
 
 
 def leave_of(verdict: Verdict | str, cleared: bool | None, unjudged: int, *, lost: bool = False) -> Leave:
@@ -32,7 +22,7 @@ def leave_of(verdict: Verdict | str, cleared: bool | None, unjudged: int, *, los
     if verdict == Verdict.STOP:
         return Leave.MUST_NOT
     fit = verdict == Verdict.READY or (verdict == Verdict.WATCH and cleared is True)
-    return Leave.MAY if fit and not unjudged and not lost else Leave.NOT_KNOWN
+    return Leave.MAY if fit and not unjudged and not lost else Leave.CHECK
 
 
 def is_lost(low: float, limit: float) -> bool:

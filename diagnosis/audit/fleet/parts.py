@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.audit.store.database import Database
+from diagnosis.results.assessed import LEAST_SHARE
 from replay.faults import Side
 
 LARGEST, LONGEST = 1e6, 1e15  # of a loss ε, and of seconds and metres: more is damage
-_LEAST_SHARE = 0.8
 _ROWS = 1 << 14  # that are taken from the store at once
 _MOST = (LONGEST, LONGEST, LARGEST, LARGEST, LARGEST)
 _PARTS = (
@@ -56,7 +56,7 @@ class PartTable(NamedTuple):
         Both of shape (m,).
         """
         decided = self.decided_s[rows]
-        enough = decided >= np.maximum(least_s, _LEAST_SHARE * self.driving_s[rows])
+        enough = decided >= np.maximum(least_s, LEAST_SHARE * self.driving_s[rows])
         return np.asarray((rows >= 0) & (decided > 0) & enough)
 
 

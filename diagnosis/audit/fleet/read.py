@@ -22,6 +22,7 @@ from diagnosis.audit.store.outcome import MissionState
 from diagnosis.audit.store.reason_template import ReasonTemplate, reason_template, whole_path
 from diagnosis.audit.store.repairs import Repair, read_repairs
 from diagnosis.audit.store.store import FILE_NAME
+from diagnosis.results.ending import lasts
 from diagnosis.results.vocabulary import Severity, Verdict
 from replay.faults import Side
 from replay.unused_files import NO_LOG
@@ -39,7 +40,7 @@ class Bounds(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class FoundFault:
-    """One fault of one mission; see the table ``fault``."""
+    """One fault of one mission; see the table ``fault``. `lasting`: to the end of its log."""
 
     id: str
     component: str
@@ -51,6 +52,7 @@ class FoundFault:
     epsilon: Bounds | None
     probability: float
     unclear: bool = False
+    lasting: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,7 +111,7 @@ _COLUMNS = (
 _RESULTS = f"SELECT {', '.join(_COLUMNS)} FROM result WHERE id IN (SELECT result FROM mission) ORDER BY id"
 _FAULTS = (
     "SELECT result, id, component, kind, side, mode, severity, stop_s - start_s, epsilon, epsilon_low, epsilon_high, "
-    "probability, {} FROM fault ORDER BY result, start_ns, length(id), id"
+    "probability, {}, stop_s, (SELECT duration_s FROM result WHERE result.id = fault.result) FROM fault ORDER BY result, start_ns, length(id), id"
 )
 _STATES = {state.value: state for state in MissionState}
 _VERDICTS: dict[str | None, Verdict | None] = {None: None, **{verdict.value: verdict for verdict in Verdict}}
@@ -138,7 +140,7 @@ def read_missions(store: Path) -> list[Mission]:
     with closing(_opened(store)) as db, db.snapshot(), db.decoding():
         faults: dict[int, list[FoundFault]] = defaultdict(list)
         for row in db.rows(_FAULTS.format("unclear" if db.has_column("fault", "unclear") else "0")):
-            r, name, component, kind, side, mode, severity, seconds, e, low, high, p, unclear = _plausible(row)
+            r, name, component, kind, side, mode, severity, seconds, e, low, high, p, unclear, *end = _plausible(row)
             found = FoundFault(
                 name,
                 component,
@@ -150,6 +152,7 @@ def read_missions(store: Path) -> list[Mission]:
                 _bounds(e, low, high),
                 p,
                 bool(unclear),
+                end[1] is not None and lasts(*end),
             )
             faults[r].append(found)
         parts = read_parts(db)

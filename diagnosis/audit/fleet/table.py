@@ -8,6 +8,7 @@ import re
 
 from diagnosis.audit.fleet.fleet_types import FleetDocument, MissionRow
 from diagnosis.pages.labels import utc, visible
+from diagnosis.results.candidates import UNCLEAR
 
 COLUMNS = (
     "machine", "mission", "state", "reason", "verdict", "title", "start_utc", "start_ns", "duration_s", "driving_s",
@@ -39,7 +40,8 @@ def fleet_csv(document: FleetDocument) -> str:
 
 def _row(m: MissionRow, labels: list[str]) -> list[Value]:
     worst = m["faults"][0] if m["faults"] else None
-    epsilon = worst["epsilon"] if worst is not None else None
+    unclear = worst is not None and worst.get("unclear", False)
+    epsilon = None if worst is None or unclear else worst["epsilon"]
     start = m.get("start_ns")
     return [
         "" if m["machine"] is None else labels[m["machine"]],
@@ -54,7 +56,11 @@ def _row(m: MissionRow, labels: list[str]) -> list[Value]:
         m.get("driving_s"),
         m.get("distance_m"),
         len(m["faults"]) if m["verdict"] is not None else None,
-        *(("", "", "", "") if worst is None else (worst["component"], worst["side"], worst["mode"], worst["severity"])),
+        *(
+            ("", "", "", "")
+            if worst is None
+            else (worst["component"], worst["side"], UNCLEAR if unclear else worst["mode"], worst["severity"])
+        ),
         *(("", "", "") if epsilon is None else (epsilon["value"], epsilon["low"], epsilon["high"])),
         "" if "open_loop" not in m else "yes" if m["open_loop"] else "no",
         m.get("copy_of"),

@@ -6,7 +6,7 @@ import shlex
 from collections.abc import Sequence
 
 from diagnosis.audit.fleet.machines import FleetFault, Machine
-from diagnosis.audit.fleet.may_leave import Leave, leave_of
+from diagnosis.audit.fleet.may_leave import leave_of
 from diagnosis.audit.fleet.trend_types import Axis
 from diagnosis.audit.fleet.trends import PartTrend
 from diagnosis.audit.trends.trend import Forecast
@@ -16,7 +16,7 @@ from diagnosis.results.candidates import UNCLEAR
 from diagnosis.results.fault_rows import mode_words
 from diagnosis.results.left_out import only_left_out
 from diagnosis.results.machine_words import MachineWords
-from diagnosis.results.vocabulary import Verdict
+from diagnosis.results.vocabulary import Leave, Verdict
 from replay.faults import Side
 
 _SHOWN = 3
@@ -189,23 +189,21 @@ def headline(
 
 
 def _leave_words(leaves: Sequence[Leave]) -> str:
-    """How many machines must not go out, may, or are not known to be fit to."""
+    """How many machines must not go out, may, or must be checked first."""
     n, must, may = len(leaves), leaves.count(Leave.MUST_NOT), leaves.count(Leave.MAY)
     rest = n - must - may
     if n == 1:
         return {
             Leave.MUST_NOT: "The machine must not go out",
             Leave.MAY: "The machine may go out",
-            Leave.NOT_KNOWN: "It is not known whether the machine may go out",
+            Leave.CHECK: "The machine must be checked before it goes out",
         }[leaves[0]]
     if max(must, may, rest) == n:
-        said = (
-            "may go out" if may else "must not go out" if must else "need a look: whether they may go out is not known"
-        )
+        said = "may go out" if may else "must not go out" if must else "must be checked before they go out"
         return f"{'Both' if n == 2 else f'All {n}'} machines {said}"
     parts = [f"{k} {words}" for k, words in ((must, "must not go out"), (may, "may go out")) if k]
     parts[0] = f"{must or may} of {n} machines {parts[0].partition(' ')[2]}"
-    return ", ".join(parts) + (f", of {rest} it is not known" if rest else "")
+    return ", ".join(parts) + (f", {rest} must be checked first" if rest else "")
 
 
 def _small(text: str) -> str:
@@ -239,19 +237,17 @@ def sentences(
     """
     bad = [m for m in machines if m.verdict in _WORK]
     out = []
-    for verdict, words in ((Verdict.STOP, "Must not go out"), (Verdict.WATCH, Verdict.WATCH.short)):
-        found = [m for m in machines if m.verdict is verdict and not is_damaged(m)]
-        if found and len(bad) > _SHOWN:
-            out.append(f"{words} ({len(found)}): {_named(found)}.")
+    must = [m for m in machines if m.verdict is Verdict.STOP]
+    if must and len(bad) > _SHOWN:
+        named = ", ".join(m.label for m in must[:_NAMED])
+        more = f" and {len(must) - _NAMED} more: listed below" if len(must) > _NAMED else ""
+        out.append(f"Must not go out ({len(must)}): {named}{more}.")
     for m in bad[:_SHOWN]:
         faults = [_found(m, f) for f in m.faults if f.standing][:2]
         note = f" ({m.note})" if m.note else ""
         words = standing(m)
         what = f": {join_words(faults)}" if faults else ""
         out.append(f"{m.label} – {_small(words)}{what}{note}.")
-    open_machines = [m for m in machines if m.verdict is Verdict.NOT_ASSESSED]
-    if open_machines:
-        out.append(f"{Verdict.NOT_ASSESSED.short} ({len(open_machines)}): {_named(open_machines)}.")
     near = [(m, t) for m, own in zip(machines, trends, strict=True) for t in own if t.approaching]
     near.sort(key=lambda p: p[1].trend.forecast.likely or 0.0)
     for m, t in near[:2]:
@@ -291,19 +287,6 @@ def as_sentence(note: str) -> str:
 def _often(f: FleetFault) -> str:
     """That a fault came in several missions of the last run at once, which is why it is called recurring."""
     return f", recurring in {f.missions} of them" if f.missions > 1 else ""
-
-
-def _named(machines: Sequence[Machine]) -> str:
-    """Names of machines, where one is not ready any more with the reason."""
-    names = [m.label for m in machines[:_NAMED]]
-    if machines[0].verdict is Verdict.NOT_ASSESSED:
-        names = [
-            m.label + (f" ({words})" if (words := standing(m).removeprefix(Verdict.NOT_ASSESSED.short).strip()) else "")
-            for m in machines[:_NAMED]
-        ]
-        names = [t.replace("(assessed since", "(since").replace("(assessed: ", "(") for t in names]
-    more = len(machines) - len(names)
-    return ", ".join(names) + (f" and {more} more: listed below" if more else "")
 
 
 def _found(m: Machine, f: FleetFault) -> str:

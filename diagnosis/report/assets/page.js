@@ -49,7 +49,7 @@
     const key = e.target.dataset.part;
     if (!key || !e.target.open || figures[key] || !view.n) return;
     const element = e.target.querySelector(".lane-figure"), figure = figures[key] = new Figure(element);
-    Data.later().then(() => Lanes.draw(figure, key, e.target.querySelector(".near"))).then(() => near(element)).catch((wrong) => { element.textContent = `The plots cannot be drawn: ${wrong.message}`; throw wrong; });
+    Data.later().then(() => Lanes.draw(figure, key, e.target.querySelector(".near"))).then(() => Sight.near(element)).catch((wrong) => { element.textContent = `The plots cannot be drawn: ${wrong.message}`; throw wrong; });
   }, true);
 
   // How the rows of a fault's figure are looked at: as they are, one row for every part, residuals as multiples of thresholds.
@@ -96,7 +96,7 @@
   // Sliders below the plots: made when they are first opened.
   let panel = null;
   const whatIf = () => Data.later().then(() => { panel ??= new WhatIfPanel(one); figures.whatif = panel.figure; return panel.open(faults.get(current)); }).catch(failed("#whatif-words"));
-  one("#whatif")?.addEventListener("toggle", (e) => e.target.open && current && (panel?.f?.id === current ? Promise.resolve() : whatIf()).then(() => near("#whatif")));
+  one("#whatif")?.addEventListener("toggle", (e) => e.target.open && current && (panel?.f?.id === current ? Promise.resolve() : whatIf()).then(() => Sight.near("#whatif")));
 
   const mark = (name) => Now.t !== null && Now.set(Now.t, { [name]: Now.t });
 
@@ -137,12 +137,8 @@
 
   // The address restores what is shown: fault, time, chosen signals. A new fault is a step of the browser's history.
   function remember(step) {
-    const parts = current ? [`fault=${encodeURIComponent(current)}`] : [];
-    if (shared) parts.push(`t=${shared.map((v) => v.toFixed(4)).join(",")}`);
-    if (explorer?.plots.length) parts.push(`plots=${explorer.plots.map((p) => p.map(encodeURIComponent).join(",")).join(";")}`);
-    if (explorer?.plots.length && explorer.view !== "time") parts.push(`view=${explorer.view}`);
-    const address = `#${parts.join("&")}`;
-    if (!parts.length || address === location.hash) return;
+    const address = Address.text(current, shared, explorer?.plots ?? [], explorer?.view);
+    if (address === "#" || address === location.hash) return;
     try { history[step ? "pushState" : "replaceState"](null, "", address); } catch { /* browsers limit how often; the next change tells */ }
   }
 
@@ -154,37 +150,22 @@
     return at === undefined ? list.slice(0, SHADES) : [...list].sort((f, g) => Math.abs(f.start - at) - Math.abs(g.start - at)).slice(0, SHADES);
   }
 
-  // Evidence of a fault that has none in the markup.
-  async function brief(f) {
-    const article = one("#brief");
-    article.dataset.ev = f.id;
-    article.querySelector("h2").textContent = `${f.id} · ${f.title}`;
-    const words = (await Data.intervals())[f.id];
-    if (article.dataset.ev !== f.id) return;
-    const times = `${f.start.toFixed(3)} s to ${f.stop.toFixed(3)} s · ${(f.stop - f.start).toFixed(3)} s · severity ${f.severity}`;
-    article.querySelector("p").textContent = times;
-    article.dataset.text = `${f.id} ${f.title}, ${times}`;
-    article.querySelector("ul").replaceChildren(...(words.evidence || []).map((s) => { const li = document.createElement("li"); li.textContent = s; return li; }));
-    article.querySelector(".advice").textContent = words.advice || "Nothing was recorded.";
-    article.querySelector(".how").textContent = words.check || "";
-  }
-
   const articleOf = (id) => one(`article[data-ev="${CSS.escape(id)}"]`);
 
   function select(id, { range, scroll, step: stepped } = {}) {
     const f = faults.get(id);
     if (!f) return;
-    tell("");
+    Address.tell("");
     const before = current;
     current = id;
     if (before !== id) evidence?.release();
-    if (!articleOf(id)) brief(f);
+    if (!articleOf(id)) Sight.brief(f);
     for (const e of all("[data-ev]")) e.hidden = e.dataset.ev !== id;
     for (const e of all("[aria-current]")) e.removeAttribute("aria-current");
     for (const e of all(`[data-f="${CSS.escape(id)}"]`)) if (e.matches(".fb, tr.fault")) e.setAttribute("aria-current", "true");
-    keepInTable(one("tr.fault[aria-current]"));
+    Sight.keepInTable(one("tr.fault[aria-current]"));
     one("#live").textContent = `Showing ${id}: ${f.title}`;
-    if (scroll) go("#evidence", scroll === "at once");
+    if (scroll) Sight.go("#evidence", scroll === "at once");
     shared = range || ranges.fault(f);
     remember(stepped && before && before !== id);
     if (!evidence) return;
@@ -196,22 +177,6 @@
     for (const b of all("[data-of=evidence], [data-zoom]")) b.disabled = !rows.length;
     if (!rows.length) return;
     Data.later().then(() => { if (current === id) { choices(f); return drawEvidence(); } });
-  }
-
-  function go(where, atOnce) {
-    one(where).scrollIntoView({ behavior: atOnce || matchMedia("(prefers-reduced-motion: reduce)").matches ? "auto" : "smooth" });
-  }
-
-  // What has been opened comes into view as far as it is not, its head first.
-  function near(where) {
-    const element = typeof where === "string" ? one(where) : where, { top, bottom } = element.getBoundingClientRect();
-    if (top >= 0 && bottom <= innerHeight) return;
-    element.scrollIntoView({ block: bottom - top < innerHeight - 80 && top > 0 ? "end" : "start", behavior: matchMedia("(prefers-reduced-motion: reduce)").matches ? "auto" : "smooth" });
-  }
-
-  function keepInTable(row) {
-    const box = row.closest(".scroll");
-    if (row.offsetTop < box.scrollTop || row.offsetTop + row.offsetHeight > box.scrollTop + box.clientHeight) box.scrollTop = row.offsetTop - 60;
   }
 
   function step(by) {
@@ -295,45 +260,26 @@
       "+": () => active()?.scale(0.5), "=": () => active()?.scale(0.5), "-": () => active()?.scale(2),
       ",": () => cursor(-1), ".": () => cursor(1), "<": () => cursor(-10), ">": () => cursor(10), a: () => mark("a"), b: () => mark("b"),
       Escape: () => Now.set(null, { a: null, b: null, held: false }), y: robust, z: () => active()?.stretch(2), Z: () => active()?.stretch(0.5),
-      p: play, w: () => { const e = one("#whatif"); if (e) { e.open = true; go("#whatif"); one("#whatif-mode").focus({ preventScroll: true }); } },
-      g: () => { go("#evidence"); one("#figure")?.focus({ preventScroll: true }); },
+      p: play, w: () => { const e = one("#whatif"); if (e) { e.open = true; Sight.go("#whatif"); one("#whatif-mode").focus({ preventScroll: true }); } },
+      g: () => { Sight.go("#evidence"); one("#figure")?.focus({ preventScroll: true }); },
       s: () => one("#find")?.focus(), t: actions.theme, "?": actions.help,
     }[e.key];
     if (key) { e.preventDefault(); key(); }
   });
 
   function fromAddress(hash, scroll) {
-    const read = (key) => new RegExp(`[#&]${key}=([^&]*)`).exec(hash)?.[1] ?? "";
-    const plain = (s) => { try { return decodeURIComponent(s); } catch { return ""; } };
-    const t = read("t") ? read("t").split(",").map(Number) : [], around = t.length === 1 ? [t[0] - 0.5, t[0] + 0.5] : t;
-    const range = around.length === 2 && around.every(Number.isFinite) && around[1] > around[0] ? around : undefined;
-    const plots = read("plots"), wanted = plots ? plots.split(";").map((p) => p.split(",").map(plain)) : [], id = plain(read("fault"));
+    const { has, t, range, plots, view: shown, id } = Address.read(hash), wanted = plots ?? [];
     if (faults.has(id)) select(id, { range, scroll });
     else if (!current && faults.size) select(faults.keys().next().value, { range });
     else if (!faults.size && range) shared = range;
-    if (explorer && plots) one("#signals-view").value = ["xy", "spectrum"].find((v) => v === read("view")) ?? "time";
+    if (explorer && plots) one("#signals-view").value = ["xy", "spectrum"].find((v) => v === shown) ?? "time";
     if (explorer && (plots || faults.has(id)) && JSON.stringify(wanted) !== JSON.stringify(explorer.plots)) explorer.set(wanted);
     const lacking = explorer ? [...new Set(wanted.flat())].filter((n) => !explorer.meaning(n)) : [];
-    tell([
-      read("fault") && !faults.has(id) ? `There is no fault ${cut(id || read("fault"))} in this report${current ? `: ${current} is shown` : ""}.` : "",
-      read("t") && !range ? `“${cut(plain(read("t")) || read("t"))}” is not a time: expected t=seconds or t=from,to.` : "",
-      lacking.length ? `There is no signal ${lacking.slice(0, 3).map(cut).join(", ")}${lacking.length > 3 ? ` and ${lacking.length - 3} more` : ""} in this report.` : "",
+    Address.tell([
+      has && !faults.has(id) ? `There is no fault ${Address.cut(id || has)} in this report${current ? `: ${current} is shown` : ""}.` : "",
+      t && !range ? `“${Address.cut(t)}” is not a time: expected t=seconds or t=from,to.` : "",
+      lacking.length ? `There is no signal ${lacking.slice(0, 3).map(Address.cut).join(", ")}${lacking.length > 3 ? ` and ${lacking.length - 3} more` : ""} in this report.` : "",
     ].filter(Boolean).join(" "));
-  }
-
-  const cut = (s) => (s.length > 60 ? `${s.slice(0, 60)}…` : s);
-
-  // What the address asks for and the page does not have, until the next address.
-  function tell(words) {
-    let note = one("#missing");
-    if (!words) { note?.remove(); return; }
-    if (!note) {
-      note = document.createElement("p");
-      Object.assign(note, { id: "missing", className: "note" });
-      one("main").before(note);
-    }
-    note.textContent = words;
-    one("#live").textContent = words;
   }
 
   // Paper: light colours and the width of a page, then back.
@@ -363,7 +309,7 @@
   if (explorer && /[#&]plots=/.test(asked) && !/[#&]fault=/.test(asked)) {
     let moved = false;
     for (const e of ["wheel", "pointerdown", "keydown"]) addEventListener(e, () => { moved = true; }, { once: true, passive: true });
-    const grown = new ResizeObserver(() => { if (!moved) go("#signals", true); });
+    const grown = new ResizeObserver(() => { if (!moved) Sight.go("#signals", true); });
     for (const e of ["#figure", "#loop-figure", "#signals-figure"]) if (one(e)) grown.observe(one(e));
     setTimeout(() => grown.disconnect(), 5000);
   }

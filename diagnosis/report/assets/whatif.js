@@ -98,7 +98,8 @@ const WhatIf = {
 
   // In a sentence: how far beyond its threshold the residual is, and when it first was.
   words(d, w) {
-    if (!w.ratio || !d.residual) return "This part has no residual that the change could be seen in.";
+    if (!d.residual) return "No residual of this part was recorded in which the change could be seen.";
+    if (!w.ratio) return `What a changed ${d.sensor ? "reading" : "opening"} does to the residual of this part (${d.runit || "no unit"}, drawn above) is not computed here: no model of the ${d.channel.name.startsWith("steer.") ? "axle" : "wheel"} was found in the readings around it.`;
     const size = (ratio, { start, stop }) => {
       let sum = 0, n = 0;
       for (let i = 0; i < d.n; i++) {
@@ -132,7 +133,7 @@ class WhatIfPanel {
     one("#whatif-figure").hidden = none;
     if (none) { one("#whatif-words").textContent = "The log has no channel of this part that could be changed."; return; }
     const { k, unit } = d.channel, most = d.accurate.reduce((m, v) => (Math.abs(v) > m ? Math.abs(v) : m), 1e-6) * k, known = ["stuck", "no_signal", "inefficient", "noisy"].includes(f.mode);
-    const set = (id, low, high, value) => Object.assign(one(id), { min: low, max: high, step: (high - low) / 500, value });
+    const set = (id, low, high, value) => Object.assign(one(id), { min: low, max: high, step: "any", value });
     one("#whatif-mode").value = known ? f.mode : "inefficient";
     set("#whatif-epsilon", 0, 1, row.epsilon?.value ?? 0.5);
     const spread = f.mode === "noisy" ? row.sat?.rms : row.sat?.mean;

@@ -113,9 +113,9 @@ def test_a_new_fault_of_a_part_that_was_not_assessed_before_says_so() -> None:
 @pytest.mark.parametrize(
     ("row", "words"),
     [
-        (NOTHING, "This part was not assessed in the older"),
-        ({"decided_driving_s": 44.0}, "This part was hardly assessed (44.0 of 100.0 s of driving) in the older"),
-        ({"decided_driving_s": 79.0}, "This part was only partly assessed (79.0 of 100.0 s of driving) in the older"),
+        (NOTHING, "This part was not judged in the older"),
+        ({"decided_driving_s": 44.0}, "This part was hardly judged (44.0 of 100.0 s of driving) in the older"),
+        ({"decided_driving_s": 79.0}, "This part was only partly judged (79.0 of 100.0 s of driving) in the older"),
     ],
 )
 def test_how_far_the_part_of_a_new_fault_was_assessed_before(row: dict[str, Any], words: str) -> None:
@@ -127,19 +127,19 @@ def test_how_far_the_part_of_a_new_fault_was_assessed_before(row: dict[str, Any]
 
 def test_the_side_of_a_new_fault_of_either_side_that_was_not_assessed_before_is_named() -> None:
     found = compared(report(FL_actuator=NOTHING), later(fault("FL", "sensor_or_actuator", "inefficient")))
-    assert only(found).note == "The actuator was not assessed in the older mission: the fault may be older."
+    assert only(found).note == "The actuator was not judged in the older mission: the fault may be older."
 
 
 @pytest.mark.parametrize(
     ("older", "newer", "words"),
     [
         ({}, {}, ""),
-        ({}, NOTHING, "no longer assessed"),
-        ({}, {"decided_driving_s": 9.0}, "no longer long enough"),
-        (NOTHING, {}, "assessed now"),
-        ({"decided_driving_s": 9.0}, {}, "long enough now"),
-        (NOTHING, NOTHING, "assessed in neither"),
-        ({"decided_driving_s": 9.0}, NOTHING, "long enough in neither"),
+        ({}, NOTHING, "no longer judged"),
+        ({}, {"decided_driving_s": 9.0}, "no longer judged long enough"),
+        (NOTHING, {}, "judged now"),
+        ({"decided_driving_s": 9.0}, {}, "judged long enough now"),
+        (NOTHING, NOTHING, "judged in neither"),
+        ({"decided_driving_s": 9.0}, NOTHING, "judged long enough in neither"),
     ],
 )
 def test_words_of_what_was_assessed(older: dict[str, Any], newer: dict[str, Any], words: str) -> None:
@@ -156,7 +156,7 @@ def test_gone_and_assessed_is_resolved() -> None:
 @pytest.mark.parametrize(
     ("row", "words"),
     [
-        (NOTHING, "not assessed"),
+        (NOTHING, "not judged"),
         ({"decided_driving_s": 79.0}, "79.0 s of 100.0 s driving, which is too little"),
         ({"driving_s": 9.0, "decided_driving_s": 9.0}, "9.0 s of 9.0 s driving, which is too little"),
         ({"tier": "tracking"}, "tracking alone"),

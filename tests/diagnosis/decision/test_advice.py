@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from diagnosis.decision.advice import check_of
+from diagnosis.decision.advice import check_of, check_of_all
 from diagnosis.results.machine_words import HYDRAULIC, MachineWords
+from diagnosis.results.result import Hypothesis
 from diagnosis.results.vocabulary import Kind
 from replay.faults import FaultMode, Side
 
@@ -67,3 +68,17 @@ def test_the_machine_files_own_words_come_first_the_most_specific_one() -> None:
     assert said(Kind.WHEEL, "FR", Side.ACTUATOR, FaultMode.STUCK) == check_of(
         Kind.WHEEL, "FR", Side.ACTUATOR, FaultMode.STUCK, HYDRAULIC
     )
+
+
+@pytest.mark.parametrize(("p", "both"), [(0.35, True), (0.1, False)])
+def test_what_may_be_the_other_part_is_checked_second(p: float, both: bool) -> None:
+    hypotheses = (
+        Hypothesis("actuator", "inefficient", 0.6),
+        Hypothesis("sensor", "inefficient", p),
+        Hypothesis("none", "healthy", 0.4 - p),
+    )
+    part = (Kind.STEER, "rear", Side.ACTUATOR, FaultMode.INEFFICIENT)
+    text, valve = check_of_all(*part, hypotheses, HYDRAULIC), check_of(*part, HYDRAULIC)
+    assert text.startswith(valve)
+    sensor = check_of(Kind.STEER, "rear", Side.SENSOR, FaultMode.INEFFICIENT, HYDRAULIC)
+    assert (text == f"{valve} If that is in order: the rear steering sensor may be it as well (35 %). {sensor}") is both

@@ -128,7 +128,7 @@ def test_unjudged_steering_is_said() -> None:
     nothing = unassessed(N, State.NOT_ASSESSED, reason)
     got = verdict(machine(front_sensor=nothing, front_actuator=nothing), dict.fromkeys(machine(), 20.0))
     assert got.status == "ready"
-    assert got.caveats == (f"Not assessed: front steering sensor and front steering valve ({reason}).",)
+    assert got.caveats == (f"Not judged: front steering sensor and front steering valve ({reason}).",)
 
 
 @pytest.mark.parametrize("decided", [20.0, 0.0])

@@ -132,3 +132,17 @@ def test_an_axle_that_was_hardly_steered_is_named_with_what_to_do() -> None:
     (one,) = told(Reservations(), {("front", "actuator"): still})
     assert one.startswith("front steering valve: judged for 20.0 s of driving, of 48 s needed (not steered).")
     assert "steer from stop to stop" in one
+
+
+def test_an_axle_that_was_hardly_steered_has_one_reason_and_one_remedy() -> None:
+    """What has its parts judged lets its checks pass, so that these ask for nothing else."""
+    nothing = unassessed(N, State.NOT_ASSESSED, "the axle was steered too little")
+    parts = PARTS | {("front", s): nothing for s in ("sensor", "actuator")}
+    still = Checked(Kind.STEER, "front", Side.ACTUATOR, Check.SECOND_MEASUREMENT, None, 0.1)
+    (one,) = told(Reservations(open=(still,)), parts)
+    assert one.startswith(
+        "Not judged: front steering sensor and front steering valve (the axle was steered too little)."
+    )
+    assert one.endswith("twice at standstill and several times while driving, with the log running")
+    deviates = replace(still, worst=0.5)
+    assert len(told(Reservations(open=(deviates,)), parts)) == 2, "what deviates has a reason of its own"

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from diagnosis.report.confidence import headline, judged, judged_means, percent, sure_of, sure_of_verdict
+from diagnosis.report.confidence import going_out, headline, judged, judged_means, percent, sure_of, sure_of_verdict
 from diagnosis.results.document import IntervalRow, ReportDocument
 from tests import report_samples as samples
 
@@ -92,7 +92,7 @@ def test_phrase_of_a_verdict() -> None:
         "All 2 wheel parts were judged, each for at least 90 % of its driving, by second measurements and a model of the "
         "wheels."
     )
-    assert judged(done) == "2 of 2 parts judged, none cleared"  # the report does not say what is open
+    assert judged(done) == "2 of 2 parts judged, none cleared, for this report does not say what is open"
     short = samples.report_with(coverage=[row("sensor", 98.0), row("actuator", 0.0, tier="none")])
     assert sure_of_verdict(short).startswith("1 of 2 wheel parts were judged long enough")
     assert sure_of_verdict(samples.report_with(coverage=[])) == ""
@@ -107,11 +107,27 @@ def test_leave_to_go_out_is_given_only_where_nothing_stands_against_it() -> None
     assert headline(with_verdict("watch", cleared=True, not_cleared="")) == leave
     assert headline(with_verdict("watch", cleared=False, not_cleared="the log is damaged")) == (
         "Faults to watch",
-        "not cleared: the log is damaged",
+        "check before it goes out: the log is damaged",
     )
     assert headline(with_verdict("stop")) == ("Stop and repair", "must not go out before repair")
     assert headline(with_verdict("ready")) == ("Ready for the next mission", "")
-    assert headline(with_verdict("not_assessed")) == ("Not assessed", "whether it may go out is not known")
+    assert headline(with_verdict("not_assessed")) == ("Not assessed", "check before it goes out")
+
+
+@pytest.mark.parametrize(
+    ("status", "more", "answer"),
+    [
+        ("stop", {}, ("No", ", not before repair")),
+        ("watch", {"cleared": False, "not_cleared": "the log is damaged"}, ("No", ", not before it was checked: the log is damaged")),
+        ("not_assessed", {}, ("No", ", not before it was checked")),
+        ("watch", {"cleared": True, "not_cleared": ""}, ("Yes", "; the faults to watch are no reason to keep it in")),
+        ("ready", {"cleared": True}, ("Yes", "")),
+    ],
+)  # fmt: skip
+def test_the_page_says_plainly_whether_the_machine_may_go_out_again(
+    status: str, more: dict[str, Any], answer: tuple[str, str]
+) -> None:
+    assert going_out(with_verdict(status, **({"cleared": False, "not_cleared": ""} | more))) == answer
 
 
 def test_parts_that_were_judged_and_those_that_were_cleared_are_counted_apart() -> None:
@@ -147,7 +163,7 @@ def test_parts_that_were_judged_and_those_that_were_cleared_are_counted_apart() 
         )
     about["to_clear"] = [{"reason": "Several wheels swing together.", "act": "lower the gains"}]
     assert judged(samples.report_with(coverage=rows, intervals=[watched], verdict=about)) == (
-        "4 of 4 parts judged, none cleared"
+        "4 of 4 parts judged, none cleared: several wheels swing together"
     )
     assert judged_means(found).startswith("Judged: decided, healthy or faulty, for at least ")
     assert judged_means(samples.report_with(coverage=[])) == ""

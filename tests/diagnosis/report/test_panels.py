@@ -73,3 +73,10 @@ def test_places() -> None:
     frame = Frame(100.0, 50.0, (0.0, 10.0), (0.0, 1.0))
     assert (float(frame.px(0.0)), float(frame.px(10.0))) == (frame.left, frame.right)
     assert (float(frame.py(-5.0)), float(frame.py(2.0))) == (frame.bottom, frame.top)
+
+
+def test_the_word_at_a_late_detection_is_not_cut_off() -> None:
+    late = edge_picture(edge(np.ones(T.size)), {**FAULT, "detected_s": 5.14})
+    assert re.search(r'class="fin b"[^>]*>detected \+140 ms<', late)
+    early = edge_picture(edge(np.ones(T.size)), FAULT)
+    assert re.search(r'class="beg b"[^>]*>detected \+20 ms<', early)

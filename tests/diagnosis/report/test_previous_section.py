@@ -76,3 +76,36 @@ def test_losses_are_listed_where_they_differ() -> None:
         {"part": "FL drive valve", "cells": ["0.100 (0.090 to 0.110)", "0.300 (0.290 to 0.310)"], "change": "+0.200"}
     ]
     assert section["same_loss"] == 1
+
+
+def test_parts_that_were_judged_in_both_missions_are_not_said_to_be_judged_in_one() -> None:
+    side = {
+        "tier": "model",
+        "driving_s": 44.5,
+        "decided_s": 44.5,
+        "judged_s": 44.5,
+        "assessed": True,
+        "shown": True,
+        "long_enough": True,
+    }
+    checked, brief = (
+        side | {"assessed": False, "shown": False},
+        side | {"assessed": False, "long_enough": False, "decided_s": 9.0},
+    )
+    row = {"component": "RL", "kind": "wheel", "side": "sensor", "older": side, "change": "lost"}
+    report = with_previous(earlier(), earlier())
+    for newer, head, words in (
+        ([checked], "Judged in both missions, its checks passed in one only", "a check is open now"),
+        ([brief], "Judged long enough in one mission only", "no longer judged long enough"),
+        (
+            [brief, checked],
+            "Judged long enough, or its checks passed, in one mission only",
+            "no longer judged long enough",
+        ),
+    ):
+        report["previous"]["coverage"] = [{**row, "newer": x} for x in newer]  # type: ignore[typeddict-item]
+        section = previous_section(report)
+        assert section is not None
+        assert section["coverage_head"] == head
+        assert section["coverage"][0]["words"] == words
+        assert section["coverage"][-1]["cells"][1].endswith("a check open") is (newer[-1] is checked)

@@ -33,7 +33,7 @@ def test_the_table_says_size_share_or_that_nothing_shows() -> None:
         ">Loss for 2 s": "not shown",
         ">Loss for 10 s": "28 %",
         ">Loss all the time": "",
-        ">Dead for 2 s": "93 % of the time",
+        ">Dead for 2 s": "found in 93 %",
         ">Stuck for 10 s": "found",
         ">Too much for 10 s": "",
         ">Offset for 10 s": "0.042 m/s",

@@ -15,6 +15,7 @@ from diagnosis.pages import labels
 from diagnosis.results.machine_words import words_of
 
 _FOLDERS = 4  # that are named
+_STATUSES = {"new": "new", "recurring": "recurring", "once": "found once", "past": "past", "repaired": "repaired"}
 
 
 def hours(seconds: float) -> str:
@@ -39,17 +40,17 @@ def kpis(document: ShownDocument) -> list[tuple[str, str, str]]:
     ]
     counted = c["counted"]
     share = (
-        f"{100 * c['with_faults'] / counted:.0f} % of the {labels.grouped(counted)} counted"
+        f"{100 * c['with_faults'] / counted:.0f} % of the {labels.grouped(counted)} with a report"
         if counted
-        else "none counted"
+        else "none with a report"
     )
     f = c["faults"]
     return [
         (
             labels.grouped(c["missions"]),
             "missions",
-            ", ".join([f"{labels.grouped(counted)} counted", *unread, *rest])
-            + (f"; of all {labels.grouped(c['not_assessed'])} not assessed" if c["not_assessed"] else ""),
+            ", ".join([f"{labels.grouped(counted)} with a report", *unread, *rest])
+            + (f"; {labels.grouped(c['not_assessed'])} without a verdict" if c["not_assessed"] else ""),
         ),
         (
             hours(c["driving_s"]),
@@ -58,10 +59,10 @@ def kpis(document: ShownDocument) -> list[tuple[str, str, str]]:
         ),
         (labels.grouped(c["with_faults"]), "missions with faults", share),
         (
-            f"{f['new']} / {f['recurring']} / {f['past']}",
-            "new, recurring, past faults",
-            f"{count(f['once'], 'other')} found once"
-            + (f", {labels.grouped(f['repaired'])} repaired" if f["repaired"] else ""),
+            labels.grouped(f["new"] + f["recurring"] + f["once"]),
+            "faults that stand",
+            ", ".join(f"{labels.grouped(f[k])} {said}" for k, said in _STATUSES.items() if f[k])
+            or "none was ever found",
         ),
         (
             "–" if c["decided"] is None else f"{100 * c['decided']:.1f} %",
@@ -77,9 +78,9 @@ def _coverage(machines: Sequence[MachineRow]) -> str:
     dark = sum(
         not m["parts"] or m["unjudged"] > 0 or any(p["assessed_last"] is None for p in m["parts"]) for m in machines
     )
-    words = [f"{count(blind, 'part')} not judged long enough in the last mission"] if blind else []
-    words += [f"{'' if blind else 'last mission '}not known of {count(dark, 'machine')}"] if dark else []
-    return ", ".join(words) or "every part assessed in the last mission"
+    words = [f"in the last missions {count(blind, 'part')} judged too briefly"] if blind else []
+    words += [f"uncertain for {count(dark, 'machine')}"] if dark else []
+    return "; ".join(words) or "every part judged long enough in the last mission"
 
 
 def unassessed(m: MachineRow) -> list[str]:

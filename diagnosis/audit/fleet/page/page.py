@@ -16,11 +16,10 @@ from pathlib import Path
 import jinja2
 from markupsafe import Markup
 
-from diagnosis.audit.fleet.fault_types import FleetFaultRow
+from diagnosis.audit.fleet.fault_types import FleetFaultRow, MissionFaultRow
 from diagnosis.audit.fleet.fleet_types import AuditRow, CountsRow, FleetDocument, MachineRow
 from diagnosis.audit.fleet.leave import GONE, Left, lists_of
 from diagnosis.audit.fleet.listed import machine_words
-from diagnosis.audit.fleet.may_leave import Leave
 from diagnosis.audit.fleet.page import rows
 from diagnosis.audit.fleet.page.changes import changes_of
 from diagnosis.audit.fleet.page.figures import blind, hours, kpis, of_folders
@@ -36,11 +35,12 @@ from diagnosis.pages.mode_style import mode_rules
 from diagnosis.results.candidates import UNCLEAR
 from diagnosis.results.fault_rows import state_label
 from diagnosis.results.machine_words import words_of
-from diagnosis.results.vocabulary import Verdict
+from diagnosis.results.vocabulary import Leave, Verdict
 from replay.faults import SCALED
 
 _HERE = Path(__file__).parent
 _FAULTS = 400
+_COURSE = 5  # missions whose ε̂ a fault's course names
 _OPEN_ROWS = 40
 _BLIND = 100  # machines whose parts that were not assessed are listed
 _FAILURES = 1000
@@ -59,9 +59,9 @@ _DEFINITIONS = (
     "A fault of high severity that no longer shows may be a loose contact. It stays open until the repair of its part is recorded "
     "(mfhca audit --repaired), or until ten missions are clean that would have shown it: the part was assessed, and by its report the "
     "mission would have shown such a fault of ten seconds more often than not. Repaired: not found since the repair.",
-    "Counted: missions with a report. A copy of a log, a log that was not read and one that is not audited yet are missions that "
+    "Missions with a report count. A copy of a log, a log that was not read and one that is not audited yet are missions that "
     "do not count in machines, faults and trends.",
-    "Assessed: judged for the seconds that the verdict “ready” takes, and for four fifths of its driving.",
+    "Assessed, or judged long enough: judged for the seconds that the verdict “ready” takes, and for four fifths of its driving. Check before it goes out: the missions do not tell that the machine is sound.",
     "Trend: weighted line through the missions' ε̂ over time, each over its whole mission, while a fault's ε̂ is that of the fault's own time; it is fitted by least squares, so that a time counts by the square of the speed, opening or angle in it, and a loss of half of the mission may be more or less than half of it; the spread from mission to mission is estimated with it. "
     "Outliers (×) are excluded. A step or bend (↓ ↑ ∠), such as a repair, starts a new line. "
     "The band is its 90 % interval, the bar on the limit the 90 % interval of the crossing.",
@@ -136,7 +136,7 @@ def build_fleet_page(found: FleetDocument) -> str:
 
 def _leave(lists: Sequence[Left], document: ShownDocument) -> list[Context]:
     """The three lists, those that keep machines back first; the mission's file where it has no name of its own."""
-    symbols = {Leave.MUST_NOT: Verdict.STOP, Leave.NOT_KNOWN: Verdict.NOT_ASSESSED, Leave.MAY: Verdict.READY}
+    symbols = {Leave.MUST_NOT: Verdict.STOP, Leave.CHECK: Verdict.NOT_ASSESSED, Leave.MAY: Verdict.READY}
     out: list[Context] = []
     for leave in Leave:
         rows_ = [
@@ -152,7 +152,9 @@ def _leave(lists: Sequence[Left], document: ShownDocument) -> list[Context]:
             if x.leave is leave
         ]
         words = leave.value[:1].upper() + leave.value[1:]
-        out.append({"symbol": symbols[leave].symbol, "words": words, "rows": rows_})
+        first = sum(x.leave is Leave.CHECK for x in lists) if leave is Leave.MUST_NOT else 0
+        but = f" for certain, but {count(first, 'machine')} must be checked first" if first else ""
+        out.append({"symbol": symbols[leave].symbol, "words": words, "rows": rows_, "but": but})
     return out
 
 
@@ -246,14 +248,29 @@ def _machine(
     }
 
 
+def _each(f: FleetFaultRow, document: ShownDocument) -> list[MissionFaultRow]:
+    """The worst fault of this row in each dated mission of its machine that has one, oldest first."""
+    about = (f["component"], f["side"], f["mode"])
+    missions, places = document["missions"].as_found, document["machines"][f["machine"]]["missions"]
+    each = (
+        [x for x in missions[k]["faults"] if (labels.visible(x["component"]), x["side"], x["mode"]) == about]
+        for k in places
+    )
+    return [same[0] for same in each if same]
+
+
 def _fault(f: FleetFaultRow, document: ShownDocument, directions: Mapping[tuple[int, str, str], str]) -> Context:
     first, last = (document["missions"][place] for place in (f["first"], f["last"]))
-    e = f["epsilon"]
+    e, found = f["epsilon"], _each(f, document)
     notes = []
     if e and f["mode"] in SCALED and not f.get("unclear"):
-        notes.append(f"ε̂ {e['value']:.2f} ({e['low']:.2f} to {e['high']:.2f}) in the fault".replace("-", "−"))
+        before = [f"{each['value']:.2f}" for m in found[-_COURSE:-1] if (each := m["epsilon"]) is not None]
+        sizes = " → ".join([*before, f"{e['value']:.2f} ({e['low']:.2f} to {e['high']:.2f})"]).replace("-", "−")
+        notes.append(f"ε̂ {sizes} in the fault{', mission by mission' if before else ''}")
         direction = directions.get((f["machine"], f["component"], f["side"]), "not_known")
         notes += [direction] if direction != "not_known" else []
+    if found and "lasting" in found[-1]:
+        notes.append("lasts to the end of the log" if found[-1]["lasting"] else "last seen before the end of the log")
     if f["status"] == "repaired" and f["repaired_ns"] is not None:
         notes.append(f"repaired on {labels.utc_moment(f['repaired_ns'])}")
     elif f["repaired_ns"] is not None:

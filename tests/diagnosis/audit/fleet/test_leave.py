@@ -8,10 +8,10 @@ from pathlib import Path
 
 from diagnosis.audit.fleet.leave import Left, lists_of
 from diagnosis.audit.fleet.listed import listed_machines
-from diagnosis.audit.fleet.may_leave import Leave
 from diagnosis.audit.fleet.page.page import build_fleet_page
 from diagnosis.audit.fleet_files import fleet_json, load_fleet
 from diagnosis.audit.store.database import Database
+from diagnosis.results.vocabulary import Leave
 from tests import fleet_samples as samples
 from tests.fleet_samples import Fault, Sample
 
@@ -28,7 +28,7 @@ def test_every_machine_of_a_fleet_stands_in_one_list(tmp_path: Path) -> None:
     assert found["HX4-07"].reason.startswith("front steering sensor stuck")
     assert found["HX4-07"].name == "HX4-07/2026-11-14"
     assert found["HX4-02"].leave is Leave.MAY
-    assert found["HX4-08"].leave is Leave.NOT_KNOWN
+    assert found["HX4-08"].leave is Leave.CHECK
     assert (found["HX4-08"].name, found["HX4-08"].reason) == (
         "HX4-08/broken",
         "FL speed sensor noisy; ends after 12 bytes",
@@ -46,7 +46,7 @@ def test_a_fault_that_was_not_seen_again_is_said_of_an_earlier_mission(tmp_path:
 def test_a_table_that_is_no_log_blocks_no_machine(tmp_path: Path) -> None:
     for reason, leave in (
         ("HX-1/oil.csv: no log of a machine: no column (iron_ppm) is called like a signal", Leave.MAY),
-        ("HX-1/b.csv: no wheel signal: no column (a) is called like a signal of a machine", Leave.NOT_KNOWN),
+        ("HX-1/b.csv: no wheel signal: no column (a) is called like a signal of a machine", Leave.CHECK),
     ):
         other = Sample("HX-1/oil", "HX-1", None, "unreadable", None, reason=reason)
         document = fleet_json(
@@ -90,13 +90,13 @@ def test_an_open_fault_and_a_rising_loss_are_said(tmp_path: Path) -> None:
 def test_a_reason_names_its_log_without_the_folders(tmp_path: Path) -> None:
     broken = Sample("x/y/z", "x", state="unreadable", reason="/data/x/y/z.mcap ends after 12 bytes; copy it again")
     (one,) = listed(tmp_path, Sample("x/y/a", "x"), broken).values()
-    assert (one.leave, one.reason) == (Leave.NOT_KNOWN, "z.mcap ends after 12 bytes")
+    assert (one.leave, one.reason) == (Leave.CHECK, "z.mcap ends after 12 bytes")
 
 
 def test_a_reason_says_that_a_log_is_no_longer_there_and_how_to_leave_it_out(tmp_path: Path) -> None:
     torn = Sample("x/z z", "x", state="unreadable", reason="/data/x/z.mcap ends after 12 bytes", gone=True)
     (one,) = listed(tmp_path, Sample("x/a", "x"), torn).values()
-    assert one.leave is Leave.NOT_KNOWN
+    assert one.leave is Leave.CHECK
     assert one.reason.endswith("it is no longer there: put it back, or leave it out with mfhca audit --forget 'x/z z'")
 
 
@@ -129,13 +129,13 @@ def worn(tmp_path: Path, low: float) -> tuple[Left, str, str]:
 
 def test_a_loss_beyond_its_limit_that_no_report_states_gives_no_leave(tmp_path: Path) -> None:
     one, words, title = worn(tmp_path, 0.15)
-    assert one.leave is Leave.NOT_KNOWN
+    assert one.leave is Leave.CHECK
     assert one.reason == (
         "RL drive valve lost 20 % over the whole of its last mission, beyond the limit of 10 %, though no fault was stated in it: check "
         "the part"
     )
     assert words == "Ready by its last report, but a loss is beyond its limit"
-    assert title == "It is not known whether the machine may go out"
+    assert title == "The machine must be checked before it goes out"
 
 
 def test_a_loss_that_may_be_within_its_limit_is_told_beside_the_leave(tmp_path: Path) -> None:
@@ -181,3 +181,18 @@ def test_a_store_of_an_earlier_version_is_read_and_written_on(tmp_path: Path) ->
             Database(store).close()
         (one,) = lists_of(fleet_json(load_fleet(store)))
         assert one.reason.startswith("FR speed sensor stuck")
+
+
+def test_parts_that_were_judged_too_briefly_are_named_once(tmp_path: Path) -> None:
+    blind = Sample("b", day=1.0, verdict="not_assessed", blind=[("FR", "sensor")], reason="Not judged long enough")
+    (one,) = listed(tmp_path, Sample("a"), blind).values()
+    assert one.leave is Leave.CHECK
+    assert one.reason == "Not judged long enough: FR speed sensor"
+
+
+def test_no_machine_that_must_not_go_out_is_no_all_clear(tmp_path: Path) -> None:
+    half = Sample("a", verdict="watch", faults=[Fault("RR", "actuator", epsilon=(0.65, 0.64, 0.66))])
+    page = build_fleet_page(fleet_json(load_fleet(samples.write_store(tmp_path / "fleet.sqlite", [half]))))
+    assert "Must not go out (0)" in page
+    assert "None for certain, but 1 machine must be checked first." in page
+    assert "Check before it goes out (1)" in page

@@ -36,7 +36,7 @@ def test_a_log_counts_for_the_machine_that_alone_has_judged_missions_around_it(t
     broken = Sample("a/new/day2", "", state="unreadable")
     d = document(tmp_path, Sample("a/old/day0"), Sample("a/old/day1", day=1.0), Sample("b/day0", "HX-2"), broken)
     assert {m["label"]: m["verdict"] for m in d["machines"]} == {"HX-1": "not_assessed", "HX-2": "ready"}
-    assert d["verdict"]["title"] == "1 of 2 machines may go out, of 1 it is not known"
+    assert d["verdict"]["title"] == "1 of 2 machines may go out, 1 must be checked first"
     assert "Not assessed (1): HX-1 (since 2026-10-27: last judged ready)." in d["verdict"]["text"]
 
 

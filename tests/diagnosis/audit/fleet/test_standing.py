@@ -68,7 +68,7 @@ def test_a_newest_mission_that_was_not_judged_is_no_leave(
 def test_a_note_counts_the_missions_that_were_not_judged(tmp_path: Path, late: int, words: str) -> None:
     blind = [Sample(f"d{k + 1}", day=k + 1.0, verdict="not_assessed") for k in range(late)]
     (m,) = document(tmp_path, Sample("d0"), *blind)["machines"]
-    assert m["note"].startswith(f"{words} showed no fault, but not all parts were judged")
+    assert m["note"].startswith(f"{words} showed no fault, but did not clear the machine")
 
 
 def test_an_earlier_mission_that_was_not_judged_takes_nothing_away(tmp_path: Path) -> None:
@@ -183,13 +183,13 @@ def test_a_fault_that_comes_back_is_as_severe_as_it_is_now(
 @pytest.mark.parametrize(
     ("missions", "told"),
     [
-        ([Sample("a")], "every part assessed in the last mission"),
-        ([Sample("a"), Sample("b", day=None)], "every part assessed in the last mission"),
-        ([Sample("a", blind=[("FR", "sensor")])], "1 part not judged long enough in the last mission"),
+        ([Sample("a")], "every part judged long enough in the last mission"),
+        ([Sample("a"), Sample("b", day=None)], "every part judged long enough in the last mission"),
+        ([Sample("a", blind=[("FR", "sensor")])], "in the last missions 1 part judged too briefly"),
         ([NO_SIGNAL], "nothing judged"),
-        ([Sample("a", day=None, verdict="not_assessed", blind=samples.PARTS)], "last mission not known of 1 machine"),
-        ([Sample("a"), Sample("b", "HX-2", state="crashed")], "last mission not known of 1 machine"),
-        ([Sample("a"), Sample("b", state="crashed")], "last mission not known of 1 machine"),
+        ([Sample("a", day=None, verdict="not_assessed", blind=samples.PARTS)], "uncertain for 1 machine"),
+        ([Sample("a"), Sample("b", "HX-2", state="crashed")], "uncertain for 1 machine"),
+        ([Sample("a"), Sample("b", state="crashed")], "uncertain for 1 machine"),
     ],
 )
 def test_every_part_is_assessed_only_where_that_is_known(tmp_path: Path, missions: list[Sample], told: str) -> None:
@@ -233,14 +233,14 @@ def test_a_damaged_log_is_no_work_to_do(tmp_path: Path) -> None:
         Sample("b", "M2"),
         Sample("c", "M3", verdict="stop", faults=[Fault()]),
     )
-    assert d["verdict"]["title"] == "1 of 3 machines must not go out, 1 may go out, of 1 it is not known"
+    assert d["verdict"]["title"] == "1 of 3 machines must not go out, 1 may go out, 1 must be checked first"
     standing = {m["id"]: m["standing"] for m in d["machines"]}
     assert standing["M1"] == "No fault found, but its last log is damaged"
     d = document(tmp_path / "two", Sample("a", "M1", verdict="watch"), Sample("b", "M2"))
-    assert d["verdict"]["title"] == "1 of 2 machines may go out, of 1 it is not known"
+    assert d["verdict"]["title"] == "1 of 2 machines may go out, 1 must be checked first"
     assert (d["verdict"]["status"], d["verdict"]["tag"]) == ("watch", "1 machine: damaged logs")
     d = document(tmp_path / "one", Sample("a", "M1", verdict="watch"))
-    assert d["verdict"]["title"] == "It is not known whether the machine may go out"
+    assert d["verdict"]["title"] == "The machine must be checked before it goes out"
 
 
 @pytest.mark.parametrize(
@@ -250,8 +250,8 @@ def test_a_damaged_log_is_no_work_to_do(tmp_path: Path) -> None:
         (["stop"], "The machine must not go out"),
         (["ready", "ready", "ready"], "All 3 machines may go out"),
         (["stop", "stop"], "Both machines must not go out"),
-        (["stop", "ready", "not_assessed"], "1 of 3 machines must not go out, 1 may go out, of 1 it is not known"),
-        (["not_assessed", "not_assessed"], "Both machines need a look: whether they may go out is not known"),
+        (["stop", "ready", "not_assessed"], "1 of 3 machines must not go out, 1 may go out, 1 must be checked first"),
+        (["not_assessed", "not_assessed"], "Both machines must be checked before they go out"),
     ],
 )
 def test_the_headline_counts_machines_as_the_lists_do(tmp_path: Path, verdicts: list[str], title: str) -> None:
@@ -284,7 +284,7 @@ def test_a_copy_adds_nothing_to_what_was_not_assessed_and_the_figures_add_up(tmp
     )
     assert d["counts"]["not_assessed"] == 1
     assert any("1 mission was read, but not assessed." in line for line in d["verdict"]["text"])
-    assert "2 counted, 1 copy; of all 1 not assessed" in build_fleet_page(d)
+    assert "2 with a report, 1 copy; 1 without a verdict" in build_fleet_page(d)
 
 
 def test_parts_that_the_last_mission_did_not_assess_are_named(tmp_path: Path) -> None:
@@ -297,7 +297,7 @@ def test_a_file_that_was_left_out_is_no_damage(tmp_path: Path) -> None:
     d = document(tmp_path, Sample("a", "M1", state="degraded", verdict="watch", reason=reason), Sample("b", "M2"))
     standing = {m["id"]: m["standing"] for m in d["machines"]}
     assert standing["M1"] == "No fault found, but a file of its last log was left out"
-    assert d["verdict"]["title"] == "1 of 2 machines may go out, of 1 it is not known"
+    assert d["verdict"]["title"] == "1 of 2 machines may go out, 1 must be checked first"
     assert d["verdict"]["tag"] == "1 machine: files left out"
 
 

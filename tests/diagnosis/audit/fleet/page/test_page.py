@@ -165,3 +165,15 @@ def test_a_machine_of_several_folders_says_that_its_id_makes_it_one(tmp_path: Pa
     page = build_fleet_page(document(tmp_path, *both))
     assert "sample has logs of 2 folders (AX, BX), which its id makes one machine." in page
     assert "which its id makes one machine" not in build_fleet_page(document(tmp_path / "few", *samples.few()))
+
+
+def test_a_course_names_the_losses_mission_by_mission_and_whether_the_fault_lasts(tmp_path: Path) -> None:
+    lost = [Fault("RR", "actuator", epsilon=(e, e - 0.01, e + 0.01)) for e in (0.5, 0.65)]
+    missions = [Sample("a")] + [Sample(f"b{k}", day=k + 1.0, verdict="watch", faults=[f]) for k, f in enumerate(lost)]
+    document = fleet_json(load_fleet(samples.write_store(tmp_path / "fleet.sqlite", missions)))
+    page = build_fleet_page(document)
+    assert "ε̂ 0.50 → 0.65 (0.64 to 0.66) in the fault, mission by mission" in page
+    assert "last seen before the end of the log" in page
+    for fault in document["missions"][-1]["faults"]:
+        fault["lasting"] = True
+    assert "lasts to the end of the log" in build_fleet_page(document)

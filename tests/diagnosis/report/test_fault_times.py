@@ -1,0 +1,26 @@
+from __future__ import annotations
+
+import pytest
+
+from diagnosis.report.fault_times import when_words
+from tests import report_samples as samples
+
+HEALTHY = {"component": "FR", "side": "actuator", "state": "healthy", "start_s": 80.0, "stop_s": 100.0, "reason": ""}
+
+
+@pytest.mark.parametrize(
+    ("start", "stop", "words"),
+    [
+        (37.995, 80.005, "began at 0:37.995 (07:30:37.995 UTC) and ended at 1:20.005, 20.0 s before the log does"),
+        (37.995, 100.0, "began at 0:37.995 (07:30:37.995 UTC) and lasts to the end of the log"),
+        (0.0, 100.0, "was there from the beginning and lasts to the end of the log"),
+    ],
+)
+def test_onset_clock_time_and_end(start: float, stop: float, words: str) -> None:
+    fault = samples.fault(component="FR", side="actuator", start_s=start, stop_s=stop)
+    report = samples.report_with(intervals=[fault], states=[HEALTHY])
+    report["log"] |= {"duration_s": 100.0, "start_ns": 1_794_814_200 * 10**9}
+    assert when_words(fault, report) == f"{fault['id']} {words}"
+    report["states"] = []
+    if stop < 99.0:
+        assert when_words(fault, report).endswith("before the log ends; its part was not seen healthy since")

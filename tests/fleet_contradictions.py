@@ -1,0 +1,80 @@
+"""Statements of a fleet's page, table and lists that cannot be true beside each other."""
+
+from __future__ import annotations
+
+import csv
+import io
+import re
+from collections import Counter
+from collections.abc import Iterator
+
+from diagnosis.audit.fleet.fleet_types import FleetDocument
+from diagnosis.audit.fleet.leave import lists_of
+from diagnosis.audit.fleet.listed import listed_machines
+from diagnosis.audit.fleet.page.page import build_fleet_page
+from diagnosis.audit.fleet.table import fleet_csv
+from diagnosis.results.candidates import UNCLEAR
+from diagnosis.results.vocabulary import Leave, Verdict
+
+
+def fleet_contradictions(document: FleetDocument) -> list[str]:
+    """One sentence for each contradiction in a ``fleet.json`` and what is made of it; empty where there is none."""
+    return [*_lists(document), *_headline(document), *_table(document), *_endings(document)]
+
+
+def _lists(document: FleetDocument) -> Iterator[str]:
+    """Each machine in one list, with a state that goes with it."""
+    lists, machines = lists_of(document), listed_machines(document)
+    if [x.machine for x in lists] != list(range(len(document["machines"]))):
+        yield "a machine stands in no list, or in two"
+    for left, machine in zip(lists, machines, strict=True):
+        ready = machine.words.startswith("Ready") and "but a loss" not in machine.words
+        if ready != (left.leave is Leave.MAY):
+            yield f"{left.label}: {machine.words!r} in the list {left.leave!r}"
+        if (machine.verdict is Verdict.STOP) != (left.leave is Leave.MUST_NOT):
+            yield f"{left.label}: verdict {machine.verdict} in the list {left.leave!r}"
+        if re.search(r"not judged long enough; not judged long enough", left.reason, re.IGNORECASE):
+            yield f"{left.label}: {left.reason!r}"
+    named = [t.partition(" – ")[0] for t in document["verdict"]["text"] if " – " in t]
+    if double := [name for name, n in Counter(named).items() if n > 1]:
+        yield f"{double[0]} stands in two sentences"
+    must = {x.label for x in lists if x.leave is Leave.MUST_NOT}
+    for text in document["verdict"]["text"]:
+        if found := re.match(r"Must not go out \(\d+\): (.*?)( and \d+ more|\.)", text):
+            wrong = set(found.group(1).split(", ")) - must
+            if wrong:
+                yield f"{sorted(wrong)} must not go out, and stand in another list"
+
+
+def _headline(document: FleetDocument) -> Iterator[str]:
+    """Numbers of the headline against the lists."""
+    counts = Counter(x.leave for x in lists_of(document))
+    title = document["verdict"]["title"]
+    for leave, form in (
+        (Leave.MUST_NOT, r"(\d+)(?: of \d+ machines)? must not go out"),
+        (Leave.MAY, r"(\d+)(?: of \d+ machines)? may go out"),
+        (Leave.CHECK, r"(\d+) must be checked first"),
+    ):
+        if (found := re.search(form, title)) and int(found.group(1)) != counts[leave]:
+            yield f"{title!r}, and {counts[leave]} in the list {leave!r}"
+
+
+def _table(document: FleetDocument) -> Iterator[str]:
+    """``fleet.csv`` against the page: what is unclear there is unclear here."""
+    rows = list(csv.DictReader(io.StringIO(fleet_csv(document))))
+    for mission, row in zip(document["missions"], rows, strict=True):
+        worst = mission["faults"][0] if mission["faults"] else None
+        if worst is not None and (row["worst_mode"] == UNCLEAR) != bool(worst.get("unclear")):
+            yield f"{mission['name']}: fleet.csv calls its worst fault {row['worst_mode']!r}"
+
+
+def _endings(document: FleetDocument) -> Iterator[str]:
+    """A fault that lasts to the end of its log, and is told to have been seen last before."""
+    page = build_fleet_page(document)
+    told = len(re.findall("last seen before the end of the log", page))
+    places = [
+        any(f["id"] == x["last_id"] and f.get("lasting") for f in document["missions"][x["last"]]["faults"])
+        for x in document["faults"]
+    ]
+    if told > places.count(False):
+        yield f"{told} faults are said to be last seen before the end of their log, of {places.count(False)}"

@@ -1,0 +1,83 @@
+"""Statements of a mission's page that cannot be true beside each other or its table of coverage."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from diagnosis.comparison.words import coverage_head
+from diagnosis.report.confidence import going_out, judged
+from diagnosis.report.fault_times import when_words
+from diagnosis.report.tables import clearing_sentences
+
+_END_S = 1.0
+
+
+def of_judged(report: Mapping[str, Any]) -> Iterator[str]:
+    """How many parts were judged, in title and facts; why none is cleared; one remedy for each reason."""
+    verdict = report["verdict"]
+    said = judged(report)  # type: ignore[arg-type]
+    found = re.match(r"(\d+) of (\d+) parts judged, (none|\d+) cleared", said)
+    if found is None:
+        return
+    whole = found.group(1) == found.group(2)
+    if whole and re.search(r"not all parts judged|Not judged long enough", verdict["title"]):
+        yield f"title {verdict['title']!r}, and {said!r}"
+    if verdict["cleared"] and found.group(3) == "none" and not report["intervals"]:
+        yield f"cleared, and {said!r}"
+    if said.partition(";")[0].endswith("none cleared"):
+        yield f"none cleared without a reason: {said!r}"
+    steering = [row["act"] for row in verdict["to_clear"] if row["act"].startswith("steer from stop to stop")]
+    silent = [row for row in verdict["to_clear"] if row["act"] in steering and " open" in row["reason"]]
+    named = [row["reason"] for row in verdict["to_clear"] if row["act"] in steering and row not in silent]
+    for row in silent:
+        for axle in report["machine"]["axles"]:
+            name = axle.removesuffix("_steer")
+            if re.search(rf"\b{name}\b", row["reason"], re.IGNORECASE) and any(
+                re.search(rf"\b{name}\b", reason, re.IGNORECASE) for reason in named
+            ):
+                yield f"two remedies for the {name} steering: {sorted(set(steering))}"
+
+
+def of_going_out(report: Mapping[str, Any]) -> Iterator[str]:
+    """The plain answer against the verdict, and reasons that an action says already."""
+    answer, _ = going_out(report)  # type: ignore[arg-type]
+    verdict = report["verdict"]
+    if (answer == "Yes") != verdict["cleared"] and not report.get("previous", {}).get("open_faults"):
+        yield f"may it go out again? {answer}, and cleared is {verdict['cleared']}"
+    told = [reason for reason, _ in clearing_sentences(verdict)]
+    if verdict["actions"] and any(re.match(r"F\d+: ", reason) for reason in told):
+        yield "what to do about a fault is said twice"
+
+
+def of_endings(report: Mapping[str, Any]) -> Iterator[str]:
+    """A fault that lasts and is said to have ended, or to have been, and the other way round."""
+    end, text = report["log"]["duration_s"], report["verdict"]["text"]
+    lasting = [f for f in report["intervals"] if f["stop_s"] >= end - _END_S]
+    for fault in report["intervals"]:
+        words = when_words(fault, report)  # type: ignore[arg-type]
+        if ("lasts to the end" in words) != (fault in lasting):
+            yield f"{fault['id']} ends at {fault['stop_s']:.2f} of {end:.2f} s: {words!r}"
+    if "to the end of the log" in text and not lasting:
+        yield f"nothing lasts to the end: {text!r}"
+    stated = [f for f in report["intervals"] if f["severity"] != "info"]
+    if stated and all(f in lasting for f in stated) and re.search(r"(sensor|valve|drive|motor) was ", text):
+        yield f"every fault lasts to the end: {text!r}"
+
+
+def of_previous(report: Mapping[str, Any]) -> Iterator[str]:
+    """Parts of a comparison that were judged in both missions, below a heading that says one."""
+    changes = report.get("previous", {}).get("coverage", [])
+    if not changes:
+        return
+    head = coverage_head(changes)
+    both = [c for c in changes if all(side is not None and side["long_enough"] for side in (c["older"], c["newer"]))]
+    if both and head == "Judged long enough in one mission only":
+        yield f"{head}: {both[0]['component']} {both[0]['side']} was in both"
+
+
+def of_page(report: Mapping[str, Any]) -> Iterator[str]:
+    """All of them."""
+    for rule in (of_judged, of_going_out, of_endings, of_previous):
+        yield from rule(report)
