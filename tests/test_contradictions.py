@@ -134,7 +134,13 @@ def _in_both(d: Document) -> None:
         "long_enough": True,
     }
     row = {"component": "RL", "kind": "wheel", "side": "sensor", "older": side, "newer": side, "change": "lost"}
-    d["previous"] = {"coverage": [row]}
+    d["previous"] = {
+        "coverage": [row],
+        "order": "earlier",
+        "mission": {"files": ["a.mcap"]},
+        "counts": {},
+        "faults": [],
+    }
 
 
 def _two_remedies(d: Document) -> None:

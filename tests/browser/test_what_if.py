@@ -99,3 +99,22 @@ def test_a_valve_moves_the_wheel(open_page: OPEN) -> None:
     page.keyboard.press("w")
     expect(page.locator("#whatif-words")).to_contain_text("Wheel model found here: K = ")
     expect(page.locator("#whatif-figure")).to_contain_text("Change of the wheel’s speed")
+
+
+def test_a_residual_that_is_drawn_is_not_denied_and_the_onset_is_the_faults_own(open_page: OPEN) -> None:
+    """Where no model of the part is found, its residual is named as the panel above, and nothing is rounded by the sliders' steps."""
+    page = open_page("five_faults", "#fault=F1")
+    page.keyboard.press("w")
+    expect(page.locator("#whatif-onset + output")).to_have_text(re.compile(r"^\d"))
+    onset, stated = page.evaluate(
+        "[+document.querySelector('#whatif-onset').value, Data.view.faults.find((f) => f.id === 'F1').start]"
+    )
+    assert onset == stated
+    words = page.evaluate(
+        """() => { const one = Float64Array.of(1), d = { sensor: false, runit: "°", channel: { name: "steer.rear.u" }, residual: one };
+          return [WhatIf.words(d, { ratio: null }), WhatIf.words({ ...d, residual: null }, { ratio: null })]; }"""
+    )
+    assert words[0].startswith(
+        "What a changed opening does to the residual of this part (°, drawn above) is not computed here"
+    )
+    assert words[1] == "No residual of this part was recorded in which the change could be seen."

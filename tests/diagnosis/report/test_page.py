@@ -309,11 +309,11 @@ def test_caveats_that_say_the_same_are_one_line() -> None:
     ]
 
 
-def test_a_verdict_without_an_answer_says_that_it_is_not_known() -> None:
+def test_whether_the_machine_may_go_out_again_is_said_plainly() -> None:
     report, columns = samples.not_assessed()
-    assert "check before it goes out" in build_page(report, columns)
+    assert "May it go out again? <b>No</b>, not before it was checked." in build_page(report, columns)
     report, columns = samples.five_faults()
-    assert "must not go out" in build_page(report, columns)
+    assert "May it go out again? <b>No</b>, not before repair." in build_page(report, columns)
 
 
 def test_loss_over_the_mission_stands_with_the_coverage() -> None:

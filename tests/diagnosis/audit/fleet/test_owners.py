@@ -10,10 +10,12 @@ import pytest
 
 from diagnosis.audit.discovery.identity import fallback_id
 from diagnosis.audit.discovery.missions import MissionSource
+from diagnosis.audit.fleet.leave import lists_of
 from diagnosis.audit.fleet_files import fleet_json, load_fleet
 from diagnosis.audit.store.keys import Key
 from diagnosis.audit.store.outcome import Outcome
 from diagnosis.audit.store.store import Store
+from diagnosis.results.vocabulary import Leave
 from tests import fleet_samples as samples
 from tests.fleet_samples import Sample
 
@@ -37,7 +39,8 @@ def test_a_log_counts_for_the_machine_that_alone_has_judged_missions_around_it(t
     d = document(tmp_path, Sample("a/old/day0"), Sample("a/old/day1", day=1.0), Sample("b/day0", "HX-2"), broken)
     assert {m["label"]: m["verdict"] for m in d["machines"]} == {"HX-1": "not_assessed", "HX-2": "ready"}
     assert d["verdict"]["title"] == "1 of 2 machines may go out, 1 must be checked first"
-    assert "Not assessed (1): HX-1 (since 2026-10-27: last judged ready)." in d["verdict"]["text"]
+    assert lists_of(d)[0].label == "HX-1"
+    assert lists_of(d)[0].leave is Leave.CHECK
 
 
 @pytest.mark.parametrize(

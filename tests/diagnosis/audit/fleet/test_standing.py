@@ -216,7 +216,7 @@ def test_what_must_not_go_out_is_told_before_what_was_not_assessed(tmp_path: Pat
     stuck = Sample("a", "HX-1", verdict="stop", faults=[Fault(mode="stuck", severity="high")])
     blind = Sample("b", "HX-2", verdict="not_assessed")
     text = document(tmp_path, stuck, blind)["verdict"]["text"]
-    assert text[:2] == ["HX-1 – stop and repair: RL drive valve stuck.", "Not assessed (1): HX-2."]
+    assert text[:2] == ["HX-1 – stop and repair: RL drive valve stuck.", "1 mission was read, but not assessed."]
 
 
 def test_a_machine_without_any_part_that_was_assessed_shows_so(tmp_path: Path) -> None:
