@@ -256,7 +256,11 @@ def sentences(
     unread, open_, pending = failed
     if unread or open_:
         said = [f"{count(unread, 'log')} could not be read"] if unread else []
-        said += [f"{count(open_, 'mission')} {_was(open_)} read, but not assessed"] if open_ else []
+        said += (
+            [f"{count(open_, 'mission')} found no fault, but did not clear {'its' if open_ == 1 else 'their'} machine"]
+            if open_
+            else []
+        )
         out.append(f"{'; '.join(said)}.")
     if unknown and any(m.verdict is not Verdict.READY for m in machines):  # else the headline says so
         out.append(

@@ -78,7 +78,11 @@ def _coverage(machines: Sequence[MachineRow]) -> str:
     dark = sum(
         not m["parts"] or m["unjudged"] > 0 or any(p["assessed_last"] is None for p in m["parts"]) for m in machines
     )
-    words = [f"in the last missions {count(blind, 'part')} judged too briefly"] if blind else []
+    words = (
+        [f"{count(blind, 'part')} not judged long enough in the last mission{'s' if len(machines) > 1 else ''}"]
+        if blind
+        else []
+    )
     words += [f"uncertain for {count(dark, 'machine')}"] if dark else []
     return "; ".join(words) or "every part judged long enough in the last mission"
 

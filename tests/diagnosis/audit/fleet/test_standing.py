@@ -185,7 +185,7 @@ def test_a_fault_that_comes_back_is_as_severe_as_it_is_now(
     [
         ([Sample("a")], "every part judged long enough in the last mission"),
         ([Sample("a"), Sample("b", day=None)], "every part judged long enough in the last mission"),
-        ([Sample("a", blind=[("FR", "sensor")])], "in the last missions 1 part judged too briefly"),
+        ([Sample("a", blind=[("FR", "sensor")])], "1 part not judged long enough in the last mission"),
         ([NO_SIGNAL], "nothing judged"),
         ([Sample("a", day=None, verdict="not_assessed", blind=samples.PARTS)], "uncertain for 1 machine"),
         ([Sample("a"), Sample("b", "HX-2", state="crashed")], "uncertain for 1 machine"),
@@ -201,7 +201,7 @@ def test_logs_not_read_and_missions_not_assessed_are_both_counted(tmp_path: Path
     bad = [Sample(f"u{k}", state="unreadable") for k in range(2)]
     open_ = [Sample(f"n{k}", day=k + 1.0, verdict="not_assessed") for k in range(2)]
     text = document(tmp_path, Sample("a"), *bad, *open_)["verdict"]["text"]
-    assert "2 logs could not be read; 2 missions were read, but not assessed." in text
+    assert "2 logs could not be read; 2 missions found no fault, but did not clear their machine." in text
 
 
 @pytest.mark.parametrize(("n", "more"), [(5, ""), (12, ""), (15, " and 3 more: listed below")])
@@ -216,7 +216,10 @@ def test_what_must_not_go_out_is_told_before_what_was_not_assessed(tmp_path: Pat
     stuck = Sample("a", "HX-1", verdict="stop", faults=[Fault(mode="stuck", severity="high")])
     blind = Sample("b", "HX-2", verdict="not_assessed")
     text = document(tmp_path, stuck, blind)["verdict"]["text"]
-    assert text[:2] == ["HX-1 – stop and repair: RL drive valve stuck.", "1 mission was read, but not assessed."]
+    assert text[:2] == [
+        "HX-1 – stop and repair: RL drive valve stuck.",
+        "1 mission found no fault, but did not clear its machine.",
+    ]
 
 
 def test_a_machine_without_any_part_that_was_assessed_shows_so(tmp_path: Path) -> None:
@@ -283,7 +286,7 @@ def test_a_copy_adds_nothing_to_what_was_not_assessed_and_the_figures_add_up(tmp
         Sample("b", day=1.0, verdict="stop", faults=fault),
     )
     assert d["counts"]["not_assessed"] == 1
-    assert any("1 mission was read, but not assessed." in line for line in d["verdict"]["text"])
+    assert any("1 mission found no fault, but did not clear its machine." in line for line in d["verdict"]["text"])
     assert "2 with a report, 1 copy; 1 without a verdict" in build_fleet_page(d)
 
 
