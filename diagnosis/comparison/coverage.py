@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
-from diagnosis.results.assessed import is_cut, is_judged
+from diagnosis.results.assessed import is_judged, is_limited
 from diagnosis.results.comparison_document import CoverageStep
 from diagnosis.results.document import ReportDocument
 from diagnosis.results.vocabulary import Kind, Tier
@@ -85,12 +85,12 @@ def sides_of(report: ReportDocument) -> dict[Part, SideCoverage]:
     """Coverage of a report by component and side."""
     least = report["limits"]["min_assessed"]
     open_ = {(c["component"], s) for c in report["clearing"] if not c["passed"] for s in Side(c["side"]).sides}
-    whole = not is_cut(report["verdict"]["scope"])
     out: dict[Part, SideCoverage] = {}
     for row in report["coverage"]:
         judged = sum(v for k, v in row["seconds"].items() if k in DECIDED)
         decided, driving, tier = row["decided_driving_s"], row["driving_s"], row["tier"]
-        shown = whole and (row["component"], row["side"]) not in open_
+        limited = is_limited(report["verdict"]["scope"], row["component"])
+        shown = not limited and (row["component"], row["side"]) not in open_
         long_enough = tier is not Tier.NONE and is_judged(decided, driving, least)
         assessed = shown and long_enough
         out[row["component"], row["side"]] = SideCoverage(tier, driving, decided, judged, assessed, shown, long_enough)

@@ -131,10 +131,12 @@ def _why_none(report: ReportDocument) -> str:
     rows = report["verdict"].get("to_clear")
     if rows is None:
         return ", for this report does not say what is open"
+    if not any(side.long_enough for side in sides_of(report).values()):
+        return ", for none was judged long enough"
     whole = next((row["reason"] for row in rows if not _named(row, report)), "")
     if whole:
         return f": {whole[:1].lower()}{whole[1:].rstrip('.')}"
-    return ", for each has a fault or is named in what is open" if rows else ", for each has a fault or an open check"
+    return ", for each that was judged has a fault or is named in what is open"
 
 
 def _named(row: ToClearRow, report: ReportDocument) -> set[str]:

@@ -21,6 +21,7 @@ def is_judged(decided_s: float, driving_s: float, min_assessed: float) -> bool:
     return decided_s >= needed_s(driving_s, min_assessed)
 
 
-def is_cut(scope: Iterable[str]) -> bool:
-    """Whether a part of the log alone was judged, by the reasons why what was judged is not the whole mission."""
-    return any(text.startswith(CUT) for text in scope)
+def is_limited(scope: Iterable[str], component: str) -> bool:
+    """Whether a component that was judged was so for a part of the mission alone, by the reasons why the whole one was not judged."""
+    own = f" the {component.removesuffix('_steer')} "
+    return any(text.startswith(CUT) or (text.startswith(AT_TIMES) and own in text) for text in scope)

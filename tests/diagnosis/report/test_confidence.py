@@ -165,5 +165,7 @@ def test_parts_that_were_judged_and_those_that_were_cleared_are_counted_apart() 
     assert judged(samples.report_with(coverage=rows, intervals=[watched], verdict=about)) == (
         "4 of 4 parts judged, none cleared: several wheels swing together"
     )
+    brief = samples.report_with(coverage=[row("sensor", 20.0)], verdict=about)
+    assert judged(brief).startswith("0 of 1 parts judged, none cleared, for none was judged long enough;")
     assert judged_means(found).startswith("Judged: decided, healthy or faulty, for at least ")
     assert judged_means(samples.report_with(coverage=[])) == ""
