@@ -29,7 +29,7 @@ def of_judged(report: Mapping[str, Any]) -> Iterator[str]:
     if said.partition(";")[0].endswith("none cleared"):
         yield f"none cleared without a reason: {said!r}"
     steering = [row["act"] for row in verdict["to_clear"] if row["act"].startswith("steer from stop to stop")]
-    silent = [row for row in verdict["to_clear"] if row["act"] in steering and " open" in row["reason"]]
+    silent = [row for row in verdict["to_clear"] if row["act"] in steering and "leaves the check" in row["reason"]]
     named = [row["reason"] for row in verdict["to_clear"] if row["act"] in steering and row not in silent]
     for row in silent:
         for axle in report["machine"]["axles"]:
