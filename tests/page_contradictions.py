@@ -28,16 +28,14 @@ def of_judged(report: Mapping[str, Any]) -> Iterator[str]:
         yield f"cleared, and {said!r}"
     if said.partition(";")[0].endswith("none cleared"):
         yield f"none cleared without a reason: {said!r}"
-    steering = [row["act"] for row in verdict["to_clear"] if row["act"].startswith("steer from stop to stop")]
-    silent = [row for row in verdict["to_clear"] if row["act"] in steering and "leaves the check" in row["reason"]]
-    named = [row["reason"] for row in verdict["to_clear"] if row["act"] in steering and row not in silent]
-    for row in silent:
-        for axle in report["machine"]["axles"]:
-            name = axle.removesuffix("_steer")
-            if re.search(rf"\b{name}\b", row["reason"], re.IGNORECASE) and any(
-                re.search(rf"\b{name}\b", reason, re.IGNORECASE) for reason in named
-            ):
-                yield f"two remedies for the {name} steering: {sorted(set(steering))}"
+    steering = [row for row in verdict["to_clear"] if row["act"].startswith("steer from stop to stop")]
+    clauses = [text for row in steering for text in row["reason"].split("; ")]
+    silent = [text for text in clauses if "leaves the check" in text]  # nothing deviates there
+    judged_too_little = [text for text in clauses if re.search(r"^Not judged: |: judged for ", text)]
+    for axle in report["machine"]["axles"]:
+        name = re.compile(rf"\b{axle.removesuffix('_steer')}\b", re.IGNORECASE)
+        if any(map(name.search, silent)) and any(map(name.search, judged_too_little)):
+            yield f"two remedies for the {axle} steering: {sorted({row['act'] for row in steering})}"
 
 
 def of_going_out(report: Mapping[str, Any]) -> Iterator[str]:
