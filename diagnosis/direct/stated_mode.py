@@ -25,7 +25,7 @@ _TRAVEL, _STANDS = (
     0.08,
     0.015,
 )  # of the span: a command that moves by more takes a healthy valve along; not in its middle
-_FEW = 10  # samples
+_FEW, _EVEN = 10, 0.5  # samples; probability of a row
 _MOST_PROBABLY = 0.75  # that a gain is more than any row has
 
 
@@ -34,12 +34,11 @@ def mode_of(isolated: Isolated, found: IdentifiedPair, limits: Limits) -> FaultM
     seen, noise = isolated.seen, isolated.seen.noise
     mode = FaultMode(ROWS[isolated.run.row])
     if mode.scaled:
-        alike = found.pair.side is Side.ACTUATOR and seen.still  # as a valve that is stuck, or off by a constant
-        return (
-            None
-            if alike and seen.deviation < _least_off(noise, found, limits)
-            else _mode_of_gain(isolated, noise, found, limits)
-        )
+        p = float(isolated.p[isolated.run.row])  # no majority: as a valve that is stuck, or off by a constant
+        alike = found.pair.side is Side.ACTUATOR and seen.still and p < _EVEN
+        if alike and seen.deviation < _least_off(noise, found, limits):
+            return None
+        return _mode_of_gain(isolated, noise, found, limits)
     if mode.varying:
         counts = limits.min_sat / 2 if found.pair.side is Side.SENSOR else least_constant(found, limits)
         least = max(2.5 * found.model.noise, 1.5 * noise, counts)

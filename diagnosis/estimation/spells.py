@@ -25,8 +25,8 @@ _LOST, _LEFT = 0.1, 0.1  # of the gain: what is lost at least, and what is left
 _SHORTEST_S, _BRIDGED_S = 0.75, 0.5
 _LEAST_USUAL = 12  # windows that follow: the median of their deviation is usual
 # times that, or the noise, what a share leaves: losses left 0.8 to 2.0 on tuning machines, disturbances beside a loss 5
-_AS_USUAL = 2.2
-_IN_SPELLS = 0.85  # of the deviation's power
+_AS_USUAL, _OF_LOSS = 2.2, 0.07  # and what is lost
+_IN_SPELLS, _MOST = 0.85, 0.75  # of the deviation's power, and of its time at most
 _P, _P_NOISE = 0.85, 0.1
 
 
@@ -75,7 +75,7 @@ def in_spells(finding: Finding, measured: Measured) -> list[Finding]:
         inside[start:stop] = True
     part = slice(first, last)
     power, within = float(np.nansum(windows.off[part])), float(np.nansum(windows.off[part][inside[part]]))
-    if within < _IN_SPELLS * power or inside[part].all():
+    if within < _IN_SPELLS * power or float(inside[part].mean()) > _MOST:
         return [finding]
     return [_as_loss(finding, s, windows, measured) for s in spells]
 
@@ -125,8 +125,8 @@ def _is_share(spell: tuple[int, int], windows: _Windows, usual: float, measured:
     count, yy, xy, xx = (z[part] for z in (windows.count, windows.yy, windows.xy, windows.xx))
     gain = _gain(spell, windows)
     squares = np.maximum(yy - 2.0 * gain * xy + gain**2 * xx, 0.0)[count > 0] / count[count > 0]
-    left = float(np.sqrt(np.median(squares)))
-    return gain >= _LEFT and left <= _AS_USUAL * max(usual, measured.noise)
+    left, lost = float(np.sqrt(np.median(squares))), float(np.sqrt(np.nanmedian(windows.off[part])))
+    return gain >= _LEFT and left <= min(_AS_USUAL * max(usual, measured.noise), _OF_LOSS * lost)
 
 
 def _as_loss(finding: Finding, spell: tuple[int, int], windows: _Windows, measured: Measured) -> Finding:
