@@ -8,6 +8,7 @@ from diagnosis.channels.liveness import alive_sources
 from diagnosis.evidence import ACTUATOR, SENSOR, MissionView, Part
 from diagnosis.families import FAMILIES
 from diagnosis.results.assessment import Assessment, unassessed
+from diagnosis.results.limited import believed
 from diagnosis.results.machine_event import MachineEvent
 from diagnosis.results.machine_words import HYDRAULIC, MachineWords, machine_words
 from diagnosis.results.wheel_model import WheelModelFit
@@ -51,7 +52,7 @@ def assess_components(
     found = {part: mission.known.get(part) or _without_evidence(mission, *part) for part in parts}
     words = machine_words(machine, timeline.signals)
     return ComponentResult(
-        {part: worded(a, words) for part, a in found.items()},
+        {part: worded(believed(a), words) for part, a in found.items()},
         None if mission.model is None else replace(mission.model, note=words.fill(mission.model.note)),
         tuple(event.worded(words) for event in mission.events),
         words,

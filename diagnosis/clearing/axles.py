@@ -39,6 +39,9 @@ VALVE = 1.4  # dead band and hysteresis of a healthy valve: its limit, likewise
 #: Limits of the rate in windows and over the mission, as multiples of the loss that counts, by whether angle and opening are measured twice.
 RATE = {False: (2.0, 0.6), True: (3.0, 2.0)}
 _LEAST_WINDOWS = 16  # for a change
+#: Times the scatter about its trend by which what lies between two axles changes, where it is no scatter: on tuning machines healthy ones
+#: reached 1.5, a sensor that comes to read 1.4 mostly 1.8 to 18.
+_CLEARLY, _NORMAL = 1.75, 1.4826
 #: Of the loss that counts, and times the other axle's: a change of one axle alone. Dead bands that are not known hide half of one.
 _CHANGED, _ALONE = 0.3, 1.5
 #: Of the loss that counts, and times the other axle's: a deviation of one axle alone in windows. Of 36 healthy tuning missions of nine machines
@@ -60,6 +63,7 @@ def axle_checks(cells: Cells, clear_at: float) -> Iterator[Checked]:
     place = np.minimum(np.arange(cells.frame.starts.size), len(rates.off) - 1)
     limit = answered(cells)
     changes = [alone(rates.changes, j, share, _CHANGED * share, _ALONE, others=1) for j in range(len(rates.changes))]
+    told = any((x or 0.0) > most for x, most in zip(rates.changes, changes, strict=True))  # which of them changes
     for j, axle in enumerate(cells.machine.axles):
         about = (Kind.STEER, axle)
         if not np.isfinite(angle[:, j]).any():
@@ -77,7 +81,8 @@ def axle_checks(cells: Cells, clear_at: float) -> Iterator[Checked]:
             off = _alone(rates.off, j) if twice else np.abs(rates.off[:, j])
             deviates = worst(cells, (*about, either, Check.RATE), off[place], brief_limit(rates, j, share, twice=twice))
             changed = lasts(cells, (*about, either, Check.RATE), rates.changes[j], changes[j])
-            yield deviates if changed.worst is None else max(deviates, changed, key=times)
+            parted = lasts(cells, (*about, either, Check.RATE), None if told else rates.parted[j], _CHANGED * share)
+            yield max([deviates, *(c for c in (changed, parted) if c.worst is not None)], key=times)
             if len(cells.machine.axles) > 1:
                 yield lasts(cells, (*about, either, Check.LASTING_RATE), rates.apart[j], RATE[twice][1] * share)
             elif not twice:  # both sides of which are measured twice needs nothing to compare with
@@ -137,6 +142,9 @@ class Rates(NamedTuple):
     changes : list[float | None]
         By how much each axle's usual one changes in the mission at most, alone and beside the other axle's; None where few
         windows tell.
+    parted : list[float | None]
+        By how much what lies between an axle and the other one changes at least, whatever their dead bands are, where that is
+        clear of its scatter, else 0; None where few windows tell.
     """
 
     frame: Frame
@@ -145,6 +153,7 @@ class Rates(NamedTuple):
     apart: list[float | None]
     weight: Array
     changes: list[float | None]
+    parted: list[float | None]
 
 
 def rates_of(cells: Cells, rate: Array, opening: Array) -> Rates:
@@ -158,8 +167,11 @@ def rates_of(cells: Cells, rate: Array, opening: Array) -> Rates:
     # at the edge of a dead band, what of an opening moves something is not known
     enough = frame.sums(opened) >= _EDGE * dead * frame.sums(steered.astype(np.float64))
     most = np.maximum(dead + unsure, min(ALIKE * stands(cells), OVERLAP))
-    off = _nearest([_off(frame, cells.dt, rate, opening, use, tried) for tried in (dead - unsure, dead, most)])
-    off = np.where(enough, off, np.nan)
+    tried = [
+        np.where(enough, _off(frame, cells.dt, rate, opening, use, band), np.nan)
+        for band in (dead - unsure, dead, most)
+    ]
+    off = _nearest(tried)
     with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
         whole = np.log(np.maximum(ahead.sum(axis=0) / opened.sum(axis=0), 1e-3))
     whole = np.where(steered.sum(axis=0) * cells.dt >= _FEW_S, whole, np.nan)
@@ -172,7 +184,31 @@ def rates_of(cells: Cells, rate: Array, opening: Array) -> Rates:
         if np.isfinite(whole[a]) and np.isfinite(whole[b]):
             between = float(abs(whole[a] - whole[b]))
             apart[a], apart[b] = max(apart[a] or 0.0, between), max(apart[b] or 0.0, between)
-    return Rates(frame, off, whole, apart, ahead, [_changes(cells, frame, off, j) for j in range(len(whole))])
+    changes = [_changes(cells, frame, off, j) for j in range(len(whole))]
+    return Rates(frame, off, whole, apart, ahead, changes, _parted(tried))
+
+
+def _parted(tried: Sequence[Array]) -> list[float | None]:
+    """By how much what lies between neighbouring axles changes [ln], for `Rates`; `tried` of shape (windows, axles), by dead bands.
+
+    Axles of one supply lose their oil together, so that a drift of one alone shows between them that its own rates hide.
+    """
+    out: list[float | None] = [None] * tried[0].shape[1]
+    for a, b in pairwise(range(len(out))):
+        between = [off[:, a] - off[:, b] for off in tried]
+        if min(np.count_nonzero(np.isfinite(x)) for x in between) >= _LEAST_WINDOWS:
+            least = min(_clear_change(x) for x in between)
+            out[a], out[b] = max(out[a] or 0.0, least), max(out[b] or 0.0, least)
+    return out
+
+
+def _clear_change(log: Array) -> float:
+    """Change of some windows, shape (windows,), in the mission [ln]; 0 where it may be their scatter about their trend."""
+    every, at = [np.ones(log.size, np.bool_)], np.flatnonzero(np.isfinite(log))
+    change = max(largest_change(log, every), growth(log, every))
+    about = log[at] - np.polyval(np.polyfit(at, log[at], 1), at)
+    scatter = _NORMAL * float(np.median(np.abs(about - np.median(about))))
+    return change if change >= _CLEARLY * scatter else 0.0
 
 
 def _changes(cells: Cells, frame: Frame, off: Array, j: int) -> float | None:

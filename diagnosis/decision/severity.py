@@ -41,7 +41,8 @@ def severity_of(
     faulty = 1.0 - sum(h.p for h in finding.hypotheses if h.mode == "healthy")
     if faulty < _LIKELY:
         return Severity.INFO, "Not certain enough to act on. Compare with the next mission."
-    brief = finding.mode.varying and seconds < _SHORT_NOISE_S
+    sizeless = finding.mode is FaultMode.OUTSIDE_TABLE and finding.epsilon is None
+    brief = (finding.mode.varying or sizeless) and seconds < _SHORT_NOISE_S
     if brief and (finding.tier is Tier.MODEL or faulty < _CERTAIN):
         by = ", and shown by a model alone" if finding.tier is Tier.MODEL else ", and not certain"
         return Severity.INFO, f"Too short to act on{by}. Compare with the next mission."

@@ -21,6 +21,7 @@ from diagnosis.estimation.fault_models import HEALTHY, INEFFICIENT, STUCK, TOTAL
 from diagnosis.estimation.one_cause import with_one_cause
 from diagnosis.estimation.segments import Run, with_leads
 from diagnosis.estimation.simple_causes import Measured
+from diagnosis.estimation.spells import in_spells
 from diagnosis.estimation.spikes import with_spikes
 from diagnosis.estimation.viterbi import ModePath
 from diagnosis.results.assessment import Finding
@@ -89,7 +90,7 @@ def find_faults(path: ModePath, found: IdentifiedPair, limits: Limits) -> Faults
         limit = (before if start == main.start else main.start, after if stop == main.stop else main.stop)
         run = _refined(main, found, limit)
         finding = told.get(run) or finding_of(run, found, limits)
-        if finding is None:
+        if finding is None or (run.row in VARYING_ROWS and run.stop * dt <= returns):  # what came before is not known
             below += 1
         elif timing_explains(found, run, finding.mode):
             timing.append(run)
@@ -103,7 +104,8 @@ def find_faults(path: ModePath, found: IdentifiedPair, limits: Limits) -> Faults
     beside = [as_excess_beside(as_beside(f, findings, found), findings, found) for f in findings]
     measured = _measured(found, limits)
     joined = with_one_cause(with_spikes(beside, measured), measured)
-    return FaultsFound([as_changing_gain(f, measured) for f in joined], timing, below)
+    parts = [part for f in joined for part in in_spells(as_changing_gain(f, measured), measured)]
+    return FaultsFound(parts, timing, below)
 
 
 def _left_open(run: Run, found: IdentifiedPair, limits: Limits) -> bool:

@@ -25,7 +25,7 @@ _TRAVEL, _STANDS = (
     0.08,
     0.015,
 )  # of the span: a command that moves by more takes a healthy valve along; not in its middle
-_FEW = 10  # samples
+_FEW, _EVEN = 10, 0.5  # samples; probability of a row
 _MOST_PROBABLY = 0.75  # that a gain is more than any row has
 
 
@@ -34,6 +34,10 @@ def mode_of(isolated: Isolated, found: IdentifiedPair, limits: Limits) -> FaultM
     seen, noise = isolated.seen, isolated.seen.noise
     mode = FaultMode(ROWS[isolated.run.row])
     if mode.scaled:
+        p = float(isolated.p[isolated.run.row])  # no majority: as a valve that is stuck, or off by a constant
+        alike = found.pair.side is Side.ACTUATOR and seen.still and p < _EVEN
+        if alike and seen.deviation < _least_off(noise, found, limits):
+            return None
         return _mode_of_gain(isolated, noise, found, limits)
     if mode.varying:
         counts = limits.min_sat / 2 if found.pair.side is Side.SENSOR else least_constant(found, limits)
@@ -46,8 +50,7 @@ def mode_of(isolated: Isolated, found: IdentifiedPair, limits: Limits) -> FaultM
     if found.pair.side is Side.ACTUATOR:
         relation = found.relation
         returns = _LEFT_S + 2.0 * (relation.lag + max(0.0, relation.delay * found.pair.dt))
-        # a relation found in the mission is no truer than half a saturation term
-        least = max(_CLEAR * noise, _LOST * found.pair.span, limits.min_sat / 2)
+        least = _least_off(noise, found, limits)
         return mode if away >= returns and (seen.deviation >= least or _left_behind(seen, found)) else None
     # what leaves its place for a sample now and then, as a noisy reference does at rest, moves nothing
     lasts = _longest(np.abs(seen.y - seen.x)[seen.use] > _CLEAR * noise) * found.pair.dt
@@ -58,6 +61,11 @@ def mode_of(isolated: Isolated, found: IdentifiedPair, limits: Limits) -> FaultM
         return None
     at_rest = known.size and max(seen.deviation, float(np.max(np.abs(known)))) < limits.min_sat / 2
     return None if at_rest else mode  # it repeats what it had, which is true
+
+
+def _least_off(noise: float, found: IdentifiedPair, limits: Limits) -> float:
+    """What a valve that stands still is off by at least to be told: a relation found in the mission is no truer than half a saturation term."""
+    return max(_CLEAR * noise, _LOST * found.pair.span, limits.min_sat / 2)
 
 
 def least_constant(found: IdentifiedPair, limits: Limits) -> float:

@@ -30,6 +30,7 @@ _STEADY, _HARDLY = 0.25, 0.05  # of its mean, and of full opening, by which such
 _FOLLOWS, _MOTION, _FEW = 0.9, 0.01, 12
 _EDGE = 0.15  # of a finding
 _LOSES, _IT_IS = 0.1, 0.85  # of its gain, from which it is a loss; probability of what a measured opening shows
+_AS_TOLD = 0.15  # of its command: no further off it, a valve opens as it is told; warm coils give up to 0.16 less
 _SHIFTED = 0.5  # of the loss, from which a zero is no matter of how it changes
 _SHOWN = "The measured opening moves with its command: {gain:.2f} of it, {zero:+.1f}{{percent}} off."
 _STANDS = "The measured opening stays at {place:+.1f}{{percent}}."
@@ -94,6 +95,9 @@ def _as_it_opens(
         edge = round(_EDGE * (f.stop - f.start))  # a valve that begins to stick has moved until then
         inner = slice(f.start + edge, f.stop - edge)
         y, x = (z[inner][pairs[2][inner]] for z in pairs[:2])
+        if f.mode.total and x.size >= _FEW and _rms(y - x) < max(min_sat, _AS_TOLD * _rms(x)):
+            open_.append((f.start // length, -(-f.stop // length)))  # it stands where it is told to
+            continue
         moves = f.mode.total and x.size >= _FEW and min(np.std(x), np.std(y)) >= _MOTION
         if not moves or float(np.corrcoef(x, y)[0, 1]) < _FOLLOWS:
             still = f.mode.total and x.size >= _FEW and float(np.std(y)) < _MOTION
@@ -122,6 +126,10 @@ def _as_it_opens(
             )
         )
     return SideFindings(tuple(kept), tuple(open_))
+
+
+def _rms(z: Array) -> float:
+    return float(np.sqrt(np.mean(z**2)))
 
 
 def _by_its_place(finding: Finding, opening: Array) -> Finding:

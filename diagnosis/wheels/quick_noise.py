@@ -16,7 +16,7 @@ from diagnosis.results.assessment import Finding
 from diagnosis.results.limited import limited
 from diagnosis.wheels.blocks import per_sample
 from diagnosis.wheels.findings import WheelFindings, WheelPath
-from diagnosis.wheels.own_swings import opened
+from diagnosis.wheels.own_swings import is_opened, opened
 from replay.faults import FaultMode, Side
 
 Array = NDArray[np.float64]
@@ -51,8 +51,8 @@ def with_shaken(paths: Mapping[int, WheelPath], found: Mapping[int, WheelFinding
 
 
 def _of_one_cause(findings: list[Finding]) -> list[Finding]:
-    """A wheel's findings; noise of its sensor beside noise of which the side is open is no surer than that."""
-    if not any(f.mode is FaultMode.NOISY and f.side is Side.SENSOR_OR_ACTUATOR for f in findings):
+    """A wheel's findings; noise of its sensor beside what swings, or deviates slowly, at other times is no surer than that."""
+    if not any(is_opened(f) for f in findings):
         return findings
     return [opened(f, _BESIDE) if _of_sensor(f) else f for f in findings]
 

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from diagnosis.results.assessment import Finding
 from diagnosis.wheels.blocks import per_sample
 from diagnosis.wheels.findings import WheelFindings, WheelPath
+from diagnosis.wheels.own_swings import is_opened
 
 Array = NDArray[np.float64]
 
@@ -59,7 +60,7 @@ def without_shared(paths: Mapping[int, WheelPath], found: Mapping[int, WheelFind
     paths, found : Mapping[int, WheelPath], Mapping[int, WheelFindings]
         Wheels and what was found, by wheel.
     """
-    noisy = {i: [f for f in w.findings if f.mode.varying] for i, w in found.items()}
+    noisy = {i: [f for f in w.findings if f.mode.varying or is_opened(f)] for i, w in found.items()}
     if len(paths) <= _OTHERS or not any(noisy.values()):
         return Swings(dict(found), ())
     width = max(1, round(_MEAN_S / next(iter(paths.values())).dt))
@@ -86,7 +87,7 @@ def without_shared(paths: Mapping[int, WheelPath], found: Mapping[int, WheelFind
 
 def _other_fault(wheel: WheelFindings, f: Finding) -> bool:
     """Whether a wheel has a fault of another row at the time of a finding."""
-    return any(not g.mode.varying and g.start < f.stop and f.start < g.stop for g in wheel.findings)
+    return any(not (g.mode.varying or is_opened(g)) and g.start < f.stop and f.start < g.stop for g in wheel.findings)
 
 
 def _size(f: Finding, own: Array, width: int) -> float:

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from diagnosis.clearing import yaw
+from diagnosis.clearing.axles import _parted
 from diagnosis.clearing.checks import checks_of
 from diagnosis.clearing.measure import off_commands
 from diagnosis.clearing.still import commanded_still, dead_bands
@@ -214,6 +215,15 @@ def test_a_reading_that_loses_scale_on_one_axle_changes_its_rate(kept: float, pa
     found = checks_by_part(one, base=True)
     assert found["front", "sensor_or_actuator", Check.RATE].passed is passes
     assert found["rear", "sensor_or_actuator", Check.RATE].passed
+
+
+@pytest.mark.parametrize(("scatter", "expected"), [(0.01, 0.17), (0.3, 0.0)])
+def test_a_drift_between_axles_shows_that_their_common_supply_hides(scatter: float, expected: float) -> None:
+    rng, n = np.random.default_rng(4), 120
+    supply, grows = 0.5 * np.sin(np.linspace(0.0, 9.0, n)), np.linspace(0.0, 2 * 0.17, n)
+    bands = [np.column_stack([supply + grows, supply]) + rng.normal(0.0, scatter, (n, 2)) for _ in range(3)]
+    assert _parted(bands) == pytest.approx([expected, expected], abs=0.02)
+    assert _parted([b[:10] for b in bands]) == [None, None]
 
 
 def test_a_valve_that_is_slow_beside_the_others_is_not_cleared() -> None:

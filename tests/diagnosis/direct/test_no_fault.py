@@ -160,3 +160,20 @@ def test_a_reading_that_changes_all_the_time_is_not_stuck_however_little() -> No
     told = found(Side.SENSOR, y + noise(0.004), speed + noise(0.002, 2))
     assert told
     assert not [f for f in told if f.mode.total and f.probability > 0.5]
+
+
+def test_how_a_valve_opens_as_the_log_begins_is_no_noise() -> None:
+    x = 0.5 * np.cos(2 * np.pi * T / 5.0)
+    y, rate = np.zeros(N), 0.0
+    for k in range(1, N):  # of second order, closed before the log begins
+        rate += ((x[k - 1] - y[k - 1]) / 0.03**2 - 1.4 * rate / 0.03) * DT
+        y[k] = y[k - 1] + rate * DT
+    assert not found(Side.ACTUATOR, y + noise(2e-3), x)
+
+
+@pytest.mark.parametrize(("off", "counts"), [(0.027, False), (0.06, True)])
+def test_what_a_valve_is_off_by_beside_a_command_that_rests_counts_as_a_constant(off: float, *, counts: bool) -> None:
+    x = command()
+    x[(T > 20.0) & (T < 24.0)] = 0.12
+    y = np.where((T > 21.0) & (T < 23.0), x - off, x)
+    assert bool(found(Side.ACTUATOR, y + noise(1e-3), x)) is counts

@@ -75,6 +75,13 @@ def test_a_valve_that_does_as_told_is_left_open() -> None:
     assert found.unexplained == (SPAN,)
 
 
+@pytest.mark.parametrize(("share", "zero"), [(0.95, 0.0), (0.95, 0.025), (0.9, 0.0)])
+@pytest.mark.parametrize("rests", [True, False])
+def test_a_warm_valve_that_opens_a_little_less_is_left_open(share: float, zero: float, *, rests: bool) -> None:
+    command = np.full(SIZE, 0.85) if rests else COMMAND
+    assert told(share * command + zero, command=command, healthy=share * command + zero).findings == ()
+
+
 @pytest.mark.parametrize(("at", "mode"), [(0.06, FaultMode.STUCK), (0.0, FaultMode.NO_SIGNAL)])
 def test_a_valve_that_stays_where_it_is_stays_stuck(at: float, mode: FaultMode) -> None:
     (finding,) = told(np.full(SIZE, at), mode).findings

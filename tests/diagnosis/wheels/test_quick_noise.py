@@ -13,6 +13,7 @@ from diagnosis.results.assessment import Finding
 from diagnosis.results.result import Hypothesis
 from diagnosis.results.vocabulary import Tier
 from diagnosis.wheels.findings import WheelFindings
+from diagnosis.wheels.own_swings import opened
 from diagnosis.wheels.quick_noise import _of_one_cause, quick_share, with_shaken
 from replay.faults import FaultMode, Side
 from tests.diagnosis.wheels.test_own_swings import DT, WIDTH, N, T, noise
@@ -45,7 +46,7 @@ def test_quick_noise_of_one_wheel_stays(tau: float) -> None:
 def test_a_slow_deviation_leaves_the_side_open() -> None:
     slow = np.convolve(noise(0.0, 1), np.hanning(80) / 5.0, "same")
     out = judged(QUIET + 0.1 * INSIDE * slow, QUIET)
-    assert (out.side, out.probability) == (Side.SENSOR_OR_ACTUATOR, 0.3)
+    assert (out.side, out.mode) == (Side.SENSOR_OR_ACTUATOR, FaultMode.OUTSIDE_TABLE)
     assert "slowly" in out.evidence[0]
 
 
@@ -74,8 +75,8 @@ def test_noise_beside_a_large_slow_rest_is_the_sensors_where_readings_become_rou
 def test_noise_beside_a_swing_of_the_same_wheel_is_no_surer_than_that() -> None:
     rows = (Hypothesis("sensor", FaultMode.NOISY, 0.97), Hypothesis("none", "healthy", 0.03))
     own = Finding(1000, 2000, Side.SENSOR, FaultMode.NOISY, 0.97, rows, None, None, ("It shakes.",), Tier.MODEL)
-    swing = replace(own, start=3000, stop=4000, side=Side.SENSOR_OR_ACTUATOR, probability=0.3)
+    swing = opened(replace(own, start=3000, stop=4000), "It swings.")
     first, second = _of_one_cause([own, swing])
-    assert (first.side, first.probability) == (Side.SENSOR_OR_ACTUATOR, 0.3)
+    assert (first.side, first.mode) == (Side.SENSOR_OR_ACTUATOR, FaultMode.OUTSIDE_TABLE)
     assert second is swing
     assert _of_one_cause([own]) == [own]
