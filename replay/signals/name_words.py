@@ -75,7 +75,9 @@ _FILLERS = frozenset(
     ("wert", "werte", "value", "val", "values", "percent", "pct", "prozent", "pourcent",
      *("mps", "kmh", "kph", "radps", "rads", "degps", "degs", "dps"))  # units that are no other word
 )  # fmt: skip
-_OPENING = frozenset(("opening", "oeffnung", "oeffnungsgrad", "ouverture", "apertura"))  # of a valve: what every valve's channel is
+_OPENING = frozenset(
+    ("opening", "oeffnung", "oeffnungsgrad", "ouverture", "apertura")
+)  # of a valve: what every valve's channel is
 #: Words that ask for something: setpoints and commands, in English.
 ASKING = frozenset(
     ("ref", "reference", "cmd", "command", "commanded", "set", "setpoint", "des", "desired", "target", "demand", "soll",
