@@ -69,6 +69,8 @@ def require_use(files: Sequence[ReadFile], signals: Signals) -> None:
                 f"{', '.join(str(f.path) for f in files)}: {NO_LOG}no column{shown} is called like a signal of a machine, and there "
                 f"are fewer than {_FEWEST} rows"
             )
+        if signals.named_elsewhere:
+            raise LogError(f"{', '.join(str(f.path) for f in files)}: no wheel signal: {signals.named_elsewhere}")
         raise LogError(
             f"{', '.join(str(f.path) for f in files)}: no wheel signal: no column{shown} is called like a signal of a machine "
             "or stands in the machine file's [signals]; name them there (`mfhca config init --log LOG` proposes what it can, `mfhca channels "

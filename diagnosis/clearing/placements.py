@@ -70,14 +70,14 @@ def placements(moving: NDArray[np.bool_], cells: int | None, enough: int) -> Pla
     moving : NDArray[np.bool_], shape (cells,)
         Whether the part is driven.
     cells : int or None
-        Length.
+        Length; 0, of a fault shorter than a cell, has no place.
     enough : int
         Cells of a fault, in which its part is driven, that are enough.
     """
     if cells is None:
         return Placements(np.zeros(1, dtype=np.intp), np.full(1, moving.size, dtype=np.intp))
     total = np.concatenate([[0], np.cumsum(moving)])
-    starts = np.arange(max(0, moving.size - cells + 1))
+    starts = np.arange(max(0, moving.size - cells + 1) if cells else 0)
     starts = starts[total[starts + cells] - total[starts] >= min(_MOVED * cells, enough)]
     if starts.size > _MOST:
         starts = starts[np.linspace(0, starts.size - 1, _MOST).astype(np.intp)]

@@ -86,7 +86,10 @@ class CanonicalSignal:
         return OPENING if self.quantity == "fraction" else self.unit
 
 
-_VALVE_POSITION = Named(0, r"(valve|spool)_?(\d+_)?(act|actual|fb|feedback|pos|position|ist)|spool|^u_?applied")
+_VALVE_POSITION = Named(
+    0,
+    r"(valve|spool)_?(\d+_)?(act|actual|fb|feedback|meas|measured|pos|position|ist)|(act|actual|fb|feedback|meas|measured|ist)_?valve|spool|^u_?applied",
+)
 _VALVE = Named(
     1,
     r"valve_?(\d+_)?(cmd|command|out|set|ref|soll)|(cmd|command|set|ref|soll)_?valve|valve$|^u_?cmd|control_?(out|cmd)|^u$",

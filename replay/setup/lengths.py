@@ -134,6 +134,15 @@ def wheel_places(
     places = structure.places
     if places is None:
         return None if structure.wheels == ONE else _sides(draft, structure.wheels, motions)
+    if structure.wheels == ONE:
+        (place,) = places.values()
+        where = f"{'before' if place.x > 0 else 'behind'} the unsteered wheels"
+        draft.ask(
+            "geometry",
+            f"how far {where} is the {place.axle} axle, which is steered? Nothing tells it; {abs(place.x):g} m stand in, as x of "
+            f"{ONE[0]}, which stands at that axle.",
+        )
+        return places
     turned = None if measured is None else track_by_yaw(measured[0], places, *measured[1:])
     asked_speeds = {n: m for n, m in motions.items() if n.endswith(".v_ref")}
     told = asked_speeds if len(asked_speeds) == len(places) else motions  # no fault hides what is asked

@@ -157,8 +157,17 @@ def named_structure(channels: Mapping[str, Channel]) -> Structure | None:
             return Structure(wheels, supposed(wheels, _steered(channels, wheels)), how="numbers in the log")
     places = _unsure_structure(channels)
     if places is None and _covers(channels, ONE):
-        return Structure(ONE, None, how="the only drive in the log")
+        return Structure(ONE, _at_the_steering(channels), how="the only drive in the log")
     return places
+
+
+def _at_the_steering(channels: Mapping[str, Channel]) -> Mapping[str, WheelGeometry] | None:
+    """Place of the only drive beside a steering angle, whose axle needs one; None where nothing is steered."""
+    ends = {along for along, across in _steering_ends(channels) if across is None}
+    if not ends:
+        return None
+    axle = "rear" if ends == {"rear"} else "front"
+    return {ONE[0]: WheelGeometry(-_BASE if axle == "rear" else _BASE, 0.0, 0.0, axle)}
 
 
 def _unsure_structure(channels: Mapping[str, Channel]) -> Structure | None:
@@ -198,15 +207,26 @@ def _covered(channels: Mapping[str, Channel], wheels: tuple[str, ...], by_name: 
     return set(found)
 
 
-def _steered(channels: Mapping[str, Channel], wheels: Sequence[str]) -> Mapping[str, str]:
-    """Steering axle of each steered wheel: its own, where each has an angle, else that of its end of the machine."""
+def _steering_names(channels: Mapping[str, Channel]) -> set[str]:
+    """Names of channels and joints that speak of steering."""
     names = set()
     for c in channels.values():
         inner = re.search(r"\[([^\[\]]+)\]$", c.field)
         name = inner[1] if inner and c.topic else c.name
         if is_steering(name):
             names.add(name)
-    ends = {(end_of(n), position(n)[1]) for n in names}
+    return names
+
+
+def _steering_ends(channels: Mapping[str, Channel]) -> set[tuple[str | None, str | None]]:
+    """Front or rear, and left or right, of the names that speak of steering."""
+    return {(end_of(n), position(n)[1]) for n in _steering_names(channels)}
+
+
+def _steered(channels: Mapping[str, Channel], wheels: Sequence[str]) -> Mapping[str, str]:
+    """Steering axle of each steered wheel: its own, where each has an angle, else that of its end of the machine."""
+    names = _steering_names(channels)
+    ends = _steering_ends(channels)
     if any(c.type_name.rpartition("/")[2].startswith("AckermannDrive") for c in channels.values()):
         ends.add((None, None))
     own = {w: own_axle(w) for w in wheels if position(w) in ends}

@@ -24,7 +24,7 @@ from replay.signals.file_names import in_its_file, named_channels
 from replay.signals.name_parts import wheel_said
 from replay.signals.rules import candidates, wanted_type
 from replay.signals.scale_doubt import scale_doubt
-from replay.signals.signal import Signal, Signals
+from replay.signals.signal import FILE_NAMES, Signal, Signals
 from replay.signals.steering_command import turn_by_steering
 from replay.signals.to_si import Converted, choose_motor_or_wheel, convert, usable_unit
 from replay.signals.unfilled import unfilled, unfilled_note
@@ -198,7 +198,7 @@ def _take_given(draft: _Draft, name: str, source: SignalSource, logs: Sequence[R
     known = [k for log in chosen for k in log.channels]
     near = difflib.get_close_matches(source.label, known, 3, 0.6)
     hint = f"; similar: {', '.join(near)}" if near else ""
-    draft.missing[name] = f"the machine file names {source.label!r}, which no source holds{hint}"
+    draft.missing[name] = f"{FILE_NAMES} {source.label!r}, which no source holds{hint}"
 
 
 def _take_guess(draft: _Draft, name: str, found: list[tuple[Candidate, RawLog]]) -> None:

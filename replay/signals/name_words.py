@@ -34,7 +34,7 @@ _PARTS = (
     "geschwindigkeit", "geschw", "drehzahl", "drehmoment", "drehrate", "gierrate", "gier", "winkel", "lenkung", "lenk",
     "ventil", "schieber", "stellung", "stell", "groesse", "ansteuerung", "strom", "spannung", "moment", "druck", "motor",
     "fahr", "antrieb", "achse", "achs", "vorder", "hinter", "vorne", "vorn", "hinten", "links", "rechts", "rad", "soll", "ist",
-    "mess", "wert", "werte", "vorgabe", "rate", "position", "dreh", "kolben", "weg", "hub",
+    "mess", "wert", "werte", "vorgabe", "rate", "position", "dreh", "kolben", "weg", "hub", "oeffnung", "oeffnungsgrad",
 )  # fmt: skip
 _TOGETHER = re.compile(rf"(?:{'|'.join(_PARTS)})+")
 _PART = re.compile("|".join(sorted(_PARTS, key=len, reverse=True)))
@@ -75,6 +75,9 @@ _FILLERS = frozenset(
     ("wert", "werte", "value", "val", "values", "percent", "pct", "prozent", "pourcent",
      *("mps", "kmh", "kph", "radps", "rads", "degps", "degs", "dps"))  # units that are no other word
 )  # fmt: skip
+_OPENING = frozenset(
+    ("opening", "oeffnung", "oeffnungsgrad", "ouverture", "apertura")
+)  # of a valve: what every valve's channel is
 #: Words that ask for something: setpoints and commands, in English.
 ASKING = frozenset(
     ("ref", "reference", "cmd", "command", "commanded", "set", "setpoint", "des", "desired", "target", "demand", "soll",
@@ -122,7 +125,7 @@ def english(words: Sequence[str]) -> list[str]:
         else:
             out.append("valve" if word.endswith("ventil") else _ENGLISH.get(word, word))  # Proportionalventil
     if "valve" in out:  # Kolbenweg of a valve: the way of its spool
-        out = [_OF_A_VALVE.get(word, word) for word in out]
+        out = [_OF_A_VALVE.get(word, word) for word in out if word not in _OPENING]
     roles = ASKING | MEASURED
     for i, word in enumerate(out):
         if word in ("n", "v") and {*out[max(i - 1, 0) : i], *out[i + 1 : i + 2]} & roles:

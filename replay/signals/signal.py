@@ -11,6 +11,9 @@ from numpy.typing import NDArray
 from replay.arrays.column_store import ColumnStore
 from replay.log.source_options import SignalSource
 
+#: Begin of the reason why a signal is missing whose channel, as the machine file names it, no file holds.
+FILE_NAMES = "the machine file names"
+
 
 @dataclass(frozen=True)
 class Signal:
@@ -83,6 +86,18 @@ class Signals:
     questions: tuple[str, ...] = ()
     open_loop: bool = False
     store: ColumnStore = field(default_factory=ColumnStore, repr=False, compare=False)
+
+    @property
+    def named_elsewhere(self) -> str:
+        """The first signal that the machine file names in a channel that no file holds, and what to do about it; may be empty."""
+        named = [f"{name}: {why}" for name, why in self.missing.items() if why.startswith(FILE_NAMES)]
+        if not named:
+            return ""
+        more = f" ({len(named) - 1} more signals likewise)" if len(named) > 1 else ""
+        return (
+            f"{named[0]}{more}; correct its [signals], have `mfhca config init --log LOG` write them from the log, or leave [signals] out "
+            "of a machine file for logs of several formats: signals are then found by their names"
+        )
 
     def without_samples(self) -> Signals:
         """The same signals with no sample left in them."""

@@ -156,13 +156,8 @@ def align(signals: Signals, start_s: float | None = None, stop_s: float | None =
         Where no wheel signal has two samples, sources do not overlap in time, or the asked part is empty.
     """
     wheel = {k: s for k, s in signals.items.items() if k.startswith("wheel.") and s.stamps.size > 1}
-    named = [f"{name}: {why}" for name, why in signals.missing.items() if why.startswith("the machine file names")]
-    if not wheel and named:
-        more = f" ({len(named) - 1} more signals likewise)" if len(named) > 1 else ""
-        raise LogError(
-            f"no wheel signal with at least two samples was found; {named[0]}{more}; correct its [signals], or have "
-            "`mfhca config init --log LOG` write them from the log"
-        )
+    if not wheel and signals.named_elsewhere:
+        raise LogError(f"no wheel signal with at least two samples was found; {signals.named_elsewhere}")
     if not wheel:
         raise LogError(
             "no wheel signal with at least two samples was found; `mfhca config init --log LOG -o machine.toml` writes a machine "

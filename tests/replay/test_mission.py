@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import dataclasses
 import hashlib
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from replay.errors import LogError
-from replay.log.source_options import SourceOptions
+from replay.log.source_options import SignalSource, SourceOptions
 from replay.machine.config import haulotte
 from replay.mission import content_hash, load_mission, read_signals, source_options
 from replay.progress import Progress, Stage
@@ -66,6 +67,16 @@ def test_without_wheels_the_error_names_the_file(tmp_path: Path) -> None:
     assert "wheel.FR.v" in signals.missing
     with pytest.raises(LogError, match=r"a\.csv: no wheel signal"):
         load_mission([log], haulotte())
+
+
+def test_a_machine_file_for_another_format_is_told_from_a_log_without_wheels(tmp_path: Path) -> None:
+    log = write_table(tmp_path / "a.csv", "wheel.FR.v", np.arange(200.0))
+    topic = SignalSource(topic="/joint_states", field="velocity[FR]", unit="rad/s")
+    machine = replace(haulotte(), signals={"wheel.FR.v": topic})
+    with pytest.raises(
+        LogError, match=r"a\.csv: no wheel signal: wheel\.FR\.v: the machine file names .* leave \[signals\] out"
+    ):
+        load_mission([log], machine)
 
 
 def test_a_slow_table_that_holds_nothing_of_a_machine_is_no_log(tmp_path: Path) -> None:

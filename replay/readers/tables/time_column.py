@@ -307,4 +307,6 @@ def _time_unit(path: Path, name: str, column: NDArray[Any], options: SourceOptio
             f"{path}: column {name!r} rises by {step:.6g} from row to row, which can be neither seconds nor milliseconds; "
             f"give [sources] time = {name!r} and time_unit = 'us', 'ns'{clock} or what it is"
         )
-    return "ms" if column.dtype.kind in "iu" and step >= 2 else "s"
+    # lines that are no numbers, between header and rows, make the whole numbers below them floats
+    whole = column.dtype.kind in "iu" or (values.size < column.size and bool((values == np.rint(values)).all()))
+    return "ms" if whole and step >= 2 else "s"

@@ -66,6 +66,10 @@ def test_a_loss_is_found_from_the_size_that_is_stated(part: str, side: Side, bas
             assert not _found(_with(mission, name, *span, 1.0 - 0.5 * sizes[k]), part, base=base), (span, sizes[k])
 
 
+def test_a_fault_shorter_than_a_cell_has_no_place() -> None:
+    assert placements(np.ones(30, dtype=np.bool_), 0, 30).first.size == 0
+
+
 def test_rows_state_every_part_and_length() -> None:
     cells = in_cells(simulated(), base=False)
     found = detectable(cells)

@@ -422,3 +422,18 @@ def test_columns_that_ask_for_something_unsaid_are_pointed_at_rather_than_denied
     assert "RIGHT SETPOINT" in question
     assert '.v_ref" = { column =' in question
     assert "None is in the log" not in question
+
+
+@pytest.mark.parametrize(("name", "axle"), [("steering_angle_rad", "front"), ("rear_steering_angle_rad", "rear")])
+def test_a_steering_angle_beside_the_only_tachometer_gets_an_axle(tmp_path: Path, name: str, axle: str) -> None:
+    t = np.arange(1200) * 0.05
+    speed = 1.0 + np.sin(t / 5)
+    columns = {"time": t, "speed_cmd_mps": speed, "wheel_speed_mps": speed, name: 0.3 * np.sin(t / 7)}
+    pd.DataFrame(columns).to_csv(tmp_path / "run.csv", index=False)
+    draft = draft_machine(read_everything([tmp_path / "run.csv"], every=False))
+    assert draft.machine.wheels == ("D",)
+    assert draft.machine.axles == (axle,)
+    assert draft.machine.signals[f"steer.{axle}.phi"].column == name
+    assert draft.machine.max_steer == pytest.approx(0.36, abs=0.01)
+    assert any(f"the unsteered wheels is the {axle} axle, which is steered?" in q for q in draft.questions)
+    assert not any("left and right" in q for q in draft.questions)

@@ -527,3 +527,10 @@ def test_a_cell_of_very_many_digits_costs_no_time(target: Path) -> None:
     start = time.process_time()
     separator_of(target.read_text(encoding="utf-8").splitlines())
     assert time.process_time() - start < 2.0
+
+
+@pytest.mark.parametrize(("cells", "step_ns"), [("{}", 20_000_000), ("{}.5", 20_000_000_000)])
+def test_whole_numbers_below_lines_of_text_are_milliseconds(target: Path, cells: str, step_ns: int) -> None:
+    rows = "".join(f"{cells.format(20 * i)};{i}\n" for i in range(1, 40))
+    target.write_text(f"Name;v\nComment;of the wheel\nType;REAL64\n{rows}")
+    assert np.diff(read(target).channels["v"].stamps).tolist() == [step_ns] * 38
