@@ -75,8 +75,7 @@ def robust_solve(regressors: Array, instruments: Array, y: Array, weight: Array,
     nothing = np.full(k, np.nan), np.zeros(n)
     if n < k + 2 or np.linalg.matrix_rank(regressors) < k:
         return nothing
-    rng = np.random.default_rng(n)
-    rows = np.array([rng.choice(n, k, replace=False, p=weight / weight.sum()) for _ in range(_SUBSETS)])
+    rows = _subsets(weight, k)
     starts = np.einsum("mij,mj->mi", np.linalg.pinv(regressors[rows], rcond=1e-6), y[rows])
     misfits = [weighted_median(np.abs(y - regressors @ b), weight) for b in starts]
     beta = starts[int(np.argmin(misfits))]
@@ -93,6 +92,17 @@ def robust_solve(regressors: Array, instruments: Array, y: Array, weight: Array,
         if np.allclose(before, beta, rtol=1e-6, atol=1e-12):
             break
     return beta, np.where(np.abs(y - regressors @ beta) <= _CUT * scale, weight, 0.0)
+
+
+def _subsets(weight: Array, k: int) -> NDArray[np.intp]:
+    """Subsets of k windows each, drawn by their weight and the same in every run; shape (_SUBSETS, k)."""
+    rng, total = np.random.default_rng(weight.size), np.cumsum(weight)
+    rows = np.empty((0, k), dtype=np.intp)
+    while len(rows) < _SUBSETS:
+        drawn = np.searchsorted(total[:-1], total[-1] * rng.random((_SUBSETS, k)), side="right")
+        different = (np.diff(np.sort(drawn, axis=1), axis=1) > 0).all(axis=1)
+        rows = np.concatenate([rows, drawn[different]])
+    return rows[:_SUBSETS]
 
 
 def solve(regressors: Array, instruments: Array, y: Array, weight: Array) -> Array:

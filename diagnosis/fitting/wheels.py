@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.fitting.robust import UNKNOWN, Estimate, equal_weights, jackknife, robust_solve, solve
-from diagnosis.fitting.windows import WINDOW_S, WheelRecord, Windows, cut_windows
+from diagnosis.fitting.windows import WINDOW_S, Cuts, WheelRecord, Windows
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -138,12 +138,12 @@ def _effort_map(w: Windows, kept: Mask, dead: float) -> _Map | None:
         return _Map(float(K), float(kink), float(shift), full, shape, std, spread > _SPREAD_OF_SPEED)
 
 
-def _lag(records: list[WheelRecord], dead: float, start: float, allowed: list[int]) -> Estimate:
+def _lag(cuts: Cuts, dead: float, start: float, allowed: list[int]) -> Estimate:
     """τ by the smallest misfit within the windows of the allowed missions; those whose speed changes decide."""
-    step = max(r.dt for r in records)
+    step = max(r.dt for r in cuts.records)
 
     def sums(tau: float) -> tuple[Array, NDArray[np.int64]]:
-        w = cut_windows(records, dead, tau)
+        w = cuts.windows(dead, tau)
         mine = np.isin(w.mission, allowed) & ~w.frozen & w.changing
         return np.column_stack([w.yy[mine], w.yp[mine], w.pp[mine]]), w.group[mine]
 
@@ -186,11 +186,11 @@ def fit_wheel(records: list[WheelRecord], start_tau: float) -> WheelFit:
         Lag to begin with, and to keep where the missions do not show it [s].
     """
     dead, tau = 0.0, Estimate(start_tau, float("nan"))
-    allowed = list(range(len(records)))
+    cuts, allowed = Cuts(records), list(range(len(records)))
     left: list[int] = []
     for _ in range(3):
         for _ in range(4):
-            w = cut_windows(records, dead, tau.value)
+            w = cuts.windows(dead, tau.value)
             found = _effort_map(w, np.isin(w.mission, allowed), dead)
             if found is None:
                 return _refused(f"fewer than {_LEAST_WINDOWS} steady windows of {WINDOW_S:g} s under command", w)
@@ -202,7 +202,7 @@ def fit_wheel(records: list[WheelRecord], start_tau: float) -> WheelFit:
         odd = _odd_missions(w, found, allowed)
         left += odd
         allowed = [m for m in allowed if m not in odd]
-        tau = _lag(records, dead, tau.value, allowed)
+        tau = _lag(cuts, dead, tau.value, allowed)
     assert found is not None
     if len(left) > len(records) / 2:
         return _refused("most missions disagree with each other", w)

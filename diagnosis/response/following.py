@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnosis.response.kernel import follow
+from diagnosis.response.kernel import follow, target
 
 Array = NDArray[np.float64]
 
@@ -25,8 +25,7 @@ def target_of(commands: Array, parts: tuple[Array, Array], limit: float, delay: 
         Dead time [cells].
     """
     weights, bounds = parts
-    target = np.clip(np.clip(commands * weights, -bounds, bounds).sum(axis=1), -limit, limit)
-    return np.asarray(np.interp(np.arange(target.size) - delay, np.arange(target.size), target))
+    return np.asarray(target(commands, weights, bounds, limit, delay))
 
 
 def followed(
@@ -53,8 +52,8 @@ def followed(
     lag, rate = pace
     gain = -np.expm1(-h / max(lag, 1e-3))
     if not np.isfinite(bounds).any():
-        target = target_of(commands, (weights, bounds), limit, delay)
-        return np.asarray(follow(target, float(target[0]), gain, rate * h))
+        asked = target_of(commands, (weights, bounds), limit, delay)
+        return np.asarray(follow(asked, float(asked[0]), gain, rate * h))
     columns = by_column(commands, (weights, bounds, rates), delay, gain, h)
     return np.asarray(np.clip(columns.sum(axis=1), -limit, limit))
 
@@ -70,8 +69,9 @@ def by_column(commands: Array, parts: tuple[Array, Array, Array], delay: float, 
         Share of what is missing that a cell makes up for.
     """
     out = np.zeros(commands.shape)
-    for k, (weight, bound, rate) in enumerate(np.transpose(parts)):
-        one = np.array([weight]), np.array([bound])
-        target = target_of(commands[:, k : k + 1], one, np.inf, delay)
-        out[:, k] = follow(target, float(target[0]), gain, rate * h)
+    weights, bounds, rates = parts
+    for k, rate in enumerate(rates):
+        one = slice(k, k + 1)
+        asked = target_of(np.ascontiguousarray(commands[:, one]), (weights[one], bounds[one]), np.inf, delay)
+        out[:, k] = follow(asked, float(asked[0]), gain, rate * h)
     return out

@@ -23,6 +23,29 @@ def follow(target, start, gain, most):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
+def target(commands, weights, bounds, limit, delay):  # type: ignore[no-untyped-def]
+    """Weighted commands within the bounds of each column and a limit, `delay` cells late; shape (cells,)."""
+    cells, columns = commands.shape
+    asked = np.empty(cells)
+    for i in range(cells):
+        total = 0.0
+        for k in range(columns):
+            total += min(max(commands[i, k] * weights[k], -bounds[k]), bounds[k])
+        asked[i] = min(max(total, -limit), limit)
+    out = np.empty(cells)
+    for i in range(cells):
+        x = i - delay
+        j = int(np.floor(x))
+        if j < 0:
+            out[i] = asked[0]
+        elif j >= cells - 1:
+            out[i] = asked[cells - 1]
+        else:
+            out[i] = asked[j] + (x - j) * (asked[j + 1] - asked[j])
+    return out
+
+
+@njit(cache=True)
 def posterior(score, enters, leaves):  # type: ignore[no-untyped-def]
     """Forward and backward probabilities of states, of which the first is the healthy one that all others are entered from.
 

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from diagnosis.response.channel import Samples
 from diagnosis.response.identification import Response, beyond
+from replay.arrays.numeric import without_nan
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -212,9 +213,10 @@ def _misfit(blocks: Blocks, scale: float, beside: Beside | None, wider: float = 
         return np.asarray(alone)
     other = _loss((blocks.mean - scale * beside.speed) / _usual(scale, beside.noise, scale * beside.speed))
     known = np.isfinite(other)
+    apart = np.where(known, other, 0.0)
     # what two views agree on is no misfit of one of them
-    agreed = np.where(known, alone * np.clip(np.nan_to_num(other) / _loss(_OTHER_Z), 0.0, 1.0), alone)
-    return np.asarray(agreed - _BESIDE * np.nan_to_num(other) * np.where(known, beside.blame, 0.0))
+    agreed = np.where(known, alone * np.minimum(apart / _loss(_OTHER_Z), 1.0), alone)
+    return np.asarray(agreed - _BESIDE * apart * np.where(known, beside.blame, 0.0))
 
 
 def _contradicted(blocks: Blocks, scale: float, joint: Beside | None) -> Array:
@@ -228,7 +230,7 @@ def _contradicted(blocks: Blocks, scale: float, joint: Beside | None) -> Array:
 def _usual(scale: float, noise: Array, size: Array) -> Array:
     """Usual misfit of a scaled sensor [m/s] that is to read `size`: a gain lies between two of `SCALES`, however quiet the channel is."""
     usual = max(scale, 0.3) * noise
-    return usual if scale == 1.0 else np.maximum(usual, _BETWEEN * np.nan_to_num(np.abs(size)))
+    return usual if scale == 1.0 else np.maximum(usual, _BETWEEN * np.abs(without_nan(size)))
 
 
 def _apart(blocks: Blocks, joint: Beside) -> Array:

@@ -15,6 +15,7 @@ from replay.export.mission import write_mission
 from replay.machine.config import haulotte
 from replay.simulation.options import EvidenceLevel, SimulationOptions
 from replay.simulation.run import simulate_mission
+from tests.campaigns import campaign
 
 PAPER = haulotte()
 
@@ -30,7 +31,7 @@ def table(evidence: EvidenceLevel) -> list[str]:
 
 
 @pytest.mark.parametrize("evidence", ["base", "spool", "direct"])
-@pytest.mark.parametrize("rows", [2, 30, 200, 600, 1200, 3500, 5000])
+@pytest.mark.parametrize("rows", campaign([2, 600, 5000, 30, 200, 1200, 3500], 3))
 def test_a_few_seconds_clear_nothing(tmp_path: Path, evidence: EvidenceLevel, rows: int) -> None:
     path = tmp_path / "short.csv"
     path.write_text("\n".join(table(evidence)[: rows + 1]) + "\n", encoding="utf-8")

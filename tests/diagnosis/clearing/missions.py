@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 
 from diagnosis.clearing.cells import Cells
 from diagnosis.clearing.checks import cells_of, checks_of
@@ -22,8 +23,9 @@ LENGTH = 60.0
 _BASE = ("_true", ".u_applied", "imu.yaw_rate", "gnss.lat", "gnss.lon")
 
 
+@cache
 def simulated(*faults: FaultSpec, seed: int = 5) -> SimulatedMission:
-    """A mission of `LENGTH` with these faults."""
+    """A mission of `LENGTH` with these faults, driven once: whoever changes a column copies it."""
     return simulate_mission(
         SimulationOptions(scenario="random", seed=seed, duration_s=LENGTH, rate_hz=100.0, faults=faults)
     )

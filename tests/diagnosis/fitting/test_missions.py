@@ -23,6 +23,7 @@ from replay.signals.timeline import align
 from replay.simulation.options import SimulationOptions
 from replay.simulation.plant_options import PlantOptions
 from replay.simulation.run import simulate_mission
+from tests.campaigns import campaign
 
 WHEELS = ("FR", "FL", "RR", "RL")
 # one machine: K = 2.4 m/s, tau = 0.25 s, d = 0.2 m, lambda = 1 s/m in every mission
@@ -125,9 +126,9 @@ def test_no_steering_leaves_the_offset_as_it_is() -> None:
     assert result.machine.geometry == haulotte().geometry
 
 
-@pytest.mark.parametrize(("side", "epsilon"), [(Side.ACTUATOR, 0.5), (Side.SENSOR, 0.4), (Side.ACTUATOR, 0.2)], ids=str)
-def test_a_mission_that_is_faulty_half_its_time_is_not_learned(ground: FitResult, side: Side, epsilon: float) -> None:
-    fault = FaultSpec("FR", side, FaultMode.INEFFICIENT, 30.0, 60.0, epsilon)
+@pytest.mark.parametrize("loss", campaign([(Side.SENSOR, 0.4), (Side.ACTUATOR, 0.2), (Side.ACTUATOR, 0.5)], 2), ids=str)
+def test_a_mission_that_is_faulty_half_its_time_is_not_learned(ground: FitResult, loss: tuple[Side, float]) -> None:
+    fault = FaultSpec("FR", loss[0], FaultMode.INEFFICIENT, 30.0, 60.0, loss[1])
     healthy = [mission(s, "ground") for s in (3, 4)]
     result = fit_missions([*healthy, mission(5, "ground", faults=(fault,))], haulotte())
     assert values(result, "K") == pytest.approx(values(ground, "K"), rel=0.03)
@@ -155,9 +156,9 @@ def test_too_little_driving_is_no_fit() -> None:
         fit_missions([mission(3, seconds=8.0)], haulotte())
 
 
-def test_same_missions_same_bytes(ground: FitResult) -> None:
-    again = fit_missions([mission(s, "ground") for s in (3, 4)], haulotte())
-    assert fit_toml(again) == fit_toml(ground)
+def test_same_missions_same_bytes() -> None:
+    once, again = (fit_missions([mission(3, "ground", seconds=20.0)], haulotte()) for _ in range(2))
+    assert fit_toml(again) == fit_toml(once)
 
 
 def test_document_and_machine_file(ground: FitResult, tmp_path_factory: pytest.TempPathFactory) -> None:

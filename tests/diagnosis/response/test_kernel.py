@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from diagnosis.response.kernel import follow, posterior
+from diagnosis.response.kernel import follow, posterior, target
 
 
 def test_a_drive_without_limits_is_a_first_order_lag() -> None:
@@ -21,6 +21,16 @@ def test_a_drive_without_limits_is_a_first_order_lag() -> None:
 def test_no_step_is_larger_than_the_rate_allows() -> None:
     target = np.repeat([0.0, 1.0, -1.0], 100)
     assert np.max(np.abs(np.diff(follow(target, 0.0, 0.9, 0.05)))) <= 0.05 + 1e-12
+
+
+@pytest.mark.parametrize("delay", [0.0, 0.4, 3.0, 7.7, 60.0, -1.3])
+@pytest.mark.parametrize(("bounds", "limit"), [([np.inf, np.inf], np.inf), ([0.8, 0.3], 0.9)])
+def test_a_target_is_what_is_asked_within_its_limits_and_late(delay: float, bounds: list[float], limit: float) -> None:
+    commands, weights = np.random.default_rng(2).normal(size=(50, 2)), np.array([1.2, -0.7])
+    most = np.array(bounds)
+    asked = np.clip(np.clip(commands * weights, -most, most).sum(axis=1), -limit, limit)
+    expected = np.interp(np.arange(50) - delay, np.arange(50), asked)
+    assert target(commands, weights, most, limit, delay) == pytest.approx(expected, abs=1e-12)
 
 
 @pytest.mark.parametrize("seed", range(3))

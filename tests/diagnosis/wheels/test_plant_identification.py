@@ -170,7 +170,7 @@ def test_a_wheel_without_channels_has_no_plant() -> None:
 @pytest.mark.parametrize("more", range(4))
 def test_missions_of_any_length_are_identified(more: int) -> None:
     """The last row of the last window may be of fewer blocks than the others."""
-    whole = driven(0.6, 0.12, 0.0)
-    n = 6000 + 97 + more
+    whole = driven(2.5, 0.3, PLAY)
+    n = 2400 + 97 + more
     part = Drive(whole.y[:n], whole.u[:n], whole.body[:n], whole.moving[:n], whole.dt)
     assert all(plant is not None for plant in found(part).plants)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 import pytest
 
@@ -35,6 +37,7 @@ def commanded(rng: np.random.Generator) -> Array:
     return np.stack([np.convolve(x, smooth)[:n] for x in wanted.T], axis=1)
 
 
+@cache
 def driven(seed: int, dead: float = 0.0, fault: tuple[Side, FaultMode] | None = None) -> dict[str, Array]:
     """Columns of a mission; a fault is one of wheel A. The law is proportional and integral with feed-forward."""
     rng, dt = np.random.default_rng(seed), 1.0 / RATE
