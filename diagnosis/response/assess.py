@@ -46,6 +46,7 @@ from diagnosis.response.rivals import (
     shared,
     told_and_doing_alike,
 )
+from diagnosis.response.runs_on import running_on
 from diagnosis.response.sides import sides_of
 from diagnosis.response.sideways import crossed, goes_sideways
 from diagnosis.response.spells import spells_of, until_back, where_asked
@@ -269,8 +270,10 @@ def _drives(
     `known`: its blocks with what is expected of it, and how the ground moves; `pull`: blocks in which it pulls nothing, and whether it is dragged along then.
     """
     idle = idle_drives(judged[wheel], *pull, block_s)  # it says why: without power
-    more = unanswered(wheel, judged, known, block_s)
-    return idle + [f for f in more if not any(f.start < g.stop and g.start < f.stop for g in idle)]
+    told = idle
+    for more in (unanswered(wheel, judged, known, block_s), running_on(wheel, judged, known[0], block_s)):
+        told = told + [f for f in more if not any(f.start < g.stop and g.start < f.stop for g in told)]
+    return told
 
 
 def _habit(wheel: str, holds: Mapping[str, Array]) -> float:

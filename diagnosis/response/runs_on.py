@@ -1,0 +1,128 @@
+"""Drives that keep one speed whatever they are told, by the wheel's own sensor: a stuck valve, an output that holds.
+
+The reading shakes as that of a turning wheel does, so that it is none that is frozen; what it shows stays where it is while the command
+asks for much else, and the other wheels follow theirs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+from numpy.typing import NDArray
+
+from diagnosis.response.machine import Judged
+from diagnosis.response.models import Blocks
+from diagnosis.results.assessment import Finding
+from diagnosis.results.result import Epsilon, Hypothesis
+from diagnosis.results.vocabulary import Tier
+from replay.faults import FaultMode, Side, State
+
+Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+_LEAST_S, _JOIN_S = 3.0, 15.0  # for which it keeps its speed, and within which it is at the same speed again
+_NEAR = 0.02  # of the top speed, or a usual misfit: as near to one speed
+_REPEATS = 0.5  # of a block's readings: a frozen channel repeats them all
+_TURNS, _ASKED = 0.08, 0.3  # of the top speed: it moves, and its command varies by as much
+_FAR, _OFF = 3.0, 0.1  # usual misfits, and share of the top speed, off its command, ...
+_MOSTLY, _AWAY_S = 0.25, 2.0  # ... for as much of the time, and for so long
+_FOLLOWS = 0.7  # of the time, in which another wheel is as near to its own command as it should
+_OTHERS = 2
+_P, _SENSOR = 0.85, 0.1
+
+
+def running_on(wheel: str, judged: Mapping[str, Judged], blocks: Blocks | None, block_s: float) -> list[Finding]:
+    """Times in which a wheel keeps one speed while its command asks for much else.
+
+    Parameters
+    ----------
+    wheel : str
+        The wheel.
+    judged : Mapping[str, Judged]
+        All wheels.
+    blocks : Blocks or None
+        Of the wheel, with what is expected of it; None where that is not known.
+    block_s : float
+        Length of a block [s].
+    """
+    # two wheels that drag each other keep a speed as well
+    if blocks is None or blocks.start.size < 2 or len(judged) <= _OTHERS:
+        return []
+    one, y = judged[wheel], blocks.mean
+    band = np.r_[blocks.low, blocks.high]
+    top = float(np.nanquantile(np.abs(band), 0.95)) if np.isfinite(band).any() else 0.0
+    if top <= 0.0:
+        return []
+    tolerance = np.maximum(_NEAR * top, np.nan_to_num(blocks.noise))
+    alive = (blocks.same <= _REPEATS * blocks.readings) & np.isfinite(y)
+    away = _astray(blocks, top)
+    others = [~_astray(j.wheel.blocks, top) for w, j in judged.items() if w != wheel]
+    asked = 0.5 * (blocks.low + blocks.high)
+    found: list[tuple[int, int, float]] = []
+    for start, stop, speed in _level(y, alive, float(np.median(tolerance)), round(_LEAST_S / block_s)):
+        part = slice(start, stop)
+        told = asked[part][np.isfinite(asked[part])]
+        alone = all(float(np.mean(x[part])) > _FOLLOWS for x in others)
+        off = int(np.count_nonzero(away[part]))
+        if abs(speed) < _TURNS * top or not told.size or not alone:
+            continue
+        if off < max(_AWAY_S / block_s, _MOSTLY * (stop - start)):
+            continue
+        same = found and start - found[-1][1] <= _JOIN_S / block_s and abs(found[-1][2] - speed) <= 2.0 * _NEAR * top
+        if same:
+            found[-1] = (found[-1][0], stop, found[-1][2])
+        elif float(np.ptp(told)) >= _ASKED * top:
+            found.append((start, stop, speed))
+    return [_finding(one, span, asked, block_s) for span in found]
+
+
+def _astray(blocks: Blocks, top: float) -> Flags:
+    """Blocks that are far off what the command makes of the wheel; `top` is the top speed [m/s]."""
+    off = np.nan_to_num(np.abs(blocks.mean - np.clip(blocks.mean, blocks.low, blocks.high)))
+    return np.asarray(off > np.maximum(_FAR * np.nan_to_num(blocks.noise), _OFF * top))
+
+
+def _level(y: Array, alive: Flags, tolerance: float, least: int) -> list[tuple[int, int, float]]:
+    """Stretches of at least so many blocks in which a speed stays within a tolerance of its median: first block, last one + 1, and that median."""
+    if y.size < least:
+        return []
+    near = np.ptp(sliding_window_view(y, least), axis=1) <= 2.0 * tolerance
+    near &= sliding_window_view(alive, least).all(axis=1)
+    out: list[tuple[int, int, float]] = []
+    stop = 0
+    for start in np.flatnonzero(near).tolist():
+        if start < stop:
+            continue
+        speed = float(np.median(y[start : start + least]))
+        left = np.flatnonzero(~alive[start + least :] | (np.abs(y[start + least :] - speed) > tolerance))
+        stop = start + least + int(left[0]) if left.size else y.size
+        out.append((start, stop, float(np.median(y[start:stop]))))
+    return out
+
+
+def _finding(one: Judged, span: tuple[int, int, float], asked: Array, block_s: float) -> Finding:
+    start, stop, speed = span
+    told = asked[start:stop][np.isfinite(asked[start:stop])]
+    width = int(one.wheel.blocks.start[1])
+    text = (
+        f"{one.data.name} stays at {speed:.2g} {{speed_unit}} for {(stop - start) * block_s:.1f} s, shaking as a turning {{wheel}} does, while its command "
+        f"asks for {told.min():.2g} to {told.max():.2g} {{speed_unit}}."
+    )
+    return Finding(
+        start=start * width,
+        stop=min(stop * width, one.data.y.size),
+        side=Side.ACTUATOR,
+        mode=FaultMode.STUCK,
+        probability=_P,
+        hypotheses=(
+            Hypothesis(Side.ACTUATOR.value, FaultMode.STUCK.value, _P),
+            Hypothesis(Side.SENSOR.value, FaultMode.OUTSIDE_TABLE.value, _SENSOR),
+            Hypothesis("none", State.HEALTHY.value, 1.0 - _P - _SENSOR),
+        ),
+        epsilon=Epsilon(1.0, 1.0, 1.0),
+        sat=None,
+        evidence=(text,),
+        tier=Tier.RESPONSE,
+    )
