@@ -36,7 +36,8 @@ def yaw_checks(cells: Cells) -> Iterator[Checked]:
     """Checks of both ends of a machine together; none without a yaw rate, two axles of which one is steered at least, and some driving.
 
     In turns tyres and the wheels' offsets make the angles an approximation: by a share of the turn that counts for nothing. They are looked
-    at where a mission has hardly any driving straight.
+    at where a mission has hardly any driving straight, and over all of it where a yaw rate is logged: an angle that drifts off points
+    straight no more.
     """
     off = _off_angles(cells)
     if off is None:
@@ -46,6 +47,8 @@ def yaw_checks(cells: Cells) -> Iterator[Checked]:
     if looked_at is None:
         return
     windows, lasting = np.abs(cells.frame.mean(looked_at)), abs(float(np.nanmedian(looked_at)))
+    turns = None if off.by_wheels else off.in_turns(cells)
+    lasting = lasting if turns is None else max(lasting, abs(float(np.nanmedian(turns))))
     told = bool(np.isfinite(windows).any()) and not (off.by_wheels and straight is None)  # in turns wheels slip
     for end in _ends(cells.machine).values():
         for axle in (name for name in end if name != _FIXED):  # one wheel's angle is a share of the mean of its end

@@ -39,6 +39,7 @@ _CLEAR = 3.0  # times the noise
 _HYSTERESIS, _RESTS_S = 0.025, 10.0  # of the span, off a healthy valve's command, for no longer than this
 _MIDDLE, _MOSTLY = 0.04, 0.98  # of the span: about its middle a valve opens nothing; of the time
 _OPEN_S, _DOUBT, _FAR_OFF = 0.5, 0.05, 0.2  # s; probability that counts for nothing; of the span
+_MOST_HEALTHY = 0.35  # that bounds of a loss which was found leave to a healthy channel: it deviates all the same
 _GROWTH_S = 0.1  # a shorter time of growth is not worth a sentence
 
 
@@ -144,6 +145,9 @@ def finding_of(run: Run, found: IdentifiedPair, limits: Limits) -> Finding | Non
     within = (
         1.0 - epsilon.exceeds_table(limits.min_epsilon) if epsilon is not None and outside else 0.0
     )  # a noisy one whose gain no row has
+    if epsilon is not None and mode is FaultMode.INEFFICIENT:  # what its bounds leave to a healthy channel
+        small = min(epsilon.below(limits.min_epsilon), _MOST_HEALTHY) * float(p[run.row])
+        p[[run.row, HEALTHY]] += (-small, small)
     if epsilon is not None and mode is not FaultMode.OUTSIDE_TABLE:
         epsilon = epsilon.as_share()
     lines = sentences(isolated, found, mode, epsilon)

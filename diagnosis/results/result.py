@@ -49,6 +49,13 @@ class Epsilon:
             0.5 * math.erfc((self.value + least) / (math.sqrt(2.0) * std)) if std > 0.0 else float(self.value < -least)
         )
 
+    def below(self, least: float) -> float:
+        """Probability that less than `least` is lost [1], by the bounds."""
+        std = (self.high - self.low) / (2.0 * _TWO_SIDED)
+        return (
+            0.5 * math.erfc((self.value - least) / (math.sqrt(2.0) * std)) if std > 0.0 else float(self.value < least)
+        )
+
     def row(self) -> EpsilonRow:
         """The same for ``report.json``."""
         return {"value": self.value, "low": self.low, "high": self.high}

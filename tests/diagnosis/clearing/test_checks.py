@@ -144,6 +144,19 @@ def test_an_angle_that_is_off_turns_a_machine_that_never_drives_straight(monkeyp
         assert found["rear", "sensor_or_actuator", Check.LASTING_YAW].passed is passed
 
 
+def test_an_angle_that_drifts_off_points_straight_no_more_and_is_seen_in_turns() -> None:
+    driven = simulate_mission(
+        SimulationOptions(scenario="random", seed=5, duration_s=LENGTH, rate_hz=100.0, faults=(), imu=True)
+    )
+    mission = _with_yaw_rate(driven)
+    angle = mission.columns["steer.front.phi"]
+    for drift, passed in ((0.0, True), (0.25, False)):
+        drifted = angle + np.linspace(0.0, drift, angle.size)
+        one = replace(mission, columns={**mission.columns, "steer.front.phi": drifted})
+        found = checks_by_part(one, base=False)
+        assert found["front", "sensor_or_actuator", Check.LASTING_YAW].passed is passed
+
+
 def _with_yaw_rate(mission: SimulatedMission) -> SimulatedMission:
     """The yaw rate as a channel of the mission's own stamps."""
     group = next(g for g in mission.slow if "imu.yaw_rate" in g.columns)

@@ -57,3 +57,10 @@ def test_bounds_hold_what_is_not_known_of_the_healthy_gain() -> None:
     assert wide.value == sharp.value
     assert (wide.low, wide.high) == pytest.approx((0.4 - 1.96 * 0.03 * 0.6, 0.4 + 1.96 * 0.03 * 0.6), abs=1e-3)
     assert sharp.with_gain(0.0).low == pytest.approx(sharp.low)
+
+
+@pytest.mark.parametrize(
+    ("value", "half", "expected"), [(0.1, 0.2, 0.5), (0.3, 0.05, 0.0), (0.12, 0.13, 0.38), (0.05, 0.0, 1.0)]
+)
+def test_how_much_of_a_loss_is_too_small_by_its_bounds(value: float, half: float, expected: float) -> None:
+    assert Epsilon(value, value - half, value + half).below(0.1) == pytest.approx(expected, abs=0.01)
