@@ -104,7 +104,8 @@ def wheel_checks(cells: Cells, clear_at: float) -> Iterator[Checked]:
             if not all(twice[i]):  # of a wheel that is measured twice on both sides, it is the ground's doing
                 yield worst(cells, (*about, either, Check.EXCESS), windows[:, i], own.above, apart=True)
                 yield lasts(cells, (*about, either, Check.LASTING_EXCESS), lasting[i].above, own.lasting_above)
-        elif _known(used[:, i]) and speed.shape[1] > OTHERS:  # nothing tells what lies behind such a drive
+        # nothing tells what lies behind such a drive, and less where its own opening is all that is measured of it
+        if _known(used[:, i]) and speed.shape[1] > OTHERS and not tells and twice[i][0]:
             yield Checked(*about, either, Check.BEHIND, None, limits[i].below)
         if _known(reference[:, i]):
             if (

@@ -349,3 +349,10 @@ def test_where_an_opening_is_no_speed_nothing_clears_what_lies_behind_a_drive(mo
     assert [c.component for c in behind] == ["FR", "FL", "RR", "RL"]
     assert not any(c.passed for c in behind)
     assert "nothing tells what lies behind its valve" in behind[0].text
+    mission = simulated()
+    once = {name: x for name, x in mission.columns.items() if not name.endswith("_true")}
+    spool = checks_of(in_cells(replace(mission, columns=once), base=False), HYDRAULIC)
+    assert [c.component for c in spool if c.check is Check.BEHIND] == ["FR", "FL", "RR", "RL"]
+    assert not [
+        c for c in checks_of(in_cells(mission, base=True), HYDRAULIC) if c.check is Check.BEHIND
+    ]  # carried or not
