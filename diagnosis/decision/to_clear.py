@@ -102,9 +102,12 @@ def to_clear(
                 "diagnose the whole log, with every part (no --start, --end, --wheel)",
             )
         )
-    out += _of_doubts(faults, words)
     steered = [k for k in assessments if k[0] in axles]
     unjudged = [k for k in steered if assessments[k].tier is Tier.NONE]
+    dark = [unjudged_axles(unjudged, assessments, words)] if unjudged else []
+    first = len(cut) < len(against.scope)  # the verdict's own reason comes first
+    out += dark if first else []
+    out += _of_doubts(faults, words)
     at_rest = {k for k, state in against.open_state.items() if state is State.NOT_EXCITED}  # exempt: its checks count
     brief = [k for k in steered if k not in {*unjudged, *at_rest} and _brief(k, decided_s, driven, limits)]
     twice = {c for (c, side), a in assessments.items() if a.tier is Tier.DIRECT and side == Side.SENSOR}
@@ -116,7 +119,7 @@ def to_clear(
     ranks = {check: k for k, check in enumerate(furthest_first(against.open))}
     out += [point for _, point in sorted(deviating, key=lambda d: ranks[d[0]])]
     out += short_parts(brief, assessments, decided_s, driven, limits, words, Kind.STEER, open_state=against.open_state)
-    return tuple(out + ([unjudged_axles(unjudged, assessments, words)] if unjudged else []))
+    return tuple(out + ([] if first else dark))
 
 
 def _asks_for_steering(check: Checked, twice: Collection[str]) -> bool:

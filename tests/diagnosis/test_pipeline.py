@@ -353,7 +353,9 @@ def test_only_the_asked_wheels_are_judged(mission: SimulatedMission) -> None:
 
 def test_unjudged_steering_is_a_caveat() -> None:
     got = diagnose_mission(in_memory(simulated("base", ()), keep=r"^(?!steer\.front)"), PAPER).report
-    assert any(c.startswith("Not assessed: ") and "front steering" in c for c in got["verdict"]["caveats"])
+    assert any(c.startswith("Not judged: ") and "front steering" in c for c in got["verdict"]["caveats"])
+    assert "front" in got["verdict"]["to_clear"][0]["reason"]  # what the verdict says is cleared by what it says
+    assert got["verdict"]["text"].endswith(f"To clear it: {got['verdict']['to_clear'][0]['act']}.")
 
 
 def test_wheel_that_does_not_exist(tmp_path: Path) -> None:

@@ -15,6 +15,7 @@ from typing import Any
 import pytest
 
 from cli.main import run
+from diagnosis.audit.fleet.leave import lists_of
 from diagnosis.audit.fleet.listed import listed_machines
 from diagnosis.audit.fleet.page.page import build_fleet_page
 from diagnosis.audit.fleet_files import fleet_json, load_fleet, write_fleet
@@ -23,6 +24,7 @@ from diagnosis.audit.store.ingest import ingest
 from diagnosis.audit.store.repairs import Repair, read_repairs, record_repair, repaired_at
 from diagnosis.audit.store.store import Store
 from diagnosis.pages.labels import utc_moment
+from diagnosis.results.vocabulary import Leave
 from replay.errors import ConfigError, OutputError
 from tests import fleet_samples as samples
 from tests.fleet_samples import DAY_NS, START_NS, Fault, Sample
@@ -176,7 +178,10 @@ def test_each_repair_is_told_with_its_own_date(tmp_path: Path) -> None:
         f"RL drive valve not judged since the repair on {late}"
     )
     assert standing(tmp_path)[:2] == ("not_assessed", words)
-    assert f"HX-1 ({words})" in " ".join(document(tmp_path)["verdict"]["text"])
+    fleet: Any = document(tmp_path)
+    (left,) = lists_of(fleet)
+    assert (left.leave, left.label) == (Leave.CHECK, "HX-1")
+    assert words in left.reason
 
 
 def test_missions_before_a_repair_say_nothing_of_it(tmp_path: Path) -> None:
