@@ -146,8 +146,9 @@ def finding_of(run: Run, found: IdentifiedPair, limits: Limits) -> Finding | Non
         1.0 - epsilon.exceeds_table(limits.min_epsilon) if epsilon is not None and outside else 0.0
     )  # a noisy one whose gain no row has
     if epsilon is not None and mode is FaultMode.INEFFICIENT:  # what its bounds leave to a healthy channel
-        small = min(epsilon.below(limits.min_epsilon), _MOST_HEALTHY) * float(p[run.row])
-        p[[run.row, HEALTHY]] += (-small, small)
+        small = min(epsilon.below(limits.min_epsilon), _MOST_HEALTHY)
+        p *= 1.0 - small
+        p[HEALTHY] += small
     if epsilon is not None and mode is not FaultMode.OUTSIDE_TABLE:
         epsilon = epsilon.as_share()
     lines = sentences(isolated, found, mode, epsilon)
