@@ -66,10 +66,9 @@ def in_spells(finding: Finding, measured: Measured) -> list[Finding]:
         return [finding]
     usual = float(np.median(np.sqrt(windows.off[follows])))
     first, last = finding.start // windows.width, -(-finding.stop // windows.width)
-    found = [_trimmed(s, windows) for s in _stretches(lost, follows, first, last)]
-    spells = [s for s in found if _is_share(s, windows, usual, measured)]
-    if not spells:
-        return [finding]
+    spells = [_trimmed(s, windows) for s in _stretches(lost, follows, first, last)]
+    if not spells or not all(_is_share(s, windows, usual, measured) for s in spells):
+        return [finding]  # what else there is would be left untold
     inside = np.zeros(lost.size, np.bool_)
     for start, stop in spells:
         inside[start:stop] = True

@@ -50,6 +50,8 @@ def running_on(wheel: str, judged: Mapping[str, Judged], blocks: Blocks | None, 
     # two wheels that drag each other keep a speed as well
     if blocks is None or blocks.start.size < 2 or len(judged) <= _OTHERS:
         return []
+    if not all(j.response.answered for w, j in judged.items() if w != wheel):
+        return []  # of which nobody knows whether they follow
     one, y = judged[wheel], blocks.mean
     band = np.r_[blocks.low, blocks.high]
     top = float(np.nanquantile(np.abs(band), 0.95)) if np.isfinite(band).any() else 0.0
@@ -58,7 +60,7 @@ def running_on(wheel: str, judged: Mapping[str, Judged], blocks: Blocks | None, 
     tolerance = np.maximum(_NEAR * top, np.nan_to_num(blocks.noise))
     alive = (blocks.same <= _REPEATS * blocks.readings) & np.isfinite(y)
     away = _astray(blocks, top)
-    others = [~_astray(j.wheel.blocks, top) for w, j in judged.items() if w != wheel]
+    others = [np.isfinite(j.wheel.blocks.mean) & ~_astray(j.wheel.blocks, top) for w, j in judged.items() if w != wheel]
     asked = 0.5 * (blocks.low + blocks.high)
     found: list[tuple[int, int, float]] = []
     for start, stop, speed in _level(y, alive, float(np.median(tolerance)), round(_LEAST_S / block_s)):

@@ -44,10 +44,7 @@ class Epsilon:
 
     def exceeds_table(self, least: float) -> float:
         """Probability that a gain is more than 1 by more than `least` [1], which no row of the tables has."""
-        std = (self.high - self.low) / (2.0 * _TWO_SIDED)
-        return (
-            0.5 * math.erfc((self.value + least) / (math.sqrt(2.0) * std)) if std > 0.0 else float(self.value < -least)
-        )
+        return self.below(-least)
 
     def below(self, least: float) -> float:
         """Probability that less than `least` is lost [1], by the bounds."""

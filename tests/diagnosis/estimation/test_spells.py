@@ -61,6 +61,9 @@ def test_a_spell_that_ends_the_finding_begins_where_it_does() -> None:
         + 0.03 * np.sin(2.0 * TIME)
         + 0.1 * INSIDE * np.sin(5.0 * TIME),  # it varies between as well
         0.6 * COMMAND + HYSTERESIS,  # it follows nowhere
+        np.where(INSIDE, 0.5, 1.0) * COMMAND
+        + HYSTERESIS
+        + (TIME > 12.0) * (TIME < 14.0) * (0.1 * np.sin(9.0 * TIME) - 0.4 * COMMAND),
     ],
 )
 def test_what_else_varies_is_left(y: Array) -> None:
