@@ -83,7 +83,7 @@ def wheel_checks(cells: Cells, clear_at: float) -> Iterator[Checked]:
         if twice[i][0]:
             limit = alone(slowest, i, VALVE * clear_at, clear_at, _VALVE_ALONE)
             yield worst(cells, (*about, Side.ACTUATOR, Check.SECOND_MEASUREMENT), behind[:, i], limit, apart=True)
-        if wheel in cells.carried and not any(twice[i]) and _known(command[:, i]):
+        if wheel in cells.carried and not twice[i][0] and _known(command[:, i]):
             limit = most_carried(limits[i].below, clear_at)
             most = max(cells.carried[wheel], cells.may_carry)
             yield Checked(*about, Side.ACTUATOR, Check.CARRIED, most, limit)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +24,10 @@ from diagnosis.steering.findings import SideFindings, apart, findings_of
 from diagnosis.steering.identification import identify_plants
 from diagnosis.steering.inputs import AxleInputs, Counts, axle_inputs
 from diagnosis.steering.measured_twice import of_one_cause
+from diagnosis.steering.model_error import ModelError, model_error
 from diagnosis.steering.models import model_of
+from diagnosis.steering.news import with_news
+from diagnosis.steering.pace import body_speed, with_pace
 from diagnosis.steering.path import AxleFilter, allowed_models, most_probable
 from diagnosis.steering.path_refinement import refine_path
 from diagnosis.steering.plant import SteeringPlant
@@ -41,6 +45,7 @@ from replay.signals.timeline import Timeline
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
+_PACES = 2  # times that a plant is identified again, at the pace that the last one tells
 _SIDES = (Side.SENSOR, Side.ACTUATOR)
 _OTHERWISE = (
     "The axles do not move as any model of them says, even where it fits best: only faults that a measurement of the same "
@@ -100,24 +105,26 @@ def assess_steering(
     progress : Subscriber
         Called at the beginning of each stage.
     """
+    timeline = with_news(timeline, machine)
     axles = _evened([axle_inputs(timeline, replay, machine, j, counts) for j in range(len(machine.axles))])
-    plants = _plants(axles, machine, progress)
-    otherwise = moves_otherwise(
-        [
-            scatter_of(a.blocks, plant)
-            for a in axles
-            if a.blocks is not None and (plant := plants.get(a.name)) is not None
-        ]
-    )
+    axles, plants = _identified(axles, body_speed(timeline, replay, machine), machine, progress)
+    scatters = [
+        scatter_of(a.blocks, plant) for a in axles if a.blocks is not None and (plant := plants.get(a.name)) is not None
+    ]
+    otherwise = moves_otherwise(scatters)
+    filters = {
+        a.name: partial(_filter, a, a.blocks, plant, machine)
+        for a in axles
+        if a.blocks is not None and (plant := plants.get(a.name)) is not None
+    }
+    error = model_error(list(filters.values()))
 
     def begun(inputs: AxleInputs) -> None:
         progress(Progress(Stage.JUDGING_STEERING, inputs.name))
 
     def found(inputs: AxleInputs) -> _Found | None:
-        plant = plants.get(inputs.name)
-        if inputs.blocks is None or plant is None:
-            return None
-        return _found(inputs, inputs.blocks, plant, machine, otherwise=otherwise)
+        under = filters.get(inputs.name)
+        return None if under is None else _found(inputs, under(error), machine, otherwise=otherwise)
 
     judged_axles = zip(axles, each(found, axles, timeline.size, begun), strict=True)
     told = {inputs.name: one for inputs, one in judged_axles if one is not None}
@@ -156,25 +163,47 @@ def _evened(axles: Sequence[AxleInputs]) -> list[AxleInputs]:
     return [replace(a, blocks=blocks.get(a.name)) for a in axles]
 
 
-def _plants(axles: Sequence[AxleInputs], machine: Machine, progress: Subscriber) -> dict[str, SteeringPlant | None]:
-    """Valve and cylinder of every axle that has blocks."""
-    modelled = [a for a in axles if a.blocks is not None]
+def _identified(
+    axles: Sequence[AxleInputs], speed: Array, machine: Machine, progress: Subscriber
+) -> tuple[list[AxleInputs], dict[str, SteeringPlant | None]]:
+    """Axles with the pace that the speed of driving [m/s] gives them, and valve and cylinder of every one that has blocks."""
+    modelled = [(a, a.blocks) for a in axles if a.blocks is not None]
     if not modelled:
-        return {}
+        return list(axles), {}
     progress(Progress(Stage.IDENTIFYING_STEERING))
-    known = [None if (k := machine.steering.get(a.name)) is None else plant_before(k) for a in modelled]
-    plants = identify_plants([a.blocks for a in modelled], [a.noise for a in modelled], machine.max_steer, known)
-    return {a.name: plant for a, plant in zip(modelled, plants, strict=True)}
+    noises = [a.noise for a, _ in modelled]
+    known = [None if (k := machine.steering.get(a.name)) is None else plant_before(k) for a, _ in modelled]
+    blocks = [b for _, b in modelled]
+    plants = identify_plants(blocks, noises, machine.max_steer, known)
+    for _ in range(_PACES):
+        paced = with_pace(blocks, noises, plants, speed, machine)
+        if all(new is old for new, old in zip(paced, blocks, strict=True)):
+            break
+        blocks = paced
+        plants = identify_plants(blocks, noises, machine.max_steer, known)
+    of = dict(zip([a.name for a, _ in modelled], blocks, strict=True))
+    return [replace(a, blocks=of.get(a.name)) for a in axles], dict(zip(of, plants, strict=True))
 
 
-def _found(
-    inputs: AxleInputs, blocks: SteeringBlocks, plant: SteeringPlant, machine: Machine, *, otherwise: bool
-) -> _Found:
-    """Inputs → models → path → findings of both sides; `otherwise`: the models do not fit."""
-    model = model_of(blocks, plant, inputs.noise, machine.max_steer)
-    valve_judged = inputs.valve_redundant or (plant.reliable and not inputs.command_missing)
-    allowed = allowed_models(sensor=inputs.measured == "phi", actuator=valve_judged, redundant=inputs.redundant)
-    axle = AxleFilter(blocks, driven_by(plant, blocks), model, allowed, inputs.names)
+def _filter(
+    inputs: AxleInputs, blocks: SteeringBlocks, plant: SteeringPlant, machine: Machine, error: ModelError
+) -> AxleFilter:
+    """The filters of an axle whose model errs by so much."""
+    model = model_of(blocks, plant, inputs.noise, machine.max_steer, error.lag)
+    allowed = allowed_models(
+        sensor=inputs.measured == "phi", actuator=_valve_judged(inputs, plant), redundant=inputs.redundant
+    )
+    return AxleFilter(blocks, driven_by(plant, blocks, error.share), model, allowed, inputs.names)
+
+
+def _valve_judged(inputs: AxleInputs, plant: SteeringPlant) -> bool:
+    """Whether an axle's valve can be judged."""
+    return inputs.valve_redundant or (plant.reliable and not inputs.command_missing)
+
+
+def _found(inputs: AxleInputs, axle: AxleFilter, machine: Machine, *, otherwise: bool) -> _Found:
+    """Inputs → path → findings of both sides; `otherwise`: the models do not fit."""
+    blocks = axle.blocks
     path = refine_path(axle, most_probable(axle))
     found = {side: findings_of(side, inputs, axle, path, machine.limits) for side in _SIDES}
     found[Side.ACTUATOR] = commanded(found[Side.ACTUATOR], inputs.command, axle)
@@ -188,7 +217,7 @@ def _found(
     found = without_agreed(not_denied(found, inputs, blocks, machine.max_steer), inputs)
     found = {side: acquitted(side, found[side], inputs, blocks, believed=not otherwise) for side in _SIDES}
     found = {side: of_one_cause(side, found[side], inputs, machine.limits.min_opening) for side in _SIDES}
-    return _Found(axle, path, found, valve_judged)
+    return _Found(axle, path, found, _valve_judged(inputs, axle.model.plant))
 
 
 def _judged(inputs: AxleInputs, told: _Found, *, otherwise: bool) -> _Judged:

@@ -54,6 +54,8 @@ class SteeringBlocks:
         Blocks in most of which nobody knows the opening.
     redundancy : Redundancy
         What is measured redundantly.
+    pace : Array, shape (m,)
+        What the axle turns at its opening at the speed of driving, as a multiple of its usual [1]; 1 unless identified.
     store : ColumnStore
         Where long columns stand.
     """
@@ -68,6 +70,7 @@ class SteeringBlocks:
     raw_u: Array
     blind: NDArray[np.bool_]
     redundancy: Redundancy
+    pace: Array
     store: ColumnStore = field(default_factory=ColumnStore, repr=False)
 
 
@@ -170,7 +173,18 @@ def blocks_of(
     raw_u, redundancy = opening.finish(), Redundancy.nothing(mean.size)
     u_mean = between(raw_u, length, mean.size)
     return SteeringBlocks(
-        length, length * dt, mean, power, count, u_mean, status, raw_u, blind, redundancy, store=store
+        length,
+        length * dt,
+        mean,
+        power,
+        count,
+        u_mean,
+        status,
+        raw_u,
+        blind,
+        redundancy,
+        np.ones(mean.size),
+        store=store,
     )
 
 

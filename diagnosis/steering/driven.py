@@ -39,12 +39,15 @@ class Driven:
             self.command,
             self.spread,
             blocks.u,
+            blocks.pace,
             blocks.status,
             blocks.redundancy,
         )
 
 
-def driven_by(plant: SteeringPlant, blocks: SteeringBlocks) -> Driven:
-    """What a plant's valve gives in an axle's blocks."""
+def driven_by(plant: SteeringPlant, blocks: SteeringBlocks, share: float = 0.0) -> Driven:
+    """What a plant's valve gives in an axle's blocks; `share`: what its rates err by, relative to them [1]."""
     rates = between(blocks.raw_u, blocks.length, blocks.mean.size, lambda part: rates_at(part, plant.valve))
-    return Driven(np.where(blocks.blind, np.nan, rates), plant.spread(blocks.u))
+    rates *= blocks.pace
+    spread = np.hypot(blocks.pace * plant.spread(blocks.u), share * np.abs(rates))
+    return Driven(np.where(blocks.blind, np.nan, rates), spread)

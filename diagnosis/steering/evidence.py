@@ -26,7 +26,6 @@ from replay.signals.timeline import Timeline
 Array = NDArray[np.float64]
 
 _ASKED_S = 0.5  # in which a valve's rate becomes an angle
-_LEAST_LAG_STD = 0.1  # of the lag, relative to it
 
 
 class _Expected(NamedTuple):
@@ -76,7 +75,7 @@ def _of_valve(axle: AxleFilter, path: SteeringPath) -> _Expected:
     window = sliding_window_view(rate, n)[1:]
     asked = angle[:-n] + dt * window.sum(axis=1)
     error = sliding_window_view(axle.driven.spread**2 + axle.model.rate_error**2, n)[1:].mean(axis=1) * (n * dt) ** 2
-    late = (rate[n:] - rate[:-n]) * plant.lag * np.hypot(_LEAST_LAG_STD, plant.lag_std)
+    late = (rate[n:] - rate[:-n]) * plant.lag * np.hypot(axle.model.lag_spread, plant.lag_std)
     variance = error + late**2 + np.maximum(path.variance[:-n, 0], 0.0) + axle.model.noise.white
     expected = np.clip(asked, *axle.model.stops)
     threshold = 3.0 * np.sqrt(variance) + plant.play

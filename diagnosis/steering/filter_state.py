@@ -56,8 +56,15 @@ class BlockSeries(NamedTuple):
     driven: Array
     spread: Array
     u: Array
+    pace: Array
     status: NDArray[np.int8]
     redundancy: Redundancy
+
+    def part(self, blocks: slice) -> BlockSeries:
+        """Some of the blocks."""
+        mean, power, samples, driven, spread, u, pace, status, redundancy = self
+        floats = (x[blocks] for x in (mean, power, samples, driven, spread, u, pace))
+        return BlockSeries(*floats, status[blocks], Redundancy(*(x[blocks] for x in redundancy)))
 
 
 class Block(NamedTuple):
@@ -77,6 +84,8 @@ class Block(NamedTuple):
         Standard deviation of the rate that is expected [rad/s].
     u : float
         Mean opening [fraction].
+    pace : float
+        What the axle turns at it at the speed of driving, as a multiple of its usual [1].
     status : int
         `PAIR`, `SILENT` or `SKIP` of `diagnosis.channels.sample_status`.
     """
@@ -87,13 +96,14 @@ class Block(NamedTuple):
     driven: float
     spread: float
     u: float
+    pace: float
     status: int
 
 
 @njit(cache=True, error_model="numpy", inline="always")
 def resting(block: Block) -> Block:
     """The same block with a valve at rest."""
-    return Block(block.mean, block.power, block.samples, 0.0, block.spread, 0.0, block.status)
+    return Block(block.mean, block.power, block.samples, 0.0, block.spread, 0.0, block.pace, block.status)
 
 
 class RedundantBlock(NamedTuple):

@@ -14,7 +14,6 @@ from diagnosis.steering.windows import windows_of
 
 _MEAN_HEALTHY_S = 60.0
 _RATE_ERROR_S = 1.0
-_LEAST_LAG_STD = 0.1  # of the lag, relative to it
 _LAG_ERROR = 0.5  # noise of a rate whose sum over a change is as large as what a wrong lag makes of it
 _STOP_SHARE, _REST_S = 0.02, 0.1  # how far from the given stop it may be, relative to it; how long an axle rests there
 _DISTURBANCE_S = 0.8  # how fast a valve's disturbance and a sensor's slow noise change
@@ -52,6 +51,8 @@ class SteeringModel:
         What the sensor reads at the lower and the upper one [rad].
     opening_measured : bool
         Whether the valve's opening is.
+    lag_spread : float
+        Standard deviation of the lag from motion to motion, relative to it [1].
     """
 
     plant: SteeringPlant
@@ -64,6 +65,7 @@ class SteeringModel:
     idle_rate: float
     stops: tuple[float, float]
     opening_measured: bool = False
+    lag_spread: float = 0.1
 
     @property
     def switch_cost(self) -> float:
@@ -128,7 +130,7 @@ class SteeringModel:
             play=plant.play if plant.play > 0.3 * self.noise.std else 0.0,
             lag=lag,
             rate_decay=float(np.exp(-self.dt / lag)),
-            lag_error=_LAG_ERROR * float(np.hypot(_LEAST_LAG_STD, plant.lag_std) * np.sqrt(lag / self.dt)),
+            lag_error=_LAG_ERROR * float(np.hypot(self.lag_spread, plant.lag_std) * np.sqrt(lag / self.dt)),
             stop=self.stop,
             stop_up=self.stops[1],
             stop_down=self.stops[0],
@@ -158,7 +160,9 @@ class SteeringModel:
         )
 
 
-def model_of(blocks: SteeringBlocks, plant: SteeringPlant, noise: SensorNoise, stop: float) -> SteeringModel:
+def model_of(
+    blocks: SteeringBlocks, plant: SteeringPlant, noise: SensorNoise, stop: float, lag_spread: float = 0.1
+) -> SteeringModel:
     """Constants of an axle's filters; the rate's error comes from windows in which nothing is steered.
 
     Parameters
@@ -171,6 +175,8 @@ def model_of(blocks: SteeringBlocks, plant: SteeringPlant, noise: SensorNoise, s
         Of the angle.
     stop : float
         Angle of the end stops [rad].
+    lag_spread : float
+        As of `SteeringModel`.
     """
     windows = windows_of(blocks, noise, stop, 0.5)
     predicted = windows.predicted(plant.valve, plant.lag, plant.play)
@@ -186,7 +192,7 @@ def model_of(blocks: SteeringBlocks, plant: SteeringPlant, noise: SensorNoise, s
     jitter = float(np.median(np.abs(np.diff(rates_at(blocks.u, plant.valve))))) if blocks.u.size > 1 else 0.0
     idle = max(_IDLE_ERRORS * error, _IDLE_JITTER * jitter)
     return SteeringModel(
-        plant, noise, stop, error, count, blocks.dt, redundant, idle, _stops(blocks, noise, stop), measured
+        plant, noise, stop, error, count, blocks.dt, redundant, idle, _stops(blocks, noise, stop), measured, lag_spread
     )
 
 

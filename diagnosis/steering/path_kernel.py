@@ -68,6 +68,7 @@ def _block(k: int, series: BlockSeries) -> Block:
         series.driven[k],
         series.spread[k],
         series.u[k],
+        series.pace[k],
         series.status[k],
     )
 

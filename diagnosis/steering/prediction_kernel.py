@@ -43,13 +43,14 @@ def _drive(m: int, block: Block, axle: AxleConstants, bank: FilterBank) -> tuple
     if a == INEFFICIENT:
         std = abs(block.u) * max(bank.cov[m, 2, 2], 0.0) ** 0.5
         rate, slope = expected_rate(z[m, 2] * block.u, std, axle.valve)
-        f += rate
-        by_a = slope * block.u
+        f += block.pace * rate
+        by_a = block.pace * slope * block.u
     elif a == NOISY or (a == STUCK and axle.opening_measured):
         P, by_opening = bank.cov, 1.0 / axle.gain
         variance = P[m, 2, 2] * block.u**2 + 2.0 * P[m, 2, 3] * block.u * by_opening + P[m, 3, 3] * by_opening**2
         f, slope = expected_rate(z[m, 2] * block.u + error * by_opening, max(variance, 0.0) ** 0.5, axle.valve)
-        return f, slope * block.u, slope * by_opening
+        slope *= block.pace
+        return block.pace * f, slope * block.u, slope * by_opening
     if abs(f) > axle.rate_limit:
         return (axle.rate_limit if f > 0 else -axle.rate_limit), 0.0, 0.0
     return f, by_a, 1.0

@@ -20,8 +20,8 @@ _OBEYED, _NEARLY = 4.0, 1e-3  # standard deviations and opening [fraction] by wh
 
 
 @njit(cache=True, error_model="numpy")
-def _window_angles(u, valve, lag, play, dt, length):  # type: ignore[no-untyped-def]
-    """Means over windows of `length` blocks of the measured angle, from a start at 0: lag, cylinder, play."""
+def _window_angles(u, pace, valve, lag, play, dt, length):  # type: ignore[no-untyped-def]
+    """Means over windows of `length` blocks of the measured angle, from a start at 0: lag, cylinder, play; rates times `pace`."""
     out = np.zeros(u.size // length)
     a = np.exp(-dt / max(lag, 1e-4))
     k_r = lag * (1 - a)
@@ -29,7 +29,7 @@ def _window_angles(u, valve, lag, play, dt, length):  # type: ignore[no-untyped-
     for w in range(out.size):
         total = 0.0
         for k in range(w * length, (w + 1) * length):
-            f = rate_at(u[k], valve)
+            f = pace[k] * rate_at(u[k], valve)
             phi += k_r * r + (dt - k_r) * f
             r = a * r + (1 - a) * f
             seen = min(max(seen, phi - play), phi + play)
@@ -50,7 +50,7 @@ def lagged(x, decay):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, error_model="numpy")
-def _window_slopes(u, valve, lag, play, dt, length):  # type: ignore[no-untyped-def]
+def _window_slopes(u, pace, valve, lag, play, dt, length):  # type: ignore[no-untyped-def]
     """What `_window_angles` gives, (w,), and its derivatives by slopes, dead bands, limits (up, down), lag and play, (w, 8).
 
     The derivatives obey the plant's own recursion, driven by those of the rate; the play hands on those of the moment in
@@ -69,28 +69,29 @@ def _window_slopes(u, valve, lag, play, dt, length):  # type: ignore[no-untyped-
         total = total_wider = 0.0
         total_by[:] = 0.0
         for k in range(w * length, (w + 1) * length):
-            f = rate_at(u[k], valve)
+            f = pace[k] * rate_at(u[k], valve)
             for i in range(7):
                 by_angle[i] += k_r * by_rate[i]
                 by_rate[i] *= a
             by_angle[6] += k_lag * (r - f)
             by_rate[6] += a_lag * (r - f)
+            p_f, p_b = pace[k] * k_f, pace[k] * b
             if u[k] > valve.dead_up:
                 beyond = u[k] - valve.dead_up
                 if valve.slope_up * beyond < valve.limit_up:
-                    by_angle[0], by_rate[0] = by_angle[0] + k_f * beyond, by_rate[0] + b * beyond
+                    by_angle[0], by_rate[0] = by_angle[0] + p_f * beyond, by_rate[0] + p_b * beyond
                     by_dead = -valve.slope_up * min(beyond / _DEAD_STEP, 1.0)
-                    by_angle[2], by_rate[2] = by_angle[2] + k_f * by_dead, by_rate[2] + b * by_dead
+                    by_angle[2], by_rate[2] = by_angle[2] + p_f * by_dead, by_rate[2] + p_b * by_dead
                 else:
-                    by_angle[4], by_rate[4] = by_angle[4] + k_f, by_rate[4] + b
+                    by_angle[4], by_rate[4] = by_angle[4] + p_f, by_rate[4] + p_b
             elif u[k] < -valve.dead_down:
                 beyond = u[k] + valve.dead_down
                 if -valve.slope_down * beyond < valve.limit_down:
-                    by_angle[1], by_rate[1] = by_angle[1] + k_f * beyond, by_rate[1] + b * beyond
+                    by_angle[1], by_rate[1] = by_angle[1] + p_f * beyond, by_rate[1] + p_b * beyond
                     by_dead = valve.slope_down * min(-beyond / _DEAD_STEP, 1.0)
-                    by_angle[3], by_rate[3] = by_angle[3] + k_f * by_dead, by_rate[3] + b * by_dead
+                    by_angle[3], by_rate[3] = by_angle[3] + p_f * by_dead, by_rate[3] + p_b * by_dead
                 else:
-                    by_angle[5], by_rate[5] = by_angle[5] - k_f, by_rate[5] - b
+                    by_angle[5], by_rate[5] = by_angle[5] - p_f, by_rate[5] - p_b
             phi += k_r * r + k_f * f
             r = a * r + b * f
             if seen < phi - play or seen > phi + play:
@@ -119,6 +120,8 @@ class Windows:
         Mean rate between the middles of neighbouring windows [rad/s].
     u : Array, shape (m,)
         Opening by block [fraction].
+    pace : Array, shape (m,)
+        What an axle turns at its opening at the speed of driving, as a multiple of its usual [1].
     opening : Array, shape (w,)
         Its mean between those middles [fraction].
     good : NDArray[np.bool_], shape (w,)
@@ -133,6 +136,7 @@ class Windows:
 
     rate: Array
     u: Array
+    pace: Array
     opening: Array
     good: NDArray[np.bool_]
     length: int
@@ -141,7 +145,7 @@ class Windows:
 
     def predicted(self, valve: ValveMap, lag: float, play: float) -> Array:
         """Rates that a plant gives at these openings [rad/s], shape (w,)."""
-        angles = _window_angles(self.u, valve, lag, play, self.dt, self.length)
+        angles = _window_angles(self.u, self.pace, valve, lag, play, self.dt, self.length)
         return np.asarray(np.diff(angles) / (self.length * self.dt))
 
     def slopes(self, valve: ValveMap, lag: float, play: float) -> tuple[Array, Array]:
@@ -149,7 +153,7 @@ class Windows:
 
         Lag in s, play in rad, rates in rad/s.
         """
-        angles, by = _window_slopes(self.u, valve, lag, play, self.dt, self.length)
+        angles, by = _window_slopes(self.u, self.pace, valve, lag, play, self.dt, self.length)
         span = self.length * self.dt
         return np.diff(angles) / span, np.diff(by, axis=0) / span
 
@@ -157,7 +161,8 @@ class Windows:
         """The same windows with openings that are means of `blocks`; as they are where that does not divide a window."""
         if self.length % blocks:
             return self
-        return replace(self, u=window_means(self.u, blocks), length=self.length // blocks, dt=self.dt * blocks)
+        u, pace = window_means(self.u, blocks), window_means(self.pace, blocks)
+        return replace(self, u=u, pace=pace, length=self.length // blocks, dt=self.dt * blocks)
 
 
 def windows_of(blocks: SteeringBlocks, noise: SensorNoise, stop: float, window_s: float) -> Windows:
@@ -187,7 +192,7 @@ def windows_of(blocks: SteeringBlocks, noise: SensorNoise, stop: float, window_s
     opening = window_means(u, length)
     spread = float(np.sqrt(2 * noise.white / max(counts, 1.0))) / (length * blocks.dt)
     middle_u = (opening[1:] + opening[:-1]) / 2
-    return Windows(rate, u, middle_u, alive[1:] & alive[:-1], length, blocks.dt, spread)
+    return Windows(rate, u, blocks.pace, middle_u, alive[1:] & alive[:-1], length, blocks.dt, spread)
 
 
 def _sampled(known: NDArray[np.bool_]) -> NDArray[np.bool_]:

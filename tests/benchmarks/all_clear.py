@@ -20,7 +20,7 @@ import argparse
 import json
 import sys
 import traceback
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from contextlib import nullcontext
 from dataclasses import asdict, replace
@@ -54,6 +54,7 @@ from replay.simulation.run import simulate_mission
 from replay.simulation.structures import STRUCTURES, StructureOptions
 
 TIERS = ("base", "spool", "direct")
+SECOND = "second"  # second speeds and angles without any valve position
 FIRST = {"tuning": 0, "reporting": 2000}
 DEFAULT = "default"
 OTHERS = {
@@ -88,8 +89,8 @@ def run(task: Task) -> list[Outcome]:
     mission, machine, trouble, out = simulate_mission(options_of(task)), haulotte(), task.trouble, []
     name = trouble.name if trouble else "healthy"
     for tier in task.tiers:
-        assert tier in EVIDENCE
-        signals = recorded_signals(mission, tier)
+        assert tier in (*EVIDENCE, SECOND)
+        signals = as_logged(lambda t: recorded_signals(mission, t), tier)
         if trouble is not None and trouble.edit is not None:
             before, signals = signals, trouble.edit(signals)
             if trouble.parts and not deformed(before, signals, machine):
@@ -108,6 +109,14 @@ def run(task: Task) -> list[Outcome]:
     return out if exercised((mission.stamps - mission.stamps[0]) * 1e-9, asked, trouble) else []
 
 
+def as_logged(signals_of: Callable[[str], Signals], tier: str) -> Signals:
+    """A mission as a recorder of a tier has it; `signals_of` gives it for a tier of the machine."""
+    if tier != SECOND:
+        return signals_of(tier)
+    whole = signals_of("direct")
+    return replace(whole, items={name: s for name, s in whole.items.items() if not name.endswith(".u_applied")})
+
+
 def run_other(task: Task, physics: ModuleType) -> list[Outcome]:
     """Outcomes of one mission of a machine of other physics."""
     trouble, out = task.trouble, []
@@ -116,7 +125,8 @@ def run_other(task: Task, physics: ModuleType) -> list[Outcome]:
     if trouble and not exercised(*physics.asked(task.seed, task.duration), trouble):
         return []
     for tier in task.tiers:
-        signals = physics.signals(task.seed, trouble.faults if trouble else (), task.duration, tier)
+        faults = trouble.faults if trouble else ()
+        signals = as_logged(lambda t, f=faults: physics.signals(task.seed, f, task.duration, t), tier)
         if trouble is not None and trouble.edit is not None:
             before, signals = signals, trouble.edit(signals)
             if trouble.parts and not deformed(before, signals, machine):
@@ -144,7 +154,7 @@ def run_foreign(task: Task) -> list[Outcome]:
     name = trouble.name if trouble else "healthy"
     return [
         judged(task, tier, name, diagnose_mission(mission, machine).report, trouble.parts if trouble else None)
-        for tier, mission, machine in missions(make, drive, task.tiers)
+        for tier, mission, machine in missions(make, drive, [t for t in task.tiers if t != SECOND])
     ]
 
 
@@ -213,7 +223,7 @@ def table(outcomes: Sequence[Outcome]) -> Iterator[str]:
     """Lines: a machine and level of evidence each."""
     yield f"{'machine':<22}{'evidence':<9}{'faulty':>7}{'cleared':>8}{'abstain':>8}{'wrong':>6}{'named':>6}{'high wrong':>12}   healthy: stopped, watch, not assessed, ready"
     for machine in dict.fromkeys(o.machine for o in outcomes):
-        for tier in TIERS:
+        for tier in (*TIERS, SECOND):
             own = [o for o in outcomes if (o.machine, o.tier) == (machine, tier)]
             if not own:
                 continue
@@ -243,7 +253,7 @@ def main() -> None:
     parser.add_argument("--offset", type=int, default=0, help="first kind, with --every")
     parser.add_argument("--healthy", type=int, default=40, help="healthy missions of each machine")
     parser.add_argument("--kinds", default=None, help="only kinds whose name has this text")
-    parser.add_argument("--tiers", nargs="+", choices=TIERS, default=TIERS)
+    parser.add_argument("--tiers", nargs="+", choices=(*TIERS, SECOND), default=TIERS)
     parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument("--json", type=Path, metavar="FILE", help="write every outcome")
     asked = parser.parse_args()
