@@ -207,7 +207,7 @@ def test_t13_steering_over_a_block_and_its_readout() -> None:
     angle, speed, steps = 0.1, 0.05, 10_000
     for _ in range(steps):
         angle, speed = angle + speed * DT / steps, speed + (driven - speed) / LAG * DT / steps
-    predict_axle(HEALTHY_MODEL, Block(0.1, 0.0, 0.0, driven, 0.0, 0.05, PAIR), constants.axle, 1.0, bank)
+    predict_axle(HEALTHY_MODEL, Block(0.1, 0.0, 0.0, driven, 0.0, 0.05, 1.0, PAIR), constants.axle, 1.0, bank)
     assert bank.mean[HEALTHY_MODEL, :2] == pytest.approx([angle, speed], rel=1e-4)
 
 

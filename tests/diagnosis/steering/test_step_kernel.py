@@ -47,6 +47,7 @@ FADE = np.exp(-DT / LAG)
 K_R = LAG * (1 - FADE)
 K_F = DT - K_R
 NOTHING = RedundantBlock(*[np.nan] * 7)
+PACE = 0.8  # while the machine stands
 
 
 def force(m: int, x: np.ndarray, P: np.ndarray, u: float, driven: float) -> tuple[float, float, float]:
@@ -57,10 +58,10 @@ def force(m: int, x: np.ndarray, P: np.ndarray, u: float, driven: float) -> tupl
     if ACTUATOR[m] == NOISY:
         h = np.array([0, 0, u, 1 / GAIN, 0, 0])
         f, slope = expected_rate(float(h @ x), float(np.sqrt(h @ P @ h)), VALVE)
-        return f, slope * u, slope / GAIN
+        return PACE * f, PACE * slope * u, PACE * slope / GAIN
     if ACTUATOR[m] == INEFFICIENT:
         rate, slope = expected_rate(x[2] * u, abs(u) * P[2, 2] ** 0.5, VALVE)
-        f, by_a = f + rate, slope * u
+        f, by_a = f + PACE * rate, PACE * slope * u
     return (f, by_a, 1.0) if abs(f) <= RATE else (np.sign(f) * RATE, 0.0, 0.0)
 
 
@@ -102,7 +103,7 @@ def test_model_is_filterpys_extended_kalman_filter(m: int) -> None:
     kf.R = np.array([[r]])
     for k in range(60):
         u = 0.04 * np.sin(k / 9.0)
-        driven = rate_at(u, VALVE)
+        driven = PACE * rate_at(u, VALVE)
         x = kf.x[:, 0].copy()
         f, by_a, by_b = force(m, x, kf.P, u, driven)
         decay, q = process_noise(m, driven, f, x[1])
@@ -122,7 +123,7 @@ def test_model_is_filterpys_extended_kalman_filter(m: int) -> None:
         )
         if ACTUATOR[m] in (INEFFICIENT, NOISY):
             kf.x[2, 0] = min(max(kf.x[2, 0], 0.1), 0.92)
-        block = Block(y, 2.6e-7 if not dead else 0.0, 10.0, driven, SPREAD, u, PAIR)
+        block = Block(y, 2.6e-7 if not dead else 0.0, 10.0, driven, SPREAD, u, PACE, PAIR)
         advance(m, block, NOTHING, constants, bank)
         assert_allclose(z[m], kf.x[:, 0], atol=1e-9, rtol=1e-9)
         assert_allclose(P[m], kf.P, atol=1e-9, rtol=1e-7)
@@ -134,7 +135,9 @@ def test_an_end_stop_holds_the_axle() -> None:
     m = int(np.flatnonzero((ACTUATOR == STUCK) & (SENSOR == HEALTHY))[0])
     bank.mean[m, 3] = RATE
     for _ in range(100):
-        predict(m, Block(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, PAIR), constants.axle, constants.sensor.coloured_decay, bank)
+        predict(
+            m, Block(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, PAIR), constants.axle, constants.sensor.coloured_decay, bank
+        )
     assert bank.mean[m, 0] == pytest.approx(STOP)
     assert bank.mean[m, 1] == 0.0
 
@@ -145,7 +148,7 @@ def test_a_block_that_no_model_explains_teaches_nothing() -> None:
     bank.cov[0, 0, 0], before = 1e-8, bank.mean[0].copy()
 
     def likelihood(angle: float) -> float:
-        block = Block(angle, 2.6e-7, 10.0, 0.0, 0.0, 0.0, PAIR)
+        block = Block(angle, 2.6e-7, 10.0, 0.0, 0.0, 0.0, 1.0, PAIR)
         return float(update(0, block, 0.0, constants.axle, constants.sensor, bank))
 
     far = likelihood(0.6)

@@ -19,7 +19,8 @@ def windows(seed: int = 0) -> Windows:
     rng = np.random.default_rng(seed)
     u = np.repeat(rng.normal(0.0, 0.3, 120), 20) * np.sin(np.arange(2400) / 70)
     none = np.zeros(95)
-    return Windows(none, u, none, none == 0, 25, 0.01, 0.0)
+    pace = 1.0 - 0.3 * np.exp(-np.arange(2400) / 500)
+    return Windows(none, u, pace, none, none == 0, 25, 0.01, 0.0)
 
 
 def rates(x: np.ndarray) -> np.ndarray:
