@@ -27,7 +27,7 @@ from diagnosis.steering.measured_twice import of_one_cause
 from diagnosis.steering.model_error import ModelError, model_error
 from diagnosis.steering.models import model_of
 from diagnosis.steering.news import with_news
-from diagnosis.steering.pace import body_speed, with_pace
+from diagnosis.steering.pace import Speed, body_speed, with_pace
 from diagnosis.steering.path import AxleFilter, allowed_models, most_probable
 from diagnosis.steering.path_refinement import refine_path
 from diagnosis.steering.plant import SteeringPlant
@@ -164,9 +164,9 @@ def _evened(axles: Sequence[AxleInputs]) -> list[AxleInputs]:
 
 
 def _identified(
-    axles: Sequence[AxleInputs], speed: Array, machine: Machine, progress: Subscriber
+    axles: Sequence[AxleInputs], speed: Speed, machine: Machine, progress: Subscriber
 ) -> tuple[list[AxleInputs], dict[str, SteeringPlant | None]]:
-    """Axles with the pace that the speed of driving [m/s] gives them, and valve and cylinder of every one that has blocks."""
+    """Axles with the pace that the speed of driving gives them, and valve and cylinder of every one that has blocks."""
     modelled = [(a, a.blocks) for a in axles if a.blocks is not None]
     if not modelled:
         return list(axles), {}

@@ -62,9 +62,9 @@ class BlockSeries(NamedTuple):
 
     def part(self, blocks: slice) -> BlockSeries:
         """Some of the blocks."""
-        mean, power, samples, driven, spread, u, pace, status, redundancy = self
-        floats = (x[blocks] for x in (mean, power, samples, driven, spread, u, pace))
-        return BlockSeries(*floats, status[blocks], Redundancy(*(x[blocks] for x in redundancy)))
+        known = Redundancy(*(x[blocks] for x in self.redundancy))
+        columns = {name: getattr(self, name)[blocks] for name in self._fields if name != "redundancy"}
+        return BlockSeries(**columns, redundancy=known)
 
 
 class Block(NamedTuple):

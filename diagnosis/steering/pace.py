@@ -7,8 +7,9 @@ strikes one of them.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +24,7 @@ from replay.machine.config import Machine
 from replay.signals.timeline import Timeline
 
 Array = NDArray[np.float64]
+Speed = Callable[[NDArray[np.intp]], Array]
 
 _KNOTS = np.array([0.0, 0.08, 0.25, 0.6])  # of the top speed
 _SPREAD, _STEP = 0.4, 0.3  # of a rate: by how much a course may differ from 1, and from knot to knot
@@ -33,27 +35,32 @@ _BETTER = 0.97  # of the robust loss without it
 _COUNTS = 0.03  # less is none
 
 
-def body_speed(timeline: Timeline, replay: Replay, machine: Machine) -> Array:
-    """Median of the wheels' speeds [m/s], of their commands where none is known, else 0; shape (n,)."""
-
-    def median(*columns: Array) -> Array:
-        speeds = np.sort(np.abs(np.column_stack(columns)), axis=1)  # NaN last
-        known = np.isfinite(speeds).sum(axis=1)
-        return np.asarray(speeds[np.arange(len(speeds)), np.maximum(known - 1, 0) // 2])
-
+def body_speed(timeline: Timeline, replay: Replay, machine: Machine) -> Speed:
+    """Median of the wheels' speeds at given steps [m/s], of their commands where none is known, else 0."""
     measured = [x for w in machine.wheels if (x := timeline.get(f"wheel.{w}.v")) is not None]
-    commanded = timeline.map(lambda v: median(*v.T), replay.v_ref)
-    if not measured:
-        return np.nan_to_num(commanded)
-    found = timeline.map(median, *measured)
-    return timeline.map(lambda a, b: np.nan_to_num(np.where(np.isfinite(a), a, b)), found, commanded)
+
+    def at(steps: NDArray[np.intp]) -> Array:
+        commanded = _median(replay.v_ref[steps])
+        if not measured:
+            return np.nan_to_num(commanded)
+        found = _median(np.column_stack([x[steps] for x in measured]))
+        return np.nan_to_num(np.where(np.isfinite(found), found, commanded))
+
+    return at
+
+
+def _median(speeds: Array) -> Array:
+    """Lower median of what is known in each row, whatever its sign; NaN where nothing is. From shape (n, wheels) to (n,)."""
+    size = np.sort(np.abs(speeds), axis=1)  # NaN last
+    middle = np.maximum(np.isfinite(size).sum(axis=1) - 1, 0) // 2
+    return np.asarray(np.take_along_axis(size, middle[:, np.newaxis], axis=1)[:, 0])
 
 
 def with_pace(
     axles: Sequence[SteeringBlocks],
     noises: Sequence[SensorNoise],
     plants: Sequence[SteeringPlant | None],
-    speed: Array,
+    speed: Speed,
     machine: Machine,
 ) -> list[SteeringBlocks]:
     """Blocks with the pace that the speed of driving gives their axles; as they are where none is seen.
@@ -66,15 +73,15 @@ def with_pace(
         Of their angles.
     plants : Sequence[SteeringPlant or None]
         Identified at one pace.
-    speed : Array, shape (n,)
-        Of driving [m/s].
+    speed : Callable[[NDArray[np.intp]], Array]
+        Of driving at given steps [m/s].
     machine : Machine
         Its top speed and end stops.
     """
     judged = [(b, n, p) for b, n, p in zip(axles, noises, plants, strict=True) if p is not None]
     if not judged:
         return list(axles)
-    shares = [_of_blocks(np.abs(speed) / machine.max_speed, b) for b, _, _ in judged]
+    shares = [np.abs(speed(_middles(b))) / machine.max_speed for b, _, _ in judged]
     found = [
         _Axle(windows_of(b, n, machine.max_steer, LONG_S), p, s) for (b, n, p), s in zip(judged, shares, strict=True)
     ]
@@ -104,10 +111,10 @@ class _Axle:
         return float((r2 / (1.0 + r2)).mean()) if use.any() else 0.0, int(np.count_nonzero(use))
 
 
-def _of_blocks(share: Array, blocks: SteeringBlocks) -> Array:
-    """Speed in every block, shape (m,)."""
-    at = np.minimum(np.arange(blocks.mean.size) * blocks.length + blocks.length // 2, share.size - 1)
-    return np.asarray(share[at])
+def _middles(blocks: SteeringBlocks) -> NDArray[np.intp]:
+    """Step in the middle of every block, shape (m,)."""
+    middle = np.arange(blocks.mean.size) * blocks.length + blocks.length // 2
+    return np.minimum(middle, blocks.raw_u.size - 1)
 
 
 def _course(axles: Sequence[_Axle], scale: float) -> Array | None:
@@ -136,7 +143,7 @@ def _course(axles: Sequence[_Axle], scale: float) -> Array | None:
     return course if told and all(after < _BETTER * before for before, after in told) else None
 
 
-def _rising(values: Array, weights: Array) -> Array:
+def _rising(values: NDArray[np.floating[Any]], weights: NDArray[np.floating[Any]]) -> Array:
     """The values that never fall, nearest to some by weighted squares (pool adjacent violators); both of shape (knots,)."""
     pools: list[list[float]] = []  # mean, weight, number
     for value, weight in zip(values.tolist(), weights.tolist(), strict=True):
