@@ -23,16 +23,24 @@ _LEAVES = ("phi", "phi_true", "u_applied")
 _TURNS = 8  # rows over which a channel turns
 _STEPS = 2.0  # rounding steps from row to row, from which on every new reading is another one
 _FEW = 30  # rows in which it turns
+_LONGEST_S = 0.1  # of a controller's cycle
 _OFTEN = 1.5  # rows to a reading: less is no cycle
 
 
 def with_news(timeline: Timeline, machine: Machine) -> Timeline:
-    """A timeline on which only renewed readings of the steering are fresh; the same one where all of them are."""
-    names = [f"steer.{axle}.{leaf}" for axle in machine.axles for leaf in _LEAVES]
+    """A timeline on which only renewed readings of the steering are fresh; the same one where all of them are.
+
+    One controller reads the sensors of all axles: what one of them renews more rarely than another one is its fault.
+    """
     found = {}
-    for name in names:
-        y = timeline.get(name)
-        if y is not None and (held := cycle(y, timeline.fresh[name])) is not None:
+    for leaf in _LEAVES:
+        names = [f"steer.{axle}.{leaf}" for axle in machine.axles]
+        known = [(name, y) for name in names if (y := timeline.get(name)) is not None]
+        cycles = [cycle(y, timeline.fresh[name]) for name, y in known]
+        held = min((c for c in cycles if c is not None), default=0.0)
+        if not held or None in cycles or held * timeline.dt > _LONGEST_S:
+            continue
+        for name, y in known:
             status = np.where(timeline.fresh[name] & np.isfinite(y), PAIR, SKIP).astype(np.int8)
             found[name] = news_alone(status, y, np.full(y.size, held), 1.0) == PAIR
     return replace(timeline, fresh={**timeline.fresh, **found}) if found else timeline

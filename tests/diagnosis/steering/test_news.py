@@ -5,7 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from diagnosis.steering.news import cycle
+from diagnosis.steering.news import cycle, with_news
+from replay.machine.config import haulotte
+from replay.signals.timeline import Timeline
 
 TIME = np.arange(0.0, 40.0, 0.005)
 ANGLE = 0.3 * np.sin(0.7 * TIME)
@@ -40,3 +42,33 @@ def test_a_resting_axle_tells_none() -> None:
 def test_rows_that_come_more_rarely_than_steps_count_in_steps() -> None:
     fresh = np.arange(TIME.size) % 4 == 0
     assert cycle(read(ANGLE, 12), fresh) == 12
+
+
+def timeline(front: np.ndarray, rear: np.ndarray) -> Timeline:
+    signals = {"steer.front.phi": front, "steer.rear.phi": rear}
+    return Timeline(0, 5_000_000, TIME.size, signals, dict.fromkeys(signals, EVERY), dict.fromkeys(signals, "log"), {})
+
+
+def test_one_controller_reads_both_axles() -> None:
+    found = with_news(timeline(read(ANGLE, 4), read(-ANGLE, 4)), haulotte())
+    for fresh in found.fresh.values():
+        assert fresh.mean() == pytest.approx(0.25, abs=0.02)
+
+
+def test_a_sensor_that_alone_is_renewed_rarely_stays_as_it_is() -> None:
+    for rear in (read(-ANGLE, 1), read(-ANGLE, 2)):
+        line = timeline(read(ANGLE, 4), rear)
+        rarely = with_news(line, haulotte()).fresh["steer.front.phi"]
+        assert rarely.mean() >= 0.5
+
+
+def test_what_both_repeat_for_longer_than_a_cycle_is_no_cycle() -> None:
+    line = timeline(read(ANGLE, 40), read(-ANGLE, 40))
+    assert with_news(line, haulotte()) is line
+
+
+def test_a_frozen_sensor_still_delivers() -> None:
+    frozen = read(ANGLE, 4)
+    frozen[4000:6000] = frozen[3999]
+    fresh = with_news(timeline(frozen, read(-ANGLE, 4)), haulotte()).fresh["steer.front.phi"]
+    assert fresh[4000:6000].sum() > 200
