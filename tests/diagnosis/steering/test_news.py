@@ -59,7 +59,7 @@ def test_a_sensor_that_alone_is_renewed_rarely_stays_as_it_is() -> None:
     for rear in (read(-ANGLE, 1), read(-ANGLE, 2)):
         line = timeline(read(ANGLE, 4), rear)
         rarely = with_news(line, haulotte()).fresh["steer.front.phi"]
-        assert rarely.mean() >= 0.5
+        assert rarely.mean() > 0.3  # by the quicker one, or not at all
 
 
 def test_what_both_repeat_for_longer_than_a_cycle_is_no_cycle() -> None:
