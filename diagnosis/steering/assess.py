@@ -21,13 +21,12 @@ from diagnosis.steering.driven import driven_by
 from diagnosis.steering.evidence import evidence_columns, path_angle
 from diagnosis.steering.filter_state import SteeringPath
 from diagnosis.steering.findings import SideFindings, apart, findings_of
-from diagnosis.steering.identification import identify_plants
 from diagnosis.steering.inputs import AxleInputs, Counts, axle_inputs
 from diagnosis.steering.measured_twice import of_one_cause
 from diagnosis.steering.model_error import ModelError, model_error
 from diagnosis.steering.models import model_of
 from diagnosis.steering.news import with_news
-from diagnosis.steering.pace import Speed, body_speed, with_pace
+from diagnosis.steering.pace import Speed, body_speed, identified
 from diagnosis.steering.path import AxleFilter, allowed_models, most_probable
 from diagnosis.steering.path_refinement import refine_path
 from diagnosis.steering.plant import SteeringPlant
@@ -45,7 +44,6 @@ from replay.signals.timeline import Timeline
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
-_PACES = 2  # times that a plant is identified again, at the pace that the last one tells
 _SIDES = (Side.SENSOR, Side.ACTUATOR)
 _OTHERWISE = (
     "The axles do not move as any model of them says, even where it fits best: only faults that a measurement of the same "
@@ -173,14 +171,7 @@ def _identified(
     progress(Progress(Stage.IDENTIFYING_STEERING))
     noises = [a.noise for a, _ in modelled]
     known = [None if (k := machine.steering.get(a.name)) is None else plant_before(k) for a, _ in modelled]
-    blocks = [b for _, b in modelled]
-    plants = identify_plants(blocks, noises, machine.max_steer, known)
-    for _ in range(_PACES):
-        paced = with_pace(blocks, noises, plants, speed, machine)
-        if all(new is old for new, old in zip(paced, blocks, strict=True)):
-            break
-        blocks = paced
-        plants = identify_plants(blocks, noises, machine.max_steer, known)
+    blocks, plants = identified([b for _, b in modelled], noises, speed, machine, known)
     of = dict(zip([a.name for a, _ in modelled], blocks, strict=True))
     return [replace(a, blocks=of.get(a.name)) for a in axles], dict(zip(of, plants, strict=True))
 

@@ -9,8 +9,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from diagnosis.steering.blocks import SensorNoise, SteeringBlocks, blocks_of
-from diagnosis.steering.identification import identify_plants
-from diagnosis.steering.pace import with_pace
+from diagnosis.steering.pace import identified
 from diagnosis.steering.valve_map import ValveMap, rate_at
 from replay.machine.config import haulotte
 
@@ -40,9 +39,8 @@ def axle(seed: int, scrub: float = 0.0, lost: tuple[float, float, float] = (0.0,
 
 
 def paced(axles: list[SteeringBlocks]) -> list[SteeringBlocks]:
-    noises = [NOISE] * len(axles)
-    plants = identify_plants(axles, noises, MACHINE.max_steer, [None] * len(axles))
-    return with_pace(axles, noises, plants, lambda steps: SPEED[steps], MACHINE)
+    noises, nothing = [NOISE] * len(axles), [None] * len(axles)
+    return identified(axles, noises, lambda steps: SPEED[steps], MACHINE, nothing)[0]
 
 
 def test_scrub_is_found_of_both_axles_alike() -> None:
