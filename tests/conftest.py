@@ -14,6 +14,7 @@ from hypothesis import settings
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 from replay.arrays.kernel_cache import drop_own_stale_kernels
+from tests.campaigns import long_ones
 
 # Examples are not timed: other work on the machine, such as compiling, would fail them.
 settings.register_profile("untimed", deadline=None)
@@ -43,10 +44,11 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     """Leave the long tests out where they are not asked for."""
     if config.getoption("--long"):
         return
-    left_out = [item for item in items if item.get_closest_marker("long")]
+    left_out = long_ones(items)
     if left_out:
         config.hook.pytest_deselected(items=left_out)
-        items[:] = [item for item in items if not item.get_closest_marker("long")]
+        apart = set(left_out)
+        items[:] = [item for item in items if item not in apart]
 
 
 @pytest.fixture(scope="session")

@@ -31,7 +31,7 @@ def table(evidence: EvidenceLevel) -> list[str]:
 
 
 @pytest.mark.parametrize("evidence", ["base", "spool", "direct"])
-@pytest.mark.parametrize("rows", campaign([2, 600, 5000, 30, 200, 1200, 3500], 3))
+@pytest.mark.parametrize("rows", campaign([2, 5000, 600, 30, 200, 1200, 3500], 2))
 def test_a_few_seconds_clear_nothing(tmp_path: Path, evidence: EvidenceLevel, rows: int) -> None:
     path = tmp_path / "short.csv"
     path.write_text("\n".join(table(evidence)[: rows + 1]) + "\n", encoding="utf-8")

@@ -47,6 +47,7 @@ def told(parts: dict[str, tuple[Assessment, Assessment]]) -> list[tuple[str, Fin
     return list(found.values())
 
 
+@pytest.mark.turns("wheels")
 @pytest.mark.parametrize("wheels", [TWO, WHEELS])
 @pytest.mark.parametrize(("share", "mode"), [(0.6, FaultMode.INEFFICIENT), (0.0, FaultMode.NO_SIGNAL)])
 def test_a_drive_is_at_fault_where_the_body_turns_as_the_reading_says(

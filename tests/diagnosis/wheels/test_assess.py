@@ -71,6 +71,7 @@ def specs(row: str) -> tuple[FaultSpec, FaultSpec]:
     )
 
 
+@pytest.mark.turns("coupling")
 @BOTH
 @pytest.mark.parametrize("row", ROWS)
 def test_each_row_is_found_on_its_side_and_wheel(row: str, coupling: str) -> None:

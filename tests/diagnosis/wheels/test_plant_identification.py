@@ -13,6 +13,7 @@ from diagnosis.wheels.plant_constants import PlantFit
 from diagnosis.wheels.plant_identification import identify_plants
 from diagnosis.wheels.plant_windows import Drive
 from replay.machine.config import WheelPlant
+from tests.campaigns import campaign
 
 DT, SECONDS, SPAN, FINE = 0.01, 120.0, 0.36, 5
 WHEELS = 4
@@ -167,7 +168,7 @@ def test_a_wheel_without_channels_has_no_plant() -> None:
     assert [p is None for p in fit.plants] == [False, False, True, False]
 
 
-@pytest.mark.parametrize("more", range(4))
+@pytest.mark.parametrize("more", campaign(range(4)))
 def test_missions_of_any_length_are_identified(more: int) -> None:
     """The last row of the last window may be of fewer blocks than the others."""
     whole = driven(2.5, 0.3, PLAY)
