@@ -14,6 +14,11 @@ def campaign(values: Iterable[object], short: int = 1) -> list[ParameterSet]:
     return [pytest.param(value, marks=[pytest.mark.long] if k >= short else []) for k, value in enumerate(values)]
 
 
+def campaign_of_rows(rows: Iterable[Sequence[object]], short: int = 1) -> list[ParameterSet]:
+    """The same of parameters that go together: each row has a value of each."""
+    return [pytest.param(*row, marks=[pytest.mark.long] if k >= short else []) for k, row in enumerate(rows)]
+
+
 def long_ones(items: Sequence[pytest.Item]) -> list[pytest.Item]:
     """Tests that run with `--long` alone: by their mark, or as combinations that have no turn.
 

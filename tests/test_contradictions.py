@@ -25,7 +25,7 @@ from replay.signals.timeline import align
 from replay.simulation.options import EvidenceLevel, SimulationOptions
 from replay.simulation.run import simulate_mission
 from tests import fleet_samples as samples
-from tests.campaigns import campaign
+from tests.campaigns import campaign_of_rows
 from tests.contradictions import contradictions
 from tests.fleet_contradictions import fleet_contradictions
 
@@ -53,7 +53,7 @@ def result() -> tuple[Document, Columns]:
 
 
 @pytest.mark.parametrize(
-    ("evidence", "seed"), campaign([("base", 1), ("spool", 2000), ("direct", 2), ("direct", 2000)], 3)
+    ("evidence", "seed"), campaign_of_rows([("base", 1), ("spool", 2000), ("direct", 2), ("direct", 2000)], 3)
 )
 def test_missions_with_many_faults_do_not_contradict_themselves(evidence: EvidenceLevel, seed: int) -> None:
     found, columns = diagnosed(evidence, seed)

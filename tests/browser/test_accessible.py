@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from tests.campaigns import campaign
+from tests.campaigns import campaign, campaign_of_rows
 
 pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
 
@@ -32,7 +32,7 @@ def breaches(page: Any, axe: str) -> list[str]:
 
 @pytest.mark.parametrize(
     ("name", "width", "theme"),
-    campaign([("five_faults", 1280, "light"), ("not_assessed", 420, "dark"), ("five_faults", 1280, "dark")], 2),
+    campaign_of_rows([("five_faults", 1280, "light"), ("not_assessed", 420, "dark"), ("five_faults", 1280, "dark")], 2),
 )
 def test_no_breach_of_any_rule(open_page: OPEN, axe: str, name: str, width: int, theme: str) -> None:
     address = "#fault=F1&t=20,50&plots=wheel.FR.v,wheel.FR.u;path.x" if name == "five_faults" else ""
