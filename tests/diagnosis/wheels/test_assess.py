@@ -17,7 +17,7 @@ from replay.simulation.options import EvidenceLevel, SimulationOptions
 from replay.simulation.run import simulate_mission
 
 PAPER = haulotte()
-RATE, SECONDS = 1000, 40.0
+RATE, SECONDS = 500, 40.0
 Key = tuple[str, str]
 
 
