@@ -63,6 +63,7 @@ def compared(own: Array, wheels: int = 1, still: tuple[float, float] = (0.0, 0.0
     return clock, float(np.abs((moved if clock.method == "estimated" else own) - ROS).max())
 
 
+@pytest.mark.turns("wheels")
 @pytest.mark.parametrize("wheels", [1, 3])
 @pytest.mark.parametrize("place", [0.1, 0.25, 0.5, 0.75, 0.9])
 @pytest.mark.parametrize("step", [0.02, 0.1, 0.5, 2.0, 5.0])

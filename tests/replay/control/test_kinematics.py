@@ -63,7 +63,7 @@ def four() -> Geometry:
     return geometry
 
 
-@settings(deadline=None)
+@settings(max_examples=30)
 @given(st.floats(-0.36, 0.36), st.floats(-0.3, 0.3), st.floats(-0.4, 0.4))
 def test_steady_motion_is_exact(v: float, omega: float, offset: float) -> None:
     geometry = Geometry({"W": WheelGeometry(1.05, -0.73, offset, "W")}, 0.854)
