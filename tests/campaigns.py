@@ -22,8 +22,8 @@ def campaign_of_rows(rows: Iterable[Sequence[object]], short: int = 1) -> list[P
 def long_ones(items: Sequence[pytest.Item]) -> list[pytest.Item]:
     """Tests that run with `--long` alone: by their mark, or as combinations that have no turn.
 
-    `pytest.mark.turns("evidence")`: every combination of a test's other parameters runs with one value of this one; all
-    values have their turn, the next one wherever another parameter takes its next value.
+    `pytest.mark.turns("evidence")`: every combination of a test's other parameters runs with one value of this one, and
+    of those that go together with it; all values have their turn, the next one wherever another parameter takes its next value.
     """
     found = [item for item in items if item.get_closest_marker("long")]
     marked = set(found)
@@ -43,13 +43,12 @@ def _places(items: Sequence[pytest.Item]) -> list[tuple[int, int]]:
     (name,) = items[0].get_closest_marker("turns").args  # type: ignore[union-attr]
     together = [mark.args[0] for mark in items[0].iter_markers("parametrize")]
     groups = [names.replace(" ", "").split(",") if isinstance(names, str) else list(names) for names in together]
-    assert [name] in groups, f"{items[0].nodeid}: {name} is no parameter of its own"
+    in_turn = next(k for k, names in enumerate(groups) if name in names)
     seen: list[dict[str, int]] = [{} for _ in groups]
     places = []
     for item in items:
         params = item.callspec.params  # type: ignore[attr-defined]
         values = (repr([params[n] for n in names]) for names in groups)
         at = [known.setdefault(value, len(known)) for known, value in zip(seen, values, strict=True)]
-        own = at[groups.index([name])]
-        places.append((own, sum(at) - own))
+        places.append((at[in_turn], sum(at) - at[in_turn]))
     return places
