@@ -14,10 +14,11 @@ from hypothesis import settings
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 from replay.arrays.kernel_cache import drop_own_stale_kernels
+from tests.campaigns import long_ones
 
 # Examples are not timed: other work on the machine, such as compiling, would fail them.
-settings.register_profile("untimed", deadline=None)
-settings.load_profile("untimed")
+settings.register_profile("short", deadline=None, max_examples=40)
+settings.register_profile("long", deadline=None, max_examples=200)
 
 # Many commands and children are started: bytecode is kept, or each would compile everything that it imports once more.
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
@@ -34,19 +35,21 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--long", action="store_true", help="also tests that repeat a proof over many seeds and machines")
 
 
-def pytest_configure() -> None:
-    """Let no test run what was compiled from former sources."""
+def pytest_configure(config: pytest.Config) -> None:
+    """Let no test run what was compiled from former sources; choose how many examples a property is tried on."""
     drop_own_stale_kernels()
+    settings.load_profile("long" if config.getoption("--long") else "short")
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Leave the long tests out where they are not asked for."""
     if config.getoption("--long"):
         return
-    left_out = [item for item in items if item.get_closest_marker("long")]
+    left_out = long_ones(items)
     if left_out:
         config.hook.pytest_deselected(items=left_out)
-        items[:] = [item for item in items if not item.get_closest_marker("long")]
+        apart = set(left_out)
+        items[:] = [item for item in items if item not in apart]
 
 
 @pytest.fixture(scope="session")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +25,7 @@ from replay.signals.timeline import align
 from replay.simulation.options import EvidenceLevel, SimulationOptions
 from replay.simulation.run import simulate_mission
 from tests import fleet_samples as samples
+from tests.campaigns import campaign_of_rows
 from tests.contradictions import contradictions
 from tests.fleet_contradictions import fleet_contradictions
 
@@ -31,6 +33,7 @@ Document = dict[str, Any]
 Columns = dict[str, NDArray[Any]]
 
 
+@cache
 def diagnosed(evidence: EvidenceLevel, seed: int) -> tuple[Document, Columns]:
     options = SimulationOptions(
         scenario="random", seed=seed, duration_s=60.0, rate_hz=200.0, evidence=evidence, steering_faults=True
@@ -49,7 +52,9 @@ def result() -> tuple[Document, Columns]:
     return diagnosed("direct", 2)
 
 
-@pytest.mark.parametrize(("evidence", "seed"), [("base", 1), ("spool", 2000), ("direct", 2000)])
+@pytest.mark.parametrize(
+    ("evidence", "seed"), campaign_of_rows([("base", 1), ("spool", 2000), ("direct", 2), ("direct", 2000)], 3)
+)
 def test_missions_with_many_faults_do_not_contradict_themselves(evidence: EvidenceLevel, seed: int) -> None:
     found, columns = diagnosed(evidence, seed)
     assert len(found["intervals"]) > 5
@@ -166,7 +171,6 @@ def _two_remedies(d: Document) -> None:
 )
 def test_a_spoilt_result_is_seen(result: tuple[Document, Columns], spoil: Callable[[Document], None]) -> None:
     document, _ = result
-    assert contradictions(document) == []
     changed = copy.deepcopy(document)
     spoil(changed)
     assert contradictions(changed) != []
@@ -208,7 +212,6 @@ def test_plots_that_show_something_else_than_the_findings_are_seen(
     result: tuple[Document, Columns], spoil: Callable[[Document, Columns], None]
 ) -> None:
     document, columns = result
-    assert contradictions(document, columns) == []
     changed = dict(columns)
     spoil(document, changed)
     assert contradictions(document, changed) != []

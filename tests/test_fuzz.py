@@ -31,14 +31,15 @@ from tests.benchmarks.fuzzing.watch import Taken, Watch, below, end, taken_by
 from tests.benchmarks.fuzzing.worker import input_of, lay_out, sound_samples, tried
 
 SEED, COUNT = 7, {"mcap": 30, "rosbag2": 20, "store": 15, "results": 20, "first-look": 15}
+_SHARE = 2  # a half of them without `--long`
 
 
 @pytest.mark.parametrize("name", TARGETS)
-def test_damaged_inputs_end_in_one_stated_way(tmp_path: Path, name: str) -> None:
+def test_damaged_inputs_end_in_one_stated_way(tmp_path: Path, name: str, pytestconfig: pytest.Config) -> None:
     target = TARGETS[name]()
     (corpus := tmp_path / "corpus").mkdir()
     samples = sound_samples(target, corpus)
-    for number in range(COUNT.get(name, 40)):
+    for number in range(COUNT.get(name, 40) // (1 if pytestconfig.getoption("--long") else _SHARE)):
         sample, case, source = input_of(target, samples, SEED, number)
         answer = tried(target, sample, case, source, lay_out(sample, case, tmp_path / str(number)))
         assert not answer["kind"], (number, answer)

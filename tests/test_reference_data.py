@@ -205,6 +205,7 @@ def test_the_motors_controller_is_read_off_its_effort(rig: tuple[Machine, DriveM
     assert model.echo.memory_s == pytest.approx(1.18, rel=0.1)
 
 
+@pytest.mark.turns("number")
 @pytest.mark.parametrize(("number", "known"), [(106, True), (118, True), (106, False)])
 @pytest.mark.parametrize(
     ("mode", "epsilon", "sat", "std"),

@@ -11,6 +11,7 @@ from typing import Any
 import orjson
 import pytest
 
+from tests.campaigns import campaign_of_rows
 from tests.contradictions import contradictions
 
 FOLDER = Path(__file__).resolve().parents[1] / "sample_logs"
@@ -60,7 +61,9 @@ def test_samples_are_diagnosed_as_before(maker: ModuleType, stem: str) -> None:
 
 @pytest.mark.parametrize(
     ("name", "machine"),
-    [("paper.bag", None), ("paper_rosbag2", "haulotte.toml"), ("paper_twincat.csv", "haulotte-twincat.toml")],
+    campaign_of_rows(
+        [("paper_twincat.csv", "haulotte-twincat.toml"), ("paper.bag", None), ("paper_rosbag2", "haulotte.toml")]
+    ),  # that the formats hold the same signals is in every run: tests/replay/export/test_samples.py
 )
 def test_the_papers_mission_is_diagnosed_alike_in_every_format(
     maker: ModuleType, name: str, machine: str | None

@@ -8,6 +8,8 @@ from typing import Any
 
 import pytest
 
+from tests.campaigns import campaign, campaign_of_rows
+
 pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
 
 OPEN = Callable[..., Any]
@@ -30,7 +32,7 @@ def breaches(page: Any, axe: str) -> list[str]:
 
 @pytest.mark.parametrize(
     ("name", "width", "theme"),
-    [("five_faults", 1280, "light"), ("five_faults", 1280, "dark"), ("not_assessed", 420, "dark")],
+    campaign_of_rows([("five_faults", 1280, "light"), ("not_assessed", 420, "dark"), ("five_faults", 1280, "dark")], 2),
 )
 def test_no_breach_of_any_rule(open_page: OPEN, axe: str, name: str, width: int, theme: str) -> None:
     address = "#fault=F1&t=20,50&plots=wheel.FR.v,wheel.FR.u;path.x" if name == "five_faults" else ""
@@ -77,7 +79,7 @@ def test_colours_stand_out(open_page: OPEN, theme: str) -> None:
                 assert (light + 0.05) / (dark + 0.05) >= least, (f, b)
 
 
-@pytest.mark.parametrize("name", ["decided", "no_faults"])
+@pytest.mark.parametrize("name", campaign(["decided", "no_faults"]))
 def test_no_breach_with_everything_unfolded(open_page: OPEN, axe: str, name: str) -> None:
     page = open_page(name, width=1280)
     page.evaluate("document.querySelectorAll('details').forEach(d => { d.open = true; })")

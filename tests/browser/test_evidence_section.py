@@ -7,6 +7,8 @@ from typing import Any
 
 import pytest
 
+from tests.campaigns import campaign
+
 playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
 expect = playwright.expect
 
@@ -63,7 +65,7 @@ def test_injected_faults_are_announced(open_page: OPEN) -> None:
 
 
 @pytest.mark.parametrize("script", [True, False])
-@pytest.mark.parametrize("width", [360, 420])
+@pytest.mark.parametrize("width", campaign([360, 420]))
 def test_narrow_screens_scroll_down_only(open_page: OPEN, width: int, script: bool) -> None:
     page = open_page("decided", width=width, script=script)
     if script:

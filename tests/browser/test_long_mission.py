@@ -12,6 +12,7 @@ import pytest
 
 from tests.browser.downloads import saved
 from tests.browser.evidence_samples import SPIKES, spikes, spikes_long
+from tests.campaigns import campaign
 
 playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
 expect = playwright.expect
@@ -37,7 +38,7 @@ def shown(page: Any, low: float, high: float, column: str = "wheel.FR.v") -> lis
     return curve
 
 
-@pytest.mark.parametrize("name", ["spikes", "spikes_long"])
+@pytest.mark.parametrize("name", campaign(["spikes_long", "spikes"]))
 def test_three_milliseconds_are_seen_at_every_zoom(open_page: OPEN, name: str) -> None:
     page = open_page(name, "#fault=F1&t=0,120&plots=wheel.FR.v")
     page.locator("#signals-figure .main-svg").first.wait_for()

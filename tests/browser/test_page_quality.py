@@ -10,6 +10,8 @@ from typing import Any
 
 import pytest
 
+from tests.campaigns import campaign
+
 pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
 
 OPEN = Callable[..., Any]
@@ -31,7 +33,7 @@ NAMELESS = """() => [...document.querySelectorAll('input,select,textarea,button,
     e.labels?.length || e.title)).map(e => e.outerHTML.slice(0, 80))"""
 
 
-@pytest.mark.parametrize("width", [320, 420, 1280])
+@pytest.mark.parametrize("width", campaign([320, 1280, 420], 2))
 def test_targets_can_be_hit_and_nothing_scrolls_sideways(open_page: OPEN, width: int) -> None:
     for name in ("five_faults", "not_assessed"):
         page = open_page(name, width=width)
@@ -94,7 +96,7 @@ def test_nothing_moves_where_motion_is_unwanted(open_page: OPEN) -> None:
     assert "smooth" not in page.evaluate("asked")
 
 
-@pytest.mark.parametrize("paper", ["A4", "Letter"])
+@pytest.mark.parametrize("paper", campaign(["A4", "Letter"]))
 def test_prints_on_two_pages(open_page: OPEN, paper: str) -> None:
     page = open_page("five_faults")
     pdf = page.pdf(format=paper, print_background=True)

@@ -226,6 +226,7 @@ main()
 """
 
 
+@pytest.mark.turns("asked")
 @pytest.mark.skipif(os.name == "nt", reason="POSIX signals")
 @pytest.mark.parametrize("asked", ["SIGINT", "SIGTERM"])
 @pytest.mark.parametrize(

@@ -27,7 +27,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @cache
 def log_of(folder: Path, evidence: str) -> Path:
     path = folder / f"{evidence}.mcap"
-    options = SimulationOptions(scenario="random", seed=5, duration_s=40.0, evidence=evidence)  # type: ignore[arg-type]
+    options = SimulationOptions(scenario="random", seed=5, duration_s=20.0, evidence=evidence)  # type: ignore[arg-type]
     write_mission(simulate_mission(options), path, "mcap")
     return path
 
@@ -73,15 +73,15 @@ def test_blocks_change_nothing(folder: Path, monkeypatch: pytest.MonkeyPatch, ev
 def test_long_missions_show_envelopes(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     log = log_of(folder, "direct")
     whole = in_one_piece(log)
-    monkeypatch.setattr(envelope, "FULL_STEPS", 10_000)
-    monkeypatch.setattr(envelope, "_BUCKETS", 6_000)
+    monkeypatch.setattr(envelope, "FULL_STEPS", 5_000)
+    monkeypatch.setattr(envelope, "_BUCKETS", 3_000)
     short = diagnose([log], haulotte())
     assert short.report["log"].pop("samples_per_bucket") == 8
     same(whole.report, short.report)
     assert whole.columns.keys() == short.columns.keys()
-    assert len(whole.columns["t"]) == 40_000
+    assert len(whole.columns["t"]) == 20_000
     rows = {len(x) for x in short.columns.values()}
-    assert rows == {10_000}
+    assert rows == {5_000}
     assert_allclose(np.diff(short.columns["t"]), 0.004)
     for name in ("wheel.FR.v", "evidence.FR.sensor.residual", "replay.FR.u"):
         buckets = whole.columns[name].reshape(-1, 8)

@@ -17,12 +17,13 @@ from diagnosis.pipeline import diagnose
 from diagnosis.results.document import ReportDocument
 from replay.errors import ConfigError
 from replay.machine.config import haulotte
+from tests.campaigns import campaign
 from tests.schemas import unknown_keys
 
 SAMPLES = Path(__file__).resolve().parents[2] / "sample_logs"
 
 
-@pytest.fixture(scope="module", params=["paper.mcap", "healthy_ice.mcap", "base.mcap", "spool.mcap"])
+@pytest.fixture(scope="module", params=campaign(["paper.mcap", "base.mcap", "healthy_ice.mcap", "spool.mcap"], 2))
 def report(request: pytest.FixtureRequest) -> ReportDocument:
     return diagnose([SAMPLES / request.param], haulotte()).report
 

@@ -16,6 +16,7 @@ from replay.arrays.column_store import ColumnStore
 from replay.faults import FaultMode, Side, State
 from replay.machine.config import haulotte
 from replay.signals.timeline import Timeline
+from tests.campaigns import campaign
 
 SAMPLES = Path(__file__).resolve().parents[2] / "sample_logs"
 MS = 1_000_000
@@ -81,7 +82,7 @@ def test_a_fault_that_was_hardly_seen_is_none() -> None:
     assert out.states[297] == CODE[State.NOT_ASSESSED]
 
 
-@pytest.mark.parametrize("place", [0.35, 0.5])
+@pytest.mark.parametrize("place", campaign([0.35, 0.5]))
 def test_a_lost_chunk_is_no_fault(tmp_path: Path, place: float) -> None:
     data = bytearray((SAMPLES / "healthy_ice.mcap").read_bytes())
     data[int(len(data) * place)] ^= 0xFF

@@ -111,7 +111,7 @@ def test_healthy_mission_at_full_rate_is_ready(seed: int) -> None:
     assert (got["verdict"]["status"] == "ready") == (min(decided) >= PAPER.limits.min_assessed and shown)
 
 
-@pytest.mark.parametrize("evidence", ["direct", "base"])
+@pytest.mark.parametrize("evidence", campaign(["base", "direct"]))
 def test_shifting_the_clock_shifts_the_stamps_alone(evidence: EvidenceLevel) -> None:
     here, there = judged(evidence), diagnose_mission(in_memory(simulated(evidence), SHIFT_NS), PAPER)
     first, second = document(here), document(there)
@@ -138,7 +138,7 @@ def rounded(value: Any) -> Any:
     return [rounded(v) for v in value] if isinstance(value, list) else value
 
 
-@pytest.mark.parametrize("evidence", ["direct", "base"])
+@pytest.mark.parametrize("evidence", campaign(["base", "direct"]))
 def test_permuting_the_wheels_permutes_the_result_alone(evidence: EvidenceLevel) -> None:
     order = ("RL", "FR", "RR", "FL")
     straight = judged(evidence)
@@ -164,8 +164,8 @@ def test_same_files_give_the_same_bytes_at_any_time_wherever_they_lie(
     for path in (here, there):
         path.parent.mkdir(parents=True)
         write_mission(mission, path, "mcap")
-    first, second, elsewhere = (orjson.dumps(diagnose([path], PAPER).report) for path in (here, here, there))
-    assert first == second == elsewhere
+    first, elsewhere = (orjson.dumps(diagnose([path], PAPER).report) for path in (here, there))
+    assert first == elsewhere
     text = first.decode()
     assert str(tmp_path) not in text
     assert not re.search(r'"/(tmp|home|root|Users)/', text)

@@ -92,7 +92,7 @@ def test_what_cannot_be_done_is_said(
 
 
 def test_a_mission_of_an_unknown_law_needs_its_name(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    log = made(tmp_path, "--controller", "fuzzy")
+    log = made(tmp_path, "--controller", "fuzzy", "--duration", "25")
     words = ["--controller", "p", "--draws", "0"]
     assert run(["counterfactual", str(log), *words]) == 3
     assert "--recorded" in capsys.readouterr().err

@@ -21,6 +21,7 @@ from diagnosis.audit.isolation.run import run_isolated
 from diagnosis.audit.store.outcome import Outcome
 from diagnosis.audit.store.store import Store
 from replay.machine.config import haulotte
+from tests.campaigns import campaign
 from tests.diagnosis.audit import samples
 from tests.diagnosis.audit.samples import asked_for, missions, run
 
@@ -65,14 +66,15 @@ def test_children_that_others_end_are_no_crash_and_are_done_by_the_next_audit(tm
     assert [p.name for p in (tmp_path / "out" / ".work").iterdir()] == ["claims"]
 
 
-def test_audits_that_are_ended_lose_nothing_that_they_acknowledged(tmp_path: Path) -> None:
+@pytest.mark.parametrize("kills", campaign([1, 3]))
+def test_audits_that_are_ended_lose_nothing_that_they_acknowledged(tmp_path: Path, kills: int) -> None:
     draw, told = random.Random(20261), list[str]()
     temporary = tmp_path / "temporary"
     temporary.mkdir()
     places = (Path(samples.__file__).parents[3], Path(samples.__file__).parent)
     environment = os.environ | {"TMPDIR": str(temporary), "PYTHONPATH": os.pathsep.join(map(str, places))}
     words = [sys.executable, "-c", _AUDIT, str(tmp_path / "logs"), str(tmp_path / "out"), *_WORKS]
-    for kill in (True, True, True, False):
+    for kill in (*[True] * kills, False):
         with subprocess.Popen(words, env=environment, stdout=subprocess.PIPE, text=True) as process:
             assert process.stdout is not None
             for line in process.stdout:

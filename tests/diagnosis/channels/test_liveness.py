@@ -19,6 +19,7 @@ from replay.signals.signal import Signal, Signals
 from replay.signals.timeline import align
 from replay.simulation.options import EvidenceLevel, SimulationOptions
 from replay.simulation.run import simulate_mission
+from tests.campaigns import campaign_of_rows
 
 START = 1_760_000_000_000_000_000
 N = 3000  # samples of 2 ms
@@ -101,7 +102,8 @@ def test_table_holds_quantities_that_came_apart() -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "evidence"), [("mcap", "direct"), ("mcap", "base"), ("twincat", "base"), ("csv", "base")]
+    ("name", "evidence"),
+    campaign_of_rows([("mcap", "direct"), ("csv", "base"), ("mcap", "base"), ("twincat", "base")], 2),
 )
 def test_lost_bursts_are_no_signal_of_nothing(tmp_path: Path, name: str, evidence: EvidenceLevel) -> None:
     options = SimulationOptions(
@@ -119,6 +121,7 @@ def test_lost_bursts_are_no_signal_of_nothing(tmp_path: Path, name: str, evidenc
     assert {s["state"] for s in report["states"]} >= {"healthy", "no_data"}
 
 
+@pytest.mark.turns("silent")
 @pytest.mark.parametrize("silent", ["drop", "nan"])
 @pytest.mark.parametrize("name", [f for f in FORMATS if f != "parquet"])
 def test_silent_sensor_is_found_in_every_format(tmp_path: Path, name: str, silent: Literal["drop", "nan"]) -> None:

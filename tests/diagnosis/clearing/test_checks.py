@@ -41,6 +41,7 @@ def test_a_healthy_mission_passes_all_checks_and_says_what_it_would_have_shown()
     assert 0.25 < response.shows < 0.5
 
 
+@pytest.mark.turns("base")
 @pytest.mark.parametrize("base", [True, False])
 @pytest.mark.parametrize(
     ("component", "side", "mode", "epsilon", "sat"),

@@ -17,6 +17,7 @@ from diagnosis.results.detectability import Deviation
 from diagnosis.results.machine_words import HYDRAULIC
 from replay.faults import FaultMode, FaultSpec, Side
 from replay.simulation.options import SimulatedMission
+from tests.campaigns import campaign_of_rows
 from tests.diagnosis.clearing.missions import LENGTH, in_cells, simulated
 
 _COLUMNS = {
@@ -42,15 +43,18 @@ def _found(mission: SimulatedMission, part: str, *, base: bool) -> bool:
 
 @pytest.mark.parametrize(
     ("part", "side", "base", "length"),
-    [
-        ("FR", Side.SENSOR, False, 2.0),
-        ("FR", Side.SENSOR, False, 10.0),
-        ("FR", Side.ACTUATOR, False, 2.0),
-        ("FR", Side.ACTUATOR, False, 10.0),
-        ("FR", Side.SENSOR, True, 2.0),
-        ("FR", Side.SENSOR, True, 10.0),
-        ("rear", Side.SENSOR, False, 10.0),
-    ],
+    campaign_of_rows(
+        [
+            ("FR", Side.SENSOR, False, 2.0),
+            ("FR", Side.ACTUATOR, False, 10.0),
+            ("FR", Side.SENSOR, True, 2.0),
+            ("rear", Side.SENSOR, False, 10.0),
+            ("FR", Side.SENSOR, False, 10.0),
+            ("FR", Side.ACTUATOR, False, 2.0),
+            ("FR", Side.SENSOR, True, 10.0),
+        ],
+        4,
+    ),
 )
 def test_a_loss_is_found_from_the_size_that_is_stated(part: str, side: Side, base: bool, length: float) -> None:
     mission, name = simulated(), _COLUMNS[part, side]

@@ -54,7 +54,7 @@ def test_an_uncertain_lambda_is_not_written() -> None:
 @pytest.fixture(scope="module")
 def pi_missions() -> list[Mission]:
     out = []
-    for seed in (1, 2, 3):
+    for seed in (1, 2):
         made = simulate_mission(
             SimulationOptions(
                 scenario="healthy",

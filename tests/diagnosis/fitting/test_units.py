@@ -14,6 +14,7 @@ from replay.signals.signal import Signal, Signals
 from replay.signals.timeline import align
 from replay.simulation.options import SimulatedMission, SimulationOptions
 from replay.simulation.run import simulate_mission
+from tests.campaigns import campaign_of_rows
 
 WHEELS = ("FR", "FL", "RR", "RL")
 R = 0.427
@@ -44,24 +45,26 @@ def each(leaf: str, factor: float) -> dict[str, float]:
 SPEED = {f"plant.{w}" for w in WHEELS} | {"control", "geometry"}
 CASES: list[tuple[str, dict[str, float], tuple[str, ...], set[str]]] = [
     ("motor speed", each("v", 17.7), ("gear ratio 17.7", 'at = "motor"'), SPEED),
-    ("motor read at wheel", each("v", 1 / 17.7), ("gear ratio 17.7", 'at = "wheel"'), SPEED),
     ("rad/s as m/s", each("v", 1 / R), ("wheel radius 0.427 m", 'unit = "rad/s"'), SPEED),
+    ("one wheel", {"wheel.FR.v": 17.7}, ("wheel.FR.v,", "gear ratio"), {"plant.FR", "control", "geometry"}),
+    ("flipped valve", {"wheel.RL.u": -1.0}, ("wheel.RL.u,", "gain = -1"), {"plant.RL", "control"}),
+    ("percent", each("u", 100.0), ('unit = "%"',), {"plant.FR", "control"}),
+    ("degrees", {"steer.front.phi": 180 / np.pi}, ("steer.front.phi,", 'unit = "deg"'), {"geometry"}),
+    ("flipped angle", {"steer.rear.phi": -1.0}, ("steer.rear.phi,", "gain = -1"), {"geometry"}),
+    ("motor read at wheel", each("v", 1 / 17.7), ("gear ratio 17.7", 'at = "wheel"'), SPEED),
     ("m/s as rad/s", each("v", R), ("wheel radius 0.427 m", 'unit = "m/s"'), SPEED),
     ("rpm as rad/s", each("v", 60 / 2 / np.pi), ("rpm read as rad/s", 'unit = "rpm"'), SPEED),
     ("command rpm", each("v_ref", 60 / 2 / np.pi), ("v_ref", "rpm read as rad/s"), {"plant.FR", "control"}),
     ("both rad/s", each("v", 1 / R) | each("v_ref", 1 / R), ("wheel radius 0.427 m",), SPEED),
-    ("one wheel", {"wheel.FR.v": 17.7}, ("wheel.FR.v,", "gear ratio"), {"plant.FR", "control", "geometry"}),
     ("flipped", {"wheel.FR.v": -1.0}, ("wheel.FR.v,", "gain = -1"), {"plant.FR", "control", "geometry"}),
-    ("flipped valve", {"wheel.RL.u": -1.0}, ("wheel.RL.u,", "gain = -1"), {"plant.RL", "control"}),
-    ("percent", each("u", 100.0), ('unit = "%"',), {"plant.FR", "control"}),
     ("no percent", each("u", 0.01), ('unit = "fraction"',), {"plant.FR", "control"}),
-    ("degrees", {"steer.front.phi": 180 / np.pi}, ("steer.front.phi,", 'unit = "deg"'), {"geometry"}),
     ("no degrees", {"steer.rear.phi": np.pi / 180}, ("steer.rear.phi,", 'unit = "rad"'), {"geometry"}),
-    ("flipped angle", {"steer.rear.phi": -1.0}, ("steer.rear.phi,", "gain = -1"), {"geometry"}),
 ]
 
 
-@pytest.mark.parametrize(("factors", "words", "kept"), [c[1:] for c in CASES], ids=[c[0] for c in CASES])
+@pytest.mark.parametrize(
+    ("factors", "words", "kept"), campaign_of_rows([c[1:] for c in CASES], 7), ids=[c[0] for c in CASES]
+)
 def test_a_wrong_unit_is_named(
     drive: SimulatedMission, factors: dict[str, float], words: tuple[str, ...], kept: set[str]
 ) -> None:
@@ -75,7 +78,9 @@ def test_a_wrong_unit_is_named(
     assert result.unit_errors[0].text in fit_toml(result)
 
 
-@pytest.mark.parametrize(("factor", "word"), [(1 / R, "wheel radius"), (17.7, "gear ratio"), (1 / 17.7, "gear ratio")])
+@pytest.mark.parametrize(
+    ("factor", "word"), campaign_of_rows([(1 / R, "wheel radius"), (17.7, "gear ratio"), (1 / 17.7, "gear ratio")], 2)
+)
 def test_speed_and_command_wrong_alike_without_the_bodys_command(
     drive: SimulatedMission, factor: float, word: str
 ) -> None:

@@ -12,6 +12,7 @@ from diagnosis.response.inputs import cells
 from diagnosis.results.assessment import Assessment, Finding
 from replay.faults import FaultMode, Side
 from replay.machine.config import Limits
+from tests.campaigns import campaign
 from tests.diagnosis.response.robot import DT, TRACK, WHEELS, followers_of, geometry, speeds
 
 Array = NDArray[np.float64]
@@ -47,6 +48,7 @@ def told(parts: dict[str, tuple[Assessment, Assessment]]) -> list[tuple[str, Fin
     return list(found.values())
 
 
+@pytest.mark.turns("wheels")
 @pytest.mark.parametrize("wheels", [TWO, WHEELS])
 @pytest.mark.parametrize(("share", "mode"), [(0.6, FaultMode.INEFFICIENT), (0.0, FaultMode.NO_SIGNAL)])
 def test_a_drive_is_at_fault_where_the_body_turns_as_the_reading_says(
@@ -59,7 +61,7 @@ def test_a_drive_is_at_fault_where_the_body_turns_as_the_reading_says(
     assert mode in {f.mode for _, f in found}
 
 
-@pytest.mark.parametrize("wheels", [TWO, WHEELS])
+@pytest.mark.parametrize("wheels", campaign([WHEELS, TWO]))
 def test_a_sensor_is_at_fault_where_the_body_turns_as_commanded(wheels: tuple[str, ...]) -> None:
     found = told(judged(wheels, wheels[1], 0.6, (60.0, 85.0), sensor=True))
     assert {w for w, _ in found} == {wheels[1]}

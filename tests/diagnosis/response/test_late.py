@@ -40,7 +40,7 @@ def late(y: Array, delay: float) -> Array:
     return out
 
 
-@pytest.mark.parametrize("delay", [0.8, 0.9])
+@pytest.mark.parametrize("delay", campaign([0.8, 0.9]))
 @pytest.mark.parametrize("seed", campaign([31, 32, 33]))
 def test_a_late_speed_is_named_with_its_delay_and_blames_no_other_wheel(seed: int, delay: float) -> None:
     measured, asked, body = speeds(seed)

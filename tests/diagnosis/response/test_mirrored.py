@@ -14,6 +14,7 @@ from diagnosis.response.mirrored import Mirrored, mirrored
 from replay.faults import FaultMode
 from replay.machine.config import Limits
 from replay.machine.geometry import Geometry, WheelGeometry
+from tests.campaigns import campaign
 
 Array = NDArray[np.float64]
 
@@ -50,6 +51,7 @@ def held(data: dict[str, FollowerData]) -> Mirrored:
     return mirrored(data, {w: x for w, x in answers.items() if x is not None}, GEOMETRY, cell_of(DT), DT)
 
 
+@pytest.mark.turns("wheel")
 @pytest.mark.parametrize("wheel", list(SIDES))
 @pytest.mark.parametrize("share", [0.0, 0.5])
 def test_a_wheel_that_fails_in_all_turns_is_found_by_what_the_other_one_makes_of_them(wheel: str, share: float) -> None:
@@ -62,7 +64,7 @@ def test_a_wheel_that_fails_in_all_turns_is_found_by_what_the_other_one_makes_of
     assert any(f.mode is mode and f.start < SPELL.stop and SPELL.start < f.stop for _, f in found)
 
 
-@pytest.mark.parametrize("skids", [0.8, 1.0, 1.8])
+@pytest.mark.parametrize("skids", campaign([1.8, 1.0, 0.8]))
 def test_healthy_sides_answer_alike_however_they_skid(skids: float) -> None:
     data = drive(2, skids)
     assert held(data).doubts == {}

@@ -59,7 +59,7 @@ def test_a_wheel_that_reads_half_of_its_speed_is_told_beside_the_yaw_rate(wheel:
     assert {w for w, _ in told(measured, yaw, 3)} == {wheel}
 
 
-@pytest.mark.parametrize("shift", [0.3, -0.3])
+@pytest.mark.parametrize("shift", campaign([0.3, -0.3]))
 @pytest.mark.parametrize("seed", campaign([3, 11]))
 def test_a_shifted_wheel_that_its_command_contradicts_too_is_not_the_gyros_fault(shift: float, seed: int) -> None:
     measured, asked, body = speeds(seed, PAIR)

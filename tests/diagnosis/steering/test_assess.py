@@ -63,6 +63,7 @@ def test_healthy_steering_gives_no_finding_and_its_angle() -> None:
     assert not result.doubtful.any()
 
 
+@pytest.mark.turns("evidence")
 @pytest.mark.parametrize(
     "fault",
     [
@@ -88,7 +89,7 @@ def test_a_fault_is_found_on_its_side_and_nowhere_else(fault: FaultSpec, evidenc
     assert finding.stop * timeline.dt == pytest.approx(27.0, abs=0.2)
 
 
-@pytest.mark.parametrize("rate", [100.0, 200.0])
+@pytest.mark.parametrize("rate", campaign([100.0, 200.0]))
 @pytest.mark.parametrize("seed", campaign([2, 4]))
 def test_a_held_axle_in_a_slow_log_is_no_dead_valve(rate: float, seed: int) -> None:
     # the position does not follow, sample by sample, the jitter that the log shows of a faster controller's command
@@ -97,7 +98,7 @@ def test_a_held_axle_in_a_slow_log_is_no_dead_valve(rate: float, seed: int) -> N
     assert [f.mode for a in result.assessments.values() for f in a.findings] == []
 
 
-@pytest.mark.parametrize("std", [0.01, 0.03])
+@pytest.mark.parametrize("std", campaign([0.01, 0.03]))
 def test_a_noisy_sensor_in_a_slow_log_makes_no_valve_faults(std: float) -> None:
     fault = front(Side.SENSOR, FaultMode.NOISY, 0.45, std=std)
     options = SimulationOptions(

@@ -7,6 +7,7 @@ import pytest
 from numpy.typing import NDArray
 
 from replay.faults import FaultMode, Side
+from tests.campaigns import campaign
 from tests.diagnosis.steering.test_assess import front, judged, mission_of
 
 
@@ -30,11 +31,14 @@ def test_a_healthy_axle_stays_within_its_thresholds() -> None:
 
 @pytest.mark.parametrize(
     "fault",
-    [
-        front(Side.ACTUATOR, FaultMode.STUCK, sat=0.05),
-        front(Side.ACTUATOR, FaultMode.NO_SIGNAL),
-        front(Side.SENSOR, FaultMode.INEFFICIENT, epsilon=0.5),
-    ],
+    campaign(
+        [
+            front(Side.ACTUATOR, FaultMode.STUCK, sat=0.05),
+            front(Side.ACTUATOR, FaultMode.NO_SIGNAL),
+            front(Side.SENSOR, FaultMode.INEFFICIENT, epsilon=0.5),
+        ],
+        2,
+    ),
     ids=lambda f: f"{f.side.value} {f.mode.value}",
 )
 def test_a_fault_is_beyond_its_threshold(fault: object) -> None:

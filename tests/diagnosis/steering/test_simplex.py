@@ -8,6 +8,7 @@ from numpy.testing import assert_array_equal
 from scipy.optimize import minimize as oracle
 
 from diagnosis.steering.simplex import minimize
+from tests.campaigns import campaign
 
 
 def rosenbrock(x: np.ndarray) -> float:
@@ -24,7 +25,7 @@ def valley(x: np.ndarray) -> float:
 
 @pytest.mark.parametrize("function", [rosenbrock, steps, valley])
 @pytest.mark.parametrize("calls", [2, 5, 17, 45, 46, 47, 400])
-@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("seed", campaign(range(5)))
 def test_same_calls_and_result_as_scipy(function: object, calls: int, seed: int) -> None:
     start = np.random.default_rng(seed).normal(size=(4, 3)) * 2
     asked: list[list[np.ndarray]] = [[], []]

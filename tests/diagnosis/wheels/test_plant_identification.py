@@ -13,6 +13,7 @@ from diagnosis.wheels.plant_constants import PlantFit
 from diagnosis.wheels.plant_identification import identify_plants
 from diagnosis.wheels.plant_windows import Drive
 from replay.machine.config import WheelPlant
+from tests.campaigns import campaign, campaign_of_rows
 
 DT, SECONDS, SPAN, FINE = 0.01, 120.0, 0.36, 5
 WHEELS = 4
@@ -100,7 +101,7 @@ def check_map(fit: PlantFit, rtol: float) -> None:
         assert_allclose(unseen[1:3], 0.0)
 
 
-@pytest.mark.parametrize(("tau", "play"), [(0.25, 0.0), (0.12, PLAY)])
+@pytest.mark.parametrize(("tau", "play"), campaign_of_rows([(0.12, PLAY), (0.25, 0.0)]))
 def test_wheels_off_the_ground_are_found_to_be_free(tau: float, play: float) -> None:
     fit = found(driven(0.0, tau, play))
     check_map(fit, 0.08)
@@ -132,7 +133,7 @@ def test_wheels_on_the_ground_show_their_grip() -> None:
         assert plant.hysteresis == pytest.approx(PLAY, abs=0.0101)
 
 
-@pytest.mark.parametrize("grip", [0.0, 2.5])
+@pytest.mark.parametrize("grip", campaign([2.5, 0.0]))
 def test_half_of_the_windows_may_be_faulty(grip: float) -> None:
     drive = driven(grip, 0.25, PLAY)
     fit = found(faulty(drive, 0.5))
@@ -167,7 +168,7 @@ def test_a_wheel_without_channels_has_no_plant() -> None:
     assert [p is None for p in fit.plants] == [False, False, True, False]
 
 
-@pytest.mark.parametrize("more", range(4))
+@pytest.mark.parametrize("more", campaign(range(4)))
 def test_missions_of_any_length_are_identified(more: int) -> None:
     """The last row of the last window may be of fewer blocks than the others."""
     whole = driven(2.5, 0.3, PLAY)

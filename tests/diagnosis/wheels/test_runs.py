@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_array_equal
 
@@ -135,7 +135,6 @@ def test_ends_at_which_nothing_could_be_seen_are_not_the_faults() -> None:
     pieces=st.lists(st.tuples(st.integers(0, MODELS - 1), st.integers(1, 120)), min_size=1, max_size=12),
     seed=st.integers(0, 1000),
 )
-@settings(max_examples=80, deadline=None)
 def test_runs_leave_no_gap(pieces: list[Piece], seed: int) -> None:
     path = path_of(*pieces)
     rng = np.random.default_rng(seed)

@@ -79,6 +79,7 @@ def judged(columns: dict[str, Array], *, placed: bool) -> dict[Key, Assessment]:
 PLACED = pytest.mark.parametrize("placed", [True, False])
 
 
+@pytest.mark.turns("placed")
 @PLACED
 @pytest.mark.parametrize(("seed", "dead"), [(1, 0.0), (2, 0.05)])
 def test_healthy_wheels_have_no_fault(seed: int, dead: float, *, placed: bool) -> None:
@@ -91,6 +92,7 @@ def test_healthy_wheels_have_no_fault(seed: int, dead: float, *, placed: bool) -
         assert not np.isin(part.states, faults).any()
 
 
+@pytest.mark.turns("placed")
 @PLACED
 @pytest.mark.parametrize("side", [Side.SENSOR, Side.ACTUATOR])
 @pytest.mark.parametrize("mode", [FaultMode.STUCK, FaultMode.NO_SIGNAL, FaultMode.INEFFICIENT])
@@ -106,6 +108,7 @@ def test_a_fault_stays_with_its_wheel_and_time(side: Side, mode: FaultMode, *, p
         assert [(f.side, f.mode) for f in found] == [(side, mode)]
 
 
+@pytest.mark.turns("placed")
 @PLACED
 @pytest.mark.parametrize("side", [Side.SENSOR, Side.ACTUATOR])
 def test_a_loss_may_be_of_either_side(side: Side, *, placed: bool) -> None:

@@ -12,6 +12,7 @@ from replay.clocks.align import estimate
 from replay.clocks.source_clock import SourceClock
 from replay.log.source_options import SignalSource
 from replay.signals.signal import Signal
+from tests.campaigns import campaign
 
 Array = NDArray[np.float64]
 
@@ -63,6 +64,7 @@ def compared(own: Array, wheels: int = 1, still: tuple[float, float] = (0.0, 0.0
     return clock, float(np.abs((moved if clock.method == "estimated" else own) - ROS).max())
 
 
+@pytest.mark.turns("wheels")
 @pytest.mark.parametrize("wheels", [1, 3])
 @pytest.mark.parametrize("place", [0.1, 0.25, 0.5, 0.75, 0.9])
 @pytest.mark.parametrize("step", [0.02, 0.1, 0.5, 2.0, 5.0])
@@ -113,7 +115,7 @@ def test_a_pause_of_the_recording_is_no_jump(wheels: int) -> None:
     assert clock.offset_s == pytest.approx(-0.3, abs=2e-3)
 
 
-@pytest.mark.parametrize("wheels", [1, 3])
+@pytest.mark.parametrize("wheels", campaign([1, 3]))
 def test_a_recording_that_often_loses_samples_is_aligned(wheels: int) -> None:
     kept = np.abs(ROS % 5.0 - 2.5) > 0.03
     ros = {
@@ -131,6 +133,7 @@ def test_a_pause_after_which_nothing_moves_stays_open() -> None:
     assert "clock that was set" in clock.reason
 
 
+@pytest.mark.turns("change")
 @pytest.mark.parametrize("change", [30e-6, -30e-6])
 @pytest.mark.parametrize("place", [20.0, 45.0, 70.0])
 def test_a_drift_that_changes_stays_within_the_bound(change: float, place: float) -> None:

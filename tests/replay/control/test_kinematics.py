@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 import sympy as sp
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
@@ -63,7 +63,6 @@ def four() -> Geometry:
     return geometry
 
 
-@settings(deadline=None)
 @given(st.floats(-0.36, 0.36), st.floats(-0.3, 0.3), st.floats(-0.4, 0.4))
 def test_steady_motion_is_exact(v: float, omega: float, offset: float) -> None:
     geometry = Geometry({"W": WheelGeometry(1.05, -0.73, offset, "W")}, 0.854)
@@ -174,7 +173,6 @@ def test_fixed_wheels_roll_ahead() -> None:
     assert_allclose(got.speed[2], [-0.1, 0.1])  # the track is 1 m wide at the wheels
 
 
-@settings(deadline=None)
 @given(st.floats(0.05, 0.36), st.sampled_from([1.0, -1.0]), st.floats(-0.06, 0.06))
 def test_axle_angles_give_back_the_wheels_angles(speed: float, sign: float, omega: float) -> None:
     got = commands(np.full(3, sign * speed), np.full(3, omega), four())

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.integrate import solve_ivp
@@ -139,7 +139,6 @@ def test_signed_and_opposed_differ_beyond_the_command() -> None:
 SPEEDS = st.floats(-0.4, 0.4)
 
 
-@settings(deadline=None)
 @given(
     law=st.sampled_from(LAWS),
     rows=st.lists(st.tuples(SPEEDS, SPEEDS, st.floats(-0.2, 0.5)), min_size=1, max_size=20),

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_array_equal
 
@@ -44,7 +44,6 @@ def test_even_samples_are_taken_as_they_are() -> None:
     assert got.get("wheel.FL.v") is None
 
 
-@settings(deadline=None)
 @given(jitter=st.lists(st.floats(-0.45, 0.45), min_size=20, max_size=20))
 def test_jitter_below_half_a_step_moves_no_sample(jitter: list[float]) -> None:
     stamps = every(10, 41)
@@ -191,7 +190,6 @@ def test_signal_without_samples_is_absent() -> None:
     assert "wheel.FL.v" not in got.signals
 
 
-@settings(deadline=None)
 @given(shift=st.integers(-(10**18), 10**18), drop=st.sets(st.integers(1, 58), max_size=30))
 def test_shifting_the_clock_shifts_the_start_alone(shift: int, drop: set[int]) -> None:
     kept = np.array([k for k in range(60) if k not in drop])

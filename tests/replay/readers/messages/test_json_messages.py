@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from mcap.writer import Writer
 
@@ -69,13 +69,11 @@ VALUES = st.recursive(
 )  # fmt: skip
 
 
-@settings(max_examples=200, deadline=None)
 @given(st.lists(st.dictionaries(KEYS, VALUES, max_size=4), min_size=1, max_size=8))
 def test_columns_are_the_plain_walks_numbers(values: list[Any]) -> None:
     assert columns([json.dumps(v).encode() for v in values]) == expected(values)
 
 
-@settings(max_examples=200, deadline=None)
 @given(
     st.lists(
         st.sampled_from(['{"a":[{}', "{}]}", "{},{}", '{"a":1}', "", "1", "[", "]", '{"a":2}', "\xff"]), min_size=1

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from mcap.writer import Writer
 
@@ -219,7 +219,6 @@ STATES = st.recursive(
 ).map(lambda fields: STATE(**fields))
 
 
-@settings(max_examples=60, deadline=None)
 @given(st.lists(STATES, min_size=1, max_size=6))
 def test_columns_are_the_oracles_numbers(states: list[Any]) -> None:
     outcome = Outcome()
@@ -249,7 +248,6 @@ def damaged(draw: st.DrawFn) -> bytes:
     return bytes(raw)
 
 
-@settings(max_examples=100, deadline=None)
 @given(st.lists(damaged(), min_size=1, max_size=4), st.sampled_from(["robot.State", "old.State"]))
 def test_damaged_payloads_give_the_oracles_numbers_or_none(payloads: list[bytes], name: str) -> None:
     outcome = Outcome()
@@ -268,7 +266,6 @@ def test_damaged_payloads_give_the_oracles_numbers_or_none(payloads: list[bytes]
     assert outcome.bad >= refused
 
 
-@settings(max_examples=100, deadline=None)
 @given(st.lists(st.binary(max_size=30), min_size=1, max_size=8))
 def test_any_bytes_give_the_oracles_numbers_or_none(payloads: list[bytes]) -> None:
     rows = columns("robot.State", payloads, Outcome())
@@ -385,7 +382,6 @@ def test_schemas_that_do_not_serve_are_told(
     assert any("/state is not decoded" in note for note in log.summary.notes)
 
 
-@settings(max_examples=100, deadline=None)
 @given(st.data())
 def test_damaged_schemas_are_refused_or_read_in_bounds(data: st.DataObject) -> None:
     raw = bytearray(DESCRIPTORS.SerializeToString())

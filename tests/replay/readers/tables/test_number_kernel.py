@@ -7,7 +7,7 @@ import struct
 
 import numpy as np
 import pytest
-from hypothesis import example, given, settings
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from replay.readers.tables.number_kernel import BAD, FLOAT, HARD, INTEGER, number
@@ -31,7 +31,6 @@ def check(text: str) -> int:
     return kind
 
 
-@settings(deadline=None)
 @given(st.floats(allow_nan=False, allow_infinity=False))
 @example(5e-324)
 @example(2.2250738585072014e-308)
@@ -42,7 +41,6 @@ def test_every_double_comes_back(value: float) -> None:
     check(repr(value))
 
 
-@settings(deadline=None)
 @given(st.integers(0, 10**25), st.integers(-345, 345))
 def test_digits_and_exponents(digits: int, exponent: int) -> None:
     check(f"{digits}e{exponent}")

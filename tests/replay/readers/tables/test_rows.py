@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from replay.arrays.column_store import ColumnStore
@@ -48,7 +48,6 @@ def parsed(text: bytes, width: int, dialect: Dialect, cuts: int) -> tuple[Rows, 
     return rows, [c.finish() for c in columns]
 
 
-@settings(deadline=None, max_examples=300)
 @given(
     st.data(),
     st.sampled_from("\t;|"),
