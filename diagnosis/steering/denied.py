@@ -20,6 +20,7 @@ from replay.faults import FaultMode, Side
 
 _SHAKEN = 2.0  # times the usual power of what changes from reading to reading
 _RESTLESS = 0.1  # share of changing readings from which on a sensor lives
+_EDGE = 0.15  # of a finding
 _MOTION_S, _LATEST_S, _FEW_MOTIONS = 0.5, 0.3, 6  # of an angle, and by how much it may be later than its command
 _OBEYS = 0.8  # correlation
 _AT_END, _REACHED, _STAYS = (
@@ -132,8 +133,9 @@ def _not_brief(findings: tuple[Finding, ...], dt: float, *, twice: bool) -> tupl
 
 
 def _trembles(finding: Finding, inputs: AxleInputs) -> bool:
-    """Whether the last digits of a reading go on changing, as those of a stuck sensor do not."""
-    part = slice(finding.start, finding.stop)
+    """Whether the last digits of a reading go on changing, as those of a stuck sensor do not; its ends may come late."""
+    edge = round(_EDGE * (finding.stop - finding.start))
+    part = slice(finding.start + edge, finding.stop - edge)
     known = np.isfinite(inputs.angle[part])
     y = inputs.angle[part][known & inputs.fresh[part]]
     return bool(y.size > 1 and np.mean(known) > _READ and np.mean(np.diff(y) != 0.0) > _RESTLESS)
