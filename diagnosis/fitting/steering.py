@@ -8,10 +8,12 @@ from dataclasses import replace
 import numpy as np
 
 from diagnosis.fitting.machine import Constant
-from diagnosis.steering.blocks import SteeringBlocks, blocks_of, sensor_noise
+from diagnosis.steering.blocks import SensorNoise, SteeringBlocks, blocks_of, sensor_noise
 from diagnosis.steering.identification import LONG_S, SHORT_S, AxleWindows, fit_axles
+from diagnosis.steering.news import with_news
+from diagnosis.steering.pace import body_speed, identified
 from diagnosis.steering.prior import axle_plant_of
-from diagnosis.steering.windows import windows_of
+from diagnosis.steering.windows import Windows, windows_of
 from replay.machine.axle_plant import AxlePlant
 from replay.machine.config import Machine, Noise
 from replay.signals.timeline import Timeline
@@ -32,30 +34,35 @@ def fit_steering(timelines: Sequence[Timeline], machine: Machine, bad: set[str])
     bad : set[str]
         Signals with wrong units; axles that rest on them are left out.
     """
-    names, windows = [], []
-    for name in machine.axles:
-        channels = {f"steer.{name}.{leaf}" for leaf in ("phi", "u")}
-        found = [w for t in timelines if (w := _windows(t, name, machine)) is not None] if not channels & bad else []
-        if found:
-            names.append(name)
-            windows.append(AxleWindows(tuple(w for w, _ in found), tuple(w for _, w in found)))
+    usable = [name for name in machine.axles if not {f"steer.{name}.{leaf}" for leaf in ("phi", "u")} & bad]
+    found: dict[str, list[tuple[Windows, Windows]]] = {}
+    for timeline in timelines:
+        for name, pair in _windows(with_news(timeline, machine), usable, machine).items():
+            found.setdefault(name, []).append(pair)
+    names = [name for name in machine.axles if name in found]
+    windows = [AxleWindows(tuple(w for w, _ in found[name]), tuple(w for _, w in found[name])) for name in names]
     plants = fit_axles(windows)
     return {n: axle_plant_of(p) for n, p in zip(names, plants, strict=True) if p is not None and p.reliable}
 
 
-def _windows(timeline: Timeline, axle: str, machine: Machine):  # type: ignore[no-untyped-def]
-    """Long and short windows of an axle in one mission; None where command or angle are not logged."""
-    channel = f"steer.{axle}.phi"
-    y, u = timeline.get(channel), timeline.get(f"steer.{axle}.u")
-    if y is None or u is None or not np.isfinite(y).any() or not np.isfinite(u).any():
-        return None
-    fresh = timeline.fresh[channel]
-    always = np.zeros(y.size, dtype=np.bool_)
-    blocks: SteeringBlocks = blocks_of(y, u, fresh, always, timeline.dt, timeline.store)
-    known = machine.noise.get(channel, Noise())
-    noise = sensor_noise(blocks, y[fresh & np.isfinite(y)], known, machine.max_steer)
-    long, short = (windows_of(blocks, noise, machine.max_steer, s) for s in (LONG_S, SHORT_S))
-    return long, short
+def _windows(timeline: Timeline, axles: Sequence[str], machine: Machine) -> dict[str, tuple[Windows, Windows]]:
+    """Long and short windows of the axles of one mission whose command and angle are logged, at the pace of its speed of driving."""
+    known: dict[str, tuple[SteeringBlocks, SensorNoise]] = {}
+    for axle in axles:
+        channel = f"steer.{axle}.phi"
+        y, u = timeline.get(channel), timeline.get(f"steer.{axle}.u")
+        if y is None or u is None or not np.isfinite(y).any() or not np.isfinite(u).any():
+            continue
+        fresh = timeline.fresh[channel]
+        blocks = blocks_of(y, u, fresh, np.zeros(y.size, dtype=np.bool_), timeline.dt, timeline.store)
+        stated = machine.noise.get(channel, Noise())
+        known[axle] = blocks, sensor_noise(blocks, y[fresh & np.isfinite(y)], stated, machine.max_steer)
+    given, noises = [b for b, _ in known.values()], [n for _, n in known.values()]
+    paced, _ = identified(given, noises, body_speed(timeline, machine), machine, [None] * len(given))
+    return {
+        axle: (windows_of(b, n, machine.max_steer, LONG_S), windows_of(b, n, machine.max_steer, SHORT_S))
+        for axle, b, n in zip(known, paced, noises, strict=True)
+    }
 
 
 def with_steering(

@@ -105,7 +105,7 @@ def assess_steering(
     """
     timeline = with_news(timeline, machine)
     axles = _evened([axle_inputs(timeline, replay, machine, j, counts) for j in range(len(machine.axles))])
-    axles, plants = _identified(axles, body_speed(timeline, replay, machine), machine, progress)
+    axles, plants = _identified(axles, body_speed(timeline, machine, replay.v_ref), machine, progress)
     scatters = [
         scatter_of(a.blocks, plant) for a in axles if a.blocks is not None and (plant := plants.get(a.name)) is not None
     ]

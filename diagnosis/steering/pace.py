@@ -20,7 +20,6 @@ from diagnosis.steering.identification import LONG_S, identify_plants, usual_rat
 from diagnosis.steering.plant import LEAST_WINDOWS, SteeringPlant
 from diagnosis.steering.plant_fit import moving, tolerance_of
 from diagnosis.steering.windows import Windows, windows_of
-from replay.control.loop import Replay
 from replay.machine.config import Machine
 from replay.signals.timeline import Timeline
 
@@ -39,16 +38,17 @@ _SCRUB = np.array([0.7, 0.8, 0.95, 1.0])  # of heavy machines: from where a map 
 _REFINED = 2  # times
 
 
-def body_speed(timeline: Timeline, replay: Replay, machine: Machine) -> Speed:
-    """Median of the wheels' speeds at given steps [m/s], of their commands where none is known, else 0."""
+def body_speed(timeline: Timeline, machine: Machine, commanded: Array | None = None) -> Speed:
+    """Median of the wheels' speeds at given steps [m/s], of their commands, of shape (n, wheels), where none is known, else 0."""
     measured = [x for w in machine.wheels if (x := timeline.get(f"wheel.{w}.v")) is not None]
 
     def at(steps: NDArray[np.intp]) -> Array:
-        commanded = _median(replay.v_ref[steps])
-        if not measured:
-            return np.nan_to_num(commanded)
-        found = _median(np.column_stack([x[steps] for x in measured]))
-        return np.nan_to_num(np.where(np.isfinite(found), found, commanded))
+        found = np.full(steps.size, np.nan)
+        if measured:
+            found = _median(np.column_stack([x[steps] for x in measured]))
+        if commanded is not None:
+            found = np.asarray(np.where(np.isfinite(found), found, _median(commanded[steps])))
+        return np.asarray(np.nan_to_num(found))
 
     return at
 
