@@ -243,8 +243,9 @@ def _require_something(assessments: Mapping[tuple[str, str], Assessment], missio
             "part of the log, or one in which the machine moves"
         )
     raise NotJudged(
-        f"{names}: speeds of the {machine.part}s are logged, but no command and no second speed beside them, so nothing can be judged; "
-        "log wheel.<W>.v_ref or cmd.v, a valve's wheel.<W>.u, or wheel.<W>.v_true, or name them in the machine file's [signals]"
+        f"{names}: speeds are logged, but no command and no second speed beside them, so nothing can be judged; record the "
+        "commands too (/cmd_vel of a ROS robot; cmd.v or wheel.<W>.v_ref, a valve's wheel.<W>.u) or a second speed "
+        "(wheel.<W>.v_true), or name them in the machine file's [signals]"
     )
 
 

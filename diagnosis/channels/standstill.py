@@ -14,7 +14,7 @@ Flags = NDArray[np.bool_]
 Span = tuple[int, int]
 
 _LEAST_S = 2.0  # longer than drives take to answer
-_STILL = 0.2  # of the driving speed
+STILL = 0.2  # of the driving speed
 _ASKED = 2.0  # driving speeds
 _TAIL_S = 3.0  # a command that has just begun proves nothing
 
@@ -44,7 +44,7 @@ def not_followed(speeds: Sequence[Array], commands: Sequence[Array], driving_spe
     """
     if len(speeds) < 2:
         return []
-    still = np.logical_and.reduce([np.abs(np.nan_to_num(y, nan=np.inf)) <= _STILL * driving_speed for y in speeds])
+    still = np.logical_and.reduce([np.abs(np.nan_to_num(y, nan=np.inf)) <= STILL * driving_speed for y in speeds])
     asked = [np.abs(np.nan_to_num(c)) > _ASKED * driving_speed for c in commands]
     edge = np.flatnonzero(np.diff(np.r_[False, still, False].astype(np.int8)))
     out: list[Span] = []

@@ -133,7 +133,8 @@ def _small_copy(v: Array, reference: Array, dt: float) -> float:
     size = float(np.sqrt(float(a @ a) * float(b @ b)))
     if size <= 0.0 or float(a @ b) / size < _ALIKE:
         return 0.0
-    return float(a @ b) / float(b @ b)
+    share = float(a @ b) / float(b @ b)
+    return share if share * _CLEAR < 1.0 else 0.0  # a larger one moves, and was merely asked for little since
 
 
 def _last_motion(v: Array, reference: Array, lag: int, dt: float) -> tuple[int, bool]:

@@ -14,6 +14,7 @@ from replay.machine.geometry import own_axle
 from replay.setup.draft_notes import Draft
 from replay.setup.one_clock import Lag
 from replay.setup.structure import ONE, Structure
+from replay.signals.candidate import message_field, source_of
 
 _DATED = 10**18  # ns; stamps before are of a clock without a date
 _TOGETHER = 5 * 10**9  # ns; tables of one recorder begin and end together
@@ -23,7 +24,7 @@ _JOINT_TYPES = ("JointState", "DynamicJointState")
 
 def odometry(channels: Mapping[str, Channel]) -> Channel | None:
     """Speed of the body by odometry."""
-    found = [c for c in channels.values() if c.field == "twist.twist.linear.x" and len(c.values) > 1]
+    found = [c for c in channels.values() if message_field(c) == "twist.twist.linear.x" and len(c.values) > 1]
     return min(found, key=lambda c: ("filter" in c.topic, len(c.topic)), default=None)
 
 
@@ -49,7 +50,7 @@ def given_signals(
                 given.setdefault(f"steer.{own_axle(wheel)}.phi", replace(where, unit="rad"))
     whole = odometry(channels)
     if structure.wheels == ONE and "odometry" in structure.how and whole is not None:
-        given["wheel.D.v"] = SignalSource(topic=whole.topic, field=whole.field, unit="m/s")
+        given["wheel.D.v"] = source_of(whole, "m/s")
     for log in logs:
         if len({c.topic for c in log.channels.values()}) == 1 and re.search(
             r"cmd|command", PurePath(log.source).stem, re.I

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
@@ -230,10 +231,11 @@ def largest_angle(draft: Draft, structure: Structure, found: Signals) -> float:
 def with_speeds(draft: Draft, machine: Machine, logs: Sequence[RawLog]) -> Machine:
     """The machine with the top speed that the log shows, and the limits that go with it."""
     found = map_signals(logs, machine).items
-    wheels = [s for n, s in found.items() if n.startswith("wheel.") and n.rpartition(".")[2] in ("v", "v_ref")]
-    asked = _asked(found, machine)
-    tops = sorted(_top(s) for s in wheels)  # one wheel alone is no measure: its sensor may have been wild
-    reached = max(tops[(len(tops) - 1) // 2] if tops else 0.0, asked)
+    measured, commanded = (
+        [s for n, s in found.items() if re.fullmatch(rf"wheel\.\w+\.{x}", n)] for x in ("v", "v_ref")
+    )
+    wheels = [*measured, *commanded]
+    reached = max(_usual_top(measured), _usual_top(commanded), _asked(found, machine))
     top = float(_round(max(_HEADROOM * reached, _LEAST_SPEED)))
     if reached > _ANY_MACHINE:
         fast = [
@@ -267,6 +269,12 @@ def _asked(found: Mapping[str, Signal], machine: Machine) -> float:
     v, omega = found.get("cmd.v"), found.get("cmd.omega")
     side = max((abs(p.y) for p in machine.geometry.wheels.values()), default=0.0) if machine.geometry else 0.0
     return (0.0 if v is None else _top(v)) + (0.0 if omega is None else side * _top(omega) / 2)
+
+
+def _usual_top(wheels: Sequence[Signal]) -> float:
+    """Top speed [m/s] of the middle one: one wheel alone is no measure, its sensor may have been wild."""
+    tops = sorted(_top(s) for s in wheels)
+    return tops[(len(tops) - 1) // 2] if tops else 0.0
 
 
 def _top(signal: Signal) -> float:

@@ -37,3 +37,8 @@ def source_of(channel: Channel, unit: str = "", derivative: bool = False) -> Sig
     if channel.type_name and channel.name != channel.field:
         return SignalSource(symbol=channel.name, unit=unit, derivative=derivative)
     return SignalSource(column=channel.name, unit=unit, derivative=derivative)
+
+
+def message_field(channel: Channel) -> str:
+    """Field of a message, also where a table of one topic holds it: `rostopic echo -p` writes ``field.`` before its names."""
+    return channel.field if channel.topic else channel.name.strip().removeprefix("field.")

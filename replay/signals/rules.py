@@ -11,7 +11,7 @@ from replay.log.raw_log import Channel
 from replay.log.source_options import SignalSource
 from replay.machine.config import Machine
 from replay.machine.signal_table import signal_of
-from replay.signals.candidate import Candidate, source_of
+from replay.signals.candidate import Candidate, message_field, source_of
 from replay.signals.name_parts import axle_of, first_indices, index_of, is_drive, is_steering, wheel_of
 from replay.signals.name_words import ASKING, tokens
 from replay.signals.symbol_rules import by_symbol
@@ -28,6 +28,13 @@ _COMMON_PACKAGES = frozenset(
         *("foxglove_msgs", "lifecycle_msgs", "statistics_msgs", "service_msgs", "theora_image_transport"),
     )
 )
+#: Fields that only one type of message has, by which a table of its topic is known.
+_EXPORTED = {
+    "twist.twist.linear.x": ("odom.v", "m/s"),
+    "pose.pose.position.x": ("odom.x", "m"),
+    "pose.pose.position.y": ("odom.y", "m"),
+    "angular_velocity.z": ("imu.yaw_rate", "rad/s"),
+}
 _WORDS_REF = re.compile(r"ref|cmd|command|set|des|target|soll|demand")
 
 
@@ -44,6 +51,9 @@ def candidates(channels: Mapping[str, Channel], machine: Machine) -> Iterator[Ca
         yield from _by_canonical(channel, machine)
         if channel.topic:
             yield from _by_message(channel, machine, channels)
+        elif (told := _EXPORTED.get(message_field(channel))) is not None:
+            yield Candidate(told[0], source_of(channel, told[1]), 1, "a field of a message, in a table of its topic")
+            continue
         if channel.topic and channel.type_name.rpartition("/")[2] in MESSAGE_TYPES[:10]:
             continue
         yield from by_symbol(channel, machine, first)

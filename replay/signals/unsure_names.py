@@ -12,6 +12,8 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from enum import StrEnum
 
+import numpy as np
+
 from replay.log.raw_log import Channel
 from replay.log.source_options import SignalSource
 from replay.machine.config import Machine
@@ -73,13 +75,13 @@ class Unsure:
     def reason(self) -> str:
         """Why it is not taken, and the line of [signals] to write if it is what it seems."""
         line = signal_line(self.signal, _as_written(self))
-        return f"{self.origin.label!r} {_REASONS[self.kind].format(beside=self.beside)}, write {line}"
+        return f"{self.origin.label!r} {_REASONS[self.kind].format(beside=self.beside, unit=self.origin.unit)}, write {line}"
 
 
 _REASONS = {
     Open.CURRENT: "is a valve's current or voltage, which is no opening by itself; with gain = 1 / the one that opens it fully",
     Open.COUNTS: "counts an encoder's steps, and how many make a turn is not known; with gain = 6.2832 / the steps of a turn",
-    Open.POSITION: "may be the position of a wheel, whose slope is its speed; if it is, and in rad",
+    Open.POSITION: "may be the position of a wheel, whose slope is its speed; if it is, and in {unit}",
     Open.SPEED: "has no word for what it holds; if it is a speed, with its unit (m/s, rad/s, rpm, mm/s)",
     Open.MOTION: "may be what the machine is told to do, or what it does (odom.v is its measured speed); if it is the command",
     Open.SECOND: "may be a second sensor beside {beside!r}; if it is",
@@ -170,7 +172,10 @@ def _one(channel: Channel, said: _Said, names: Mapping[str, _Said], measured: se
     """Yield what a channel of a wheel may be, of which no rule for names is sure."""
     v, quantity, words = f"wheel.{said.wheel}.v", _quantity(said.unit), said.words - _THINGS - _MORE - MEASURED
     if words and words <= _STEPS | _PLACES and words & _STEPS and quantity in ("", "angle"):
-        yield Unsure(v, source_of(channel, "", derivative=True), Open.COUNTS)
+        if said.unit or _whole(channel):
+            yield Unsure(v, source_of(channel, "", derivative=True), Open.COUNTS)
+        else:  # steps have no fractions: somebody has made a distance of them
+            yield Unsure(v, source_of(channel, "m", derivative=True), Open.POSITION)
     elif words and words <= _PLACES and said.words & _THINGS and quantity in ("", "angle", "length"):
         signal = f"{v}_position" if v in measured else v
         yield Unsure(signal, source_of(channel, said.unit or "rad", derivative=True), Open.POSITION)
@@ -178,6 +183,12 @@ def _one(channel: Channel, said: _Said, names: Mapping[str, _Said], measured: se
         pair = _pair(said, names)
         if words & _LETTERS or pair:
             yield Unsure(f"{v}_ref" if said.asked == "ref" else v, source_of(channel, said.unit), Open.SPEED, pair)
+
+
+def _whole(channel: Channel) -> bool:
+    """Whether every reading is a whole number, as steps are."""
+    known = channel.values[np.isfinite(channel.values)] if channel.values.dtype.kind == "f" else channel.values[:0]
+    return bool((known == np.rint(known)).all())
 
 
 def _motion(channel: Channel, sure: set[str]) -> Iterator[Unsure]:

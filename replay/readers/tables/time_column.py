@@ -124,7 +124,7 @@ def find_time(
         how = "by its name" if name in called else _course(sample[name], unit)
         report.note(f"{path.name}: time is column {name!r} in {unit}, found {how}; [sources] time and time_unit set it")
         return TimeColumn(name, unit, None, _day(path, sample, name, options, report))
-    for name in called or names:
+    for name in called or [n for n in names if _LIKE_TIME.fullmatch(n.lower())]:
         if rises(sample[name], often=False):
             raise LogError(
                 f"{path} has no time column that rises from row to row; {name!r} rises only now and then: if it counts "

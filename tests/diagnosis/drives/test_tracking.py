@@ -111,3 +111,11 @@ def test_a_small_copy_of_the_command_is_a_wrong_unit_and_no_standstill() -> None
     for one in assess_tracking(np.round(response(25) / 57.3, 4), command(), DT, LIMITS, NAMES):
         assert one.findings == ()
         assert "0.017 of its size: a wrong unit" in one.reasons[State.NOT_ASSESSED]
+
+
+def test_a_drive_that_keeps_the_speed_it_was_told_has_no_wrong_unit() -> None:
+    asked = np.full(N, 0.3)
+    v = 0.297 * np.minimum(1.0, np.arange(N) * DT) + 0.001 * np.random.default_rng(1).normal(size=N)
+    for one in assess_tracking(v, asked, DT, LIMITS, NAMES):
+        assert one.findings == ()
+        assert "wrong unit" not in one.reasons[State.NOT_ASSESSED]

@@ -437,3 +437,23 @@ def test_a_steering_angle_beside_the_only_tachometer_gets_an_axle(tmp_path: Path
     assert draft.machine.max_steer == pytest.approx(0.36, abs=0.01)
     assert any(f"the unsteered wheels is the {axle} axle, which is steered?" in q for q in draft.questions)
     assert not any("left and right" in q for q in draft.questions)
+
+
+@pytest.mark.parametrize("lead", ["", "field."])
+def test_odometry_that_was_exported_as_a_table_is_the_drive_as_a_whole(tmp_path: Path, lead: str) -> None:
+    t = 1_747_151_383_574_611_814 + np.arange(600) * 50_000_000
+    v = np.repeat(np.random.default_rng(1).uniform(0.2, 2.0, 15), 40)
+    columns = {"twist.twist.linear.x": v, "pose.pose.position.x": np.cumsum(v) * 0.05, "pose.pose.position.y": 0.0 * v}
+    table = pd.DataFrame({"%time": t} | {lead + name: x for name, x in columns.items()})
+    table.to_csv(tmp_path / "odom.csv", index=False)
+    draft = read_back(draft_machine(read_everything([tmp_path / "odom.csv"])), tmp_path)
+    assert draft.machine.wheels == ("D",)
+    assert draft.machine.signals["wheel.D.v"].column == f"{lead}twist.twist.linear.x"
+    assert {"odom.x", "odom.y"} <= set(draft.machine.signals)
+
+
+def test_a_machine_that_ignored_its_commands_is_as_fast_as_they_are(tmp_path: Path) -> None:
+    t = np.arange(600) * 0.05
+    pd.DataFrame({"time_s": t, "target_speed": 0.5, "actual_speed": 0.0 * t}).to_csv(tmp_path / "run.csv", index=False)
+    draft = draft_machine(read_everything([tmp_path / "run.csv"]))
+    assert draft.machine.max_speed == pytest.approx(0.6)

@@ -103,3 +103,10 @@ def test_a_command_in_turns_of_the_wheels_is_named(tmp_path: Path) -> None:
 def test_a_speed_that_no_machine_has_names_its_columns(tmp_path: Path) -> None:
     draft = drafted(tmp_path, {"cmd_vel_x": 50 * V, **{f"speed_{s} [m/s]": x for s, x in SIDES.items()}})
     assert any("in which unit is cmd_vel_x?" in q for q in draft.questions)
+
+
+def test_encoders_with_fractions_are_distances(tmp_path: Path) -> None:
+    columns = {f"{s}_enc": np.round(0.05 * turned(s), 4) for s in SIDES}
+    draft = drafted(tmp_path, columns)
+    assert {draft.machine.signals[f"wheel.{w}.v"].unit for w in ("R", "L")} == {"m"}
+    assert any("positions of the wheels" in q for q in draft.questions)

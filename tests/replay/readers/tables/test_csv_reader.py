@@ -344,6 +344,7 @@ def test_parquet_keeps_types(tmp_path: Path) -> None:
     [
         ("t,v\n0,1\n1,2\n", {"time": "zeit"}, "no column 'zeit' for time; its columns are t, v"),
         ("a,b\n5,1\n3,2\n4,0\n", {}, "no time column"),
+        ("throttle,rps\n0,5\n0,3\n0,4\n1,3\n", {}, r"no time column \(none rises\)"),
         ("t,v\n0,1\n1,2\n", {"time": "t", "epoch": "yesterday"}, "not an ISO date"),
         ("t,v\nx,1\ny,2\n", {"time": "t"}, "holds no readable time"),
     ],
