@@ -21,6 +21,7 @@ from sprayer_physics import Array, Build
 
 from replay.faults import FaultSpec
 from replay.log.source_options import SignalSource
+from replay.log.stamp_order import spread_ticks
 from replay.machine.config import Machine
 from replay.machine.toml_file import load_machine
 from replay.signals.signal import Signal, Signals
@@ -204,6 +205,8 @@ def signals(seed: int, faults: Sequence[FaultSpec], duration: float, tier: str) 
     items = {}
     for name, (group, values) in columns.items():
         at, stamps = _rows(rng, n, rates[group], loses, batch)
+        if (spread := spread_ticks(stamps, values[at])) is not None:  # as a reader does
+            stamps = spread[0]
         origin = SignalSource(topic=f"/{group}/{name.split('.')[1]}", field=name)
         items[name] = Signal(name, stamps, np.ascontiguousarray(values[at]), origin, NAME, guessed=False)
     return Signals(items, {}, (), (), open_loop=False)
