@@ -31,6 +31,7 @@ _MOST = 100
 _MOST_STRAYS = 0.05
 _WHOLE_NS = 1_800_000_000_000
 _NEAR_WHOLE = 0.01
+_AT_ONCE = 0.02  # of the mean distance
 
 
 @dataclass
@@ -233,7 +234,7 @@ def _seconds(ns: float) -> str:
 
 
 def spread_ticks(stamps: Stamps, values: Sequence[object] | NDArray[np.generic]) -> tuple[Stamps, int] | None:
-    """Spread samples over the ticks of a coarse clock.
+    """Spread samples over the ticks of a coarse clock, or of a gateway that hands several on at once.
 
     Parameters
     ----------
@@ -247,8 +248,12 @@ def spread_ticks(stamps: Stamps, values: Sequence[object] | NDArray[np.generic])
     tuple[NDArray[np.int64], int] or None
         Stamps, and the clock's tick [ns]; None where equal stamps are too few, or their samples mostly the same.
     """
-    equal = stamps[1:] == stamps[:-1]
-    if len(stamps) < 10 or equal.mean() < 0.3:
+    if len(stamps) < 10:
+        return None
+    equal = np.diff(stamps) <= _AT_ONCE * float(stamps[-1] - stamps[0]) / len(
+        stamps
+    )  # a gateway hands bunches on in some µs
+    if equal.mean() < 0.3:
         return None
     x = np.asarray(values)
     if (x[1:] != x[:-1])[equal].mean() < 0.3:
@@ -266,5 +271,9 @@ def spread_ticks(stamps: Stamps, values: Sequence[object] | NDArray[np.generic])
     width[[0, -1]] = tick / max(usual, float(count[0]), 1.0), tick / max(usual, float(count[-1]), 1.0)
     late = np.zeros(len(first))
     late[0] = max(0.0, tick - count[0] * width[0])  # the first tick was entered in its course
-    out: Stamps = stamps + np.floor(share * np.repeat(width, count) + np.repeat(late, count)).astype(np.int64)
+    if np.any(np.diff(stamps)[equal]):
+        late -= tick  # a gateway hands on what came before
+    out: Stamps = np.repeat(stamps[first], count) + np.floor(
+        share * np.repeat(width, count) + np.repeat(late, count)
+    ).astype(np.int64)
     return out, tick

@@ -26,6 +26,7 @@ MAX_STEPS = 200_000_000
 _LARGEST = 1e9
 _HOLD_PERIODS = 2.5
 _COMMAND_HOLD_NS = 500_000_000
+_BUNCH = 32  # messages that may come at once
 _STANDARD_NS = np.array([1, 2, 4, 5, 8, 10, 20, 25, 40, 50, 100, 200, 500, 1000], dtype=np.int64) * 1_000_000
 
 
@@ -122,8 +123,13 @@ class Timeline:
 
 
 def median_period(stamps: NDArray[np.int64]) -> int:
-    """Median distance of stamps [ns]; 0 for fewer than two. Stamps of shape (n,)."""
-    return int(np.median(np.diff(stamps))) if stamps.size > 1 else 0
+    """Median distance of stamps [ns]; of stamps in bunches, half of the distance on the whole. Stamps of shape (n,); 0 for fewer than two."""
+    if stamps.size < 2:
+        return 0
+    median = int(np.median(np.diff(stamps)))
+    if stamps.size <= 2 * _BUNCH:
+        return median
+    return max(median, int(np.median(stamps[_BUNCH:] - stamps[:-_BUNCH])) // (2 * _BUNCH))
 
 
 class _Periods:

@@ -38,6 +38,7 @@ import forwarder
 import geared_circuit
 import hydrostatic
 import numpy as np
+import sprayer
 from accuracy import EVIDENCE
 from campaign import Outcome, Task, judged
 from foreign_machine import NAME as FOREIGN
@@ -59,7 +60,17 @@ FIRST = {"tuning": 0, "reporting": 2000}
 DEFAULT = "default"
 OTHERS = {
     m.NAME: m
-    for m in (hydrostatic, electrohydraulic, electric, flow_sharing, closed_circuit, geared_circuit, forwarder, dumper)
+    for m in (
+        hydrostatic,
+        electrohydraulic,
+        electric,
+        flow_sharing,
+        closed_circuit,
+        geared_circuit,
+        forwarder,
+        dumper,
+        sprayer,
+    )
 }
 _DRIVEN, _STEERED = 0.06, 0.02  # m/s, rad/s
 _DRIVEN_S, _STEERED_S = 3.0, 1.0
@@ -246,7 +257,7 @@ def main() -> None:
         "--machine",
         nargs="+",
         default=None,
-        help="default, structures, foreign, hydrostatic, electrohydraulic, electric, flow_sharing, closed_circuit, geared_circuit, forwarder, dumper",
+        help="default, structures, foreign, hydrostatic, electrohydraulic, electric, flow_sharing, closed_circuit, geared_circuit, forwarder, dumper, sprayer",
     )
     parser.add_argument("--duration", type=float, default=75.0, help="length of a mission [s]")
     parser.add_argument("--every", type=int, default=1, help="one of so many kinds of trouble")

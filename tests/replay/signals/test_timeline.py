@@ -204,6 +204,8 @@ def test_shifting_the_clock_shifts_the_start_alone(shift: int, drop: set[int]) -
 def test_median_period() -> None:
     assert median_period(np.array([0, 10, 20, 50, 60])) == 10
     assert median_period(np.array([5])) == 0
+    bunches = np.repeat(np.arange(100) * 40_000_000, 8) + np.arange(800) % 8 * 5_000
+    assert 2_000_000 < median_period(bunches) <= 5_000_000
 
 
 def test_a_changed_timeline_keeps_no_columns_of_the_former_one() -> None:
