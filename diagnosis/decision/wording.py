@@ -68,6 +68,12 @@ def _order(faults: Sequence[FaultInterval]) -> str:
     return "Check at the next service" if worst.mode.total else "Check"
 
 
+def remedy_words(fault: FaultInterval, words: MachineWords) -> str:
+    """What the action of a fault comes to, by what is open for it: ``check the FR drive valve (F1) and repair what is found``."""
+    part = f"the {words.part_words(fault.kind, fault.component, fault.side)} ({fault.id})"
+    return f"repair {part}" if fault.severity is Severity.HIGH else f"check {part} and repair what is found"
+
+
 def _urgency(worst: FaultInterval) -> int:
     """Place of a part among the actions, by its worst fault; equal ones keep their order."""
     if worst.severity is Severity.HIGH:

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import re
-
 from diagnosis.comparison.coverage import SideCoverage, sides_of
-from diagnosis.results.document import IntervalRow, ReportDocument, ToClearRow, VerdictRow
+from diagnosis.results.document import IntervalRow, ReportDocument, VerdictRow
 from diagnosis.results.fault_rows import state_label
 from diagnosis.results.machine_words import words_of
 from diagnosis.results.vocabulary import Kind, Leave, Severity, Tier, Verdict
@@ -76,8 +74,6 @@ def _judged_words(share: float, moving: str) -> str:
 
 
 _WORTH_A_WORD = 0.05  # probability of an alternative
-#: Begins a reason that is a fault's own, which the verdict's actions say.
-OF_A_FAULT = re.compile(r"F\d+: ")
 
 
 def _likely(p: float) -> str:
@@ -129,20 +125,14 @@ def judged_means(report: ReportDocument) -> str:
 def _why_none(report: ReportDocument) -> str:
     """Why no part is cleared, to follow *none cleared*."""
     rows = report["verdict"].get("to_clear")
-    if rows is None:
+    if rows is None or any("parts" not in row for row in rows):
         return ", for this report does not say what is open"
     if not any(side.long_enough for side in sides_of(report).values()):
         return ", for none was judged long enough"
-    whole = next((row["reason"] for row in rows if not _named(row, report)), "")
+    whole = next((row["reason"] for row in rows if not row["parts"]), "")
     if whole:
         return f": {whole[:1].lower()}{whole[1:].rstrip('.')}"
     return ", for each that was judged has a fault or is named in what is open"
-
-
-def _named(row: ToClearRow, report: ReportDocument) -> set[str]:
-    """Components that an open point names."""
-    components = {r["component"] for r in report["coverage"]}
-    return {c for c in components if re.search(rf"(?<!\w){re.escape(c.removesuffix('_steer'))}(?!\w)", row["reason"])}
 
 
 def _cleared(report: ReportDocument) -> list[tuple[str, str]]:
@@ -162,25 +152,15 @@ def _cleared(report: ReportDocument) -> list[tuple[str, str]]:
     faulty |= {(row["component"], row["side"]) for row in report["detectability"]["rows"] if row["size"] == 0.0}
     named: set[tuple[str, str]] = set()
     for row in verdict["to_clear"]:
-        if OF_A_FAULT.match(row["reason"]):
+        if row.get("fault"):
             continue  # its part is among the faulty ones
-        mine = _named(row, report)
+        mine = {(p["component"], p["side"]) for p in row.get("parts", [])}
         if not mine:
             return []
-        named |= {(c, s) for c in mine for s in _sides_named(row["reason"], c, report)}
+        named |= mine
     if verdict["status"] == Verdict.NOT_ASSESSED and not named:
         return []
     return [part for part, s in sides_of(report).items() if s.assessed and part not in faulty and part not in named]
-
-
-def _sides_named(reason: str, component: str, report: ReportDocument) -> tuple[str, ...]:
-    """Sides of a component that an open point is of: one where it begins with that part alone, else both."""
-    head = re.split(r"[(:]", reason.removeprefix("Not judged: "), maxsplit=1)[0]
-    kind = Kind.STEER if component in report["machine"]["axles"] else Kind.WHEEL
-    words = words_of(report["machine"])
-    sides = (Side.SENSOR.value, Side.ACTUATOR.value)
-    mine = tuple(s for s in sides if re.search(rf"\b{re.escape(words.part_name(kind, Side(s)))}\b", head))
-    return mine if mine and " or " not in head else sides
 
 
 def _partly(side: SideCoverage) -> bool:

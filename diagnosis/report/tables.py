@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -10,7 +9,6 @@ from markupsafe import Markup
 
 from diagnosis.pages.labels import UNDATED_NS, clock, mode_legend, number, sat_text, utc, utc_mark
 from diagnosis.report.confidence import (
-    OF_A_FAULT,
     going_out,
     headline,
     holds_open,
@@ -179,15 +177,15 @@ def clearing_sentences(verdict: VerdictRow) -> list[tuple[str, str]]:
     rows = [
         r
         for r in verdict.get("to_clear", [])
-        if not _said(r, text) and not (verdict["actions"] and OF_A_FAULT.match(r["reason"]))
+        if not _said(r, text) and not (verdict["actions"] and r.get("fault"))
     ]
     return [(_begun(row["reason"]), "" if row["act"] in text else row["act"]) for row in rows]
 
 
 def _said(row: ToClearRow, text: str) -> bool:
     """Whether the verdict's sentences give a reason, or why parts were not judged together with what would clear them."""
-    why = re.search(r"^Not judged: .* \((.*)\)\.$", row["reason"])
-    return row["reason"] in text or (why is not None and why[1] in text and row["act"] in text)
+    why = row.get("why", "")
+    return row["reason"] in text or (bool(why) and why in text and row["act"] in text)
 
 
 def _begun(text: str) -> str:

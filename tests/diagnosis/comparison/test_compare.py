@@ -342,6 +342,7 @@ def test_gone_in_a_part_of_a_mission_or_beside_an_open_check_is_not_resolved() -
     older = report(fault("FR", "sensor", "stuck"))
     window = later()
     window["verdict"]["scope"] = ["only 29.5 s of 60.0 s of the log were judged"]
+    window["verdict"]["cuts"] = [{"kind": "log", "components": []}]
     open_check = {
         "component": "FR",
         "side": "sensor_or_actuator",
