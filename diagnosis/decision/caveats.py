@@ -10,6 +10,7 @@ import numpy as np
 from diagnosis.decision.severity import halved_words, unanswered
 from diagnosis.decision.short import main_reason, main_state, short_parts, unjudged_axles
 from diagnosis.decision.wording import count_words, join_words
+from diagnosis.results.assessed import Cut
 from diagnosis.results.assessment import Assessment
 from diagnosis.results.clearing import Checked
 from diagnosis.results.detectability import Detectable, Deviation

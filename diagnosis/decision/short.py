@@ -115,7 +115,9 @@ def short_parts(
         judged = _span([decided_s[part] for part in parts], ".1f")
         asked = [needed_s(driven.get(part, 0.0), limits.min_assessed) for part in parts]
         needed = _span(asked if max(asked) - min(asked) >= 1.0 else [max(asked)], ".3g")
-        out.append(ToClear(f"{who}: judged for {judged} s of {words.moving}, of {needed} s needed{why}.", named, tuple(parts)))
+        out.append(
+            ToClear(f"{who}: judged for {judged} s of {words.moving}, of {needed} s needed{why}.", named, tuple(parts))
+        )
     return out
 
 

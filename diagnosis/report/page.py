@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from diagnosis.decision.wording import join_words
 from diagnosis.pages import labels
-from diagnosis.pages.environment import SHARED, asset, environment, shared_style
+from diagnosis.pages.environment import SHARED, asset, environment, shared_style, unbroken
 from diagnosis.pages.scripts import packed, packed_plotly, script_policy
 from diagnosis.pages.svg import icon
 from diagnosis.report import tables
@@ -234,7 +234,7 @@ def _headed(rows: Markup, heads: Sequence[str]) -> Markup:
 
 def _coded(text: str) -> Markup:
     """A text whose commands and names, between backticks, are set as such."""
-    return Markup(re.sub(r"`([^`]+)`", r"<code>\1</code>", str(escape(text))))
+    return Markup(re.sub(r"`([^`]+)`", r"<code>\1</code>", str(escape(unbroken(text)))))
 
 
 @lru_cache

@@ -29,7 +29,7 @@ from diagnosis.report.data_tables import (
     signal_row,
 )
 from diagnosis.report.edges import time_words
-from diagnosis.report.fault_times import when_words
+from diagnosis.report.fault_times import times_words
 from diagnosis.report.judged_parts import judged_sides
 from diagnosis.results.candidates import label_of
 from diagnosis.results.document import (
@@ -154,6 +154,7 @@ def _fault(fault: IntervalRow, words: MachineWords) -> Context:
         ),
         "figures": figures,
         "check": fault.get("check", ""),
+        "size_note": fault.get("size_note", ""),
         "percent": percent(fault["probability"]),
     }
 
@@ -175,9 +176,7 @@ def clearing_sentences(verdict: VerdictRow) -> list[tuple[str, str]]:
     """What keeps the machine from being cleared and what would clear it, but for what the verdict's own sentences and actions say."""
     text = verdict["text"]
     rows = [
-        r
-        for r in verdict.get("to_clear", [])
-        if not _said(r, text) and not (verdict["actions"] and r.get("fault"))
+        r for r in verdict.get("to_clear", []) if not _said(r, text) and not (verdict["actions"] and r.get("fault"))
     ]
     return [(_begun(row["reason"]), "" if row["act"] in text else row["act"]) for row in rows]
 
@@ -227,7 +226,8 @@ def _action(action: ActionRow, intervals: Mapping[str, IntervalRow], report: Rep
         "state": first["mode"] if first else "warning",
         "severity": action["severity"],
         "sure": sure_of(first, report) if first else "",
-        "when": when_words(first, report) if first else "",
+        "of": f" of {first['id']}" if first and len(faults) > 1 else "",
+        "when": times_words([intervals[f] for f in faults], report),
     }
 
 

@@ -198,6 +198,7 @@ class IntervalRow(TypedDict):
     tier: Tier
     detected_s: Seconds | None
     check: NotRequired[str]
+    size_note: NotRequired[str]
 
 
 class StateRow(TypedDict):

@@ -123,7 +123,9 @@ def test_unjudged_steering_has_one_reason() -> None:
     axle = {
         ("front", s): unassessed(N, State.NOT_ASSESSED, "nothing of it is in the log") for s in ("sensor", "actuator")
     }
-    (one,) = told(Reservations(scope=(Cut(CutKind.STEERING, ("front",), "the front steering was not judged"),)), {**PARTS, **axle})
+    (one,) = told(
+        Reservations(scope=(Cut(CutKind.STEERING, ("front",), "the front steering was not judged"),)), {**PARTS, **axle}
+    )
     assert "front steering sensor and front steering valve (nothing of it is in the log)" in one
     assert "log steer.<part>.phi" in one
 
