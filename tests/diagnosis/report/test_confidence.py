@@ -88,6 +88,7 @@ def test_a_fault_of_a_part_that_was_hardly_judged_may_last_for_longer() -> None:
 
 def test_phrase_of_a_verdict() -> None:
     done = samples.report_with(coverage=[row("sensor", 98.0), row("actuator", 90.0, tier="model")])
+    del done["verdict"]["to_clear"]
     assert sure_of_verdict(done) == (
         "All 2 wheel parts were judged, each for at least 90 % of its driving, by second measurements and a model of the "
         "wheels."

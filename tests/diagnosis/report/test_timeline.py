@@ -61,6 +61,7 @@ def test_a_part_that_was_not_judged_long_enough_does_not_count_as_healthy() -> N
     rows = [("sensor", 60.0), ("actuator", 18.0)]
     report = samples.report_with(
         machine={"wheels": ["FR"]},
+        verdict={"status": "watch", "cleared": False, "to_clear": []},
         states=[
             {"component": "FR", "side": side, "state": "healthy", "start_s": 0.0, "stop_s": s, "reason": ""}
             for side, s in rows
