@@ -121,7 +121,7 @@ def to_clear(
     brief = [k for k in steered if k not in {*unjudged, *at_rest} and _brief(k, decided_s, driven, limits)]
     twice = {c for (c, side), a in assessments.items() if a.tier is Tier.DIRECT and side == Side.SENSOR}
     blamed = {k: f for k, c in enumerate(against.open) if (f := _meanwhile(c, faults)) is not None}
-    deviating = _of_faults([(against.open[k], f) for k, f in blamed.items()], words)
+    deviating = _of_faults([(against.open[k], f) for k, f in blamed.items()], faults, words)
     told = {component for component, _ in (*unjudged, *brief)}  # what has them judged lets their checks pass
     left = [c for k, c in enumerate(against.open) if k not in blamed]
     deviating += _of_checks([c for c in left if c.component not in told or not _asks_for_steering(c, twice)], twice)
@@ -163,7 +163,7 @@ def _of_doubts(faults: Sequence[FaultInterval], words: MachineWords) -> list[ToC
     return [
         ToClear(
             f"{f.id}: {doubt}.",
-            f"{remedy_words(f, words)}, then diagnose the next mission",
+            f"{remedy_words(f, faults, words)}, then diagnose the next mission",
             sides_of([(f.component, f.side)]),
             f.id,
         )
@@ -171,7 +171,9 @@ def _of_doubts(faults: Sequence[FaultInterval], words: MachineWords) -> list[ToC
     ]
 
 
-def _of_faults(blamed: Sequence[tuple[Checked, FaultInterval]], words: MachineWords) -> list[tuple[Checked, ToClear]]:
+def _of_faults(
+    blamed: Sequence[tuple[Checked, FaultInterval]], faults: Sequence[FaultInterval], words: MachineWords
+) -> list[tuple[Checked, ToClear]]:
     """Checks that deviate while faults last, or just after, those of one fault together: of each component the furthest beyond its limit.
 
     Each with the furthest of its checks.
@@ -188,7 +190,7 @@ def _of_faults(blamed: Sequence[tuple[Checked, FaultInterval]], words: MachineWo
         fault = mine[0][1]
         point = ToClear(
             f"{when} {name}, which may explain it: {_some([check.text for check, _ in mine])}.",
-            f"{remedy_words(fault, words)}, then diagnose the next mission",
+            f"{remedy_words(fault, faults, words)}, then diagnose the next mission",
             sides_of((check.component, check.side) for check, _ in mine),
         )
         out.append((mine[0][0], point))
