@@ -51,7 +51,16 @@ _FIRST = _ASSETS / "data.js"
 #: Scripts that a page holds packed, and expands when it is opened.
 _MAIN = tuple(
     _ASSETS / name
-    for name in ("figure_looks.js", "plot.js", "export.js", "explorer.js", "sight.js", "address.js", "stage.js", "page.js")
+    for name in (
+        "figure_looks.js",
+        "plot.js",
+        "export.js",
+        "explorer.js",
+        "sight.js",
+        "address.js",
+        "stage.js",
+        "page.js",
+    )
 )
 #: Scripts that it expands when its first plot is drawn.
 _LATER = tuple(
