@@ -70,11 +70,9 @@ def _table(document: FleetDocument) -> Iterator[str]:
 def _words(document: FleetDocument) -> Iterator[str]:
     """One word for one notion, on the page, in the document and in the table."""
     page = re.sub(r"<(script|style).*?</\1>|<[^>]*>", " ", build_fleet_page(document), flags=re.DOTALL)
-    for text in (
-        page,
-        *document["verdict"]["text"],
-        *(f["note"] for f in (document.get("baseline") or {}).get("faults", [])),
-    ):
+    baseline = document["baseline"]
+    notes = [] if baseline is None else [f["note"] for f in baseline["faults"]]
+    for text in (page, *document["verdict"]["text"], *notes):
         if found := re.search(
             r"\bassess\w*|without (control )?signal|too briefly", re.sub(r"[Nn]ot assessed", "", text)
         ):
