@@ -21,7 +21,7 @@ from diagnosis.decision.decide import Decision, decide
 from diagnosis.decision.intervals import intervals_of, spans_of
 from diagnosis.decision.scale import Scale, scale_of
 from diagnosis.decision.wording import join_words
-from diagnosis.results.assessed import AT_TIMES, CUT
+from diagnosis.results.assessed import Cut, CutKind
 from diagnosis.results.assessment import CODE
 from diagnosis.results.clearing import Checked, clearing_rows
 from diagnosis.results.detectability import Detectability, detectability_table
@@ -204,27 +204,34 @@ def _decision(
     )
 
 
-def _scope(judged: Judged) -> tuple[str, ...]:
+def _scope(judged: Judged) -> tuple[Cut, ...]:
     """Why the mission that was judged is not the whole one."""
-    out, line, machine = [], judged.mission.timeline, judged.machine
+    line, machine = judged.mission.timeline, judged.machine
+    out: list[Cut] = []
     left_out = [w for w in machine.wheels if not any(component == w for component, _ in judged.found.assessments)]
     if left_out:
-        out.append(
-            f"the {machine.part}{'s' if len(left_out) > 1 else ''} {', '.join(left_out)} {'were' if len(left_out) > 1 else 'was'} not judged"
-        )
-    unjudged = [axle.removesuffix("_steer") for axle in machine.axles if _unjudged(judged.found, axle)]
-    out += [f"the {join_words(unjudged)} steering was not judged"] if unjudged else []
+        many = len(left_out) > 1
+        text = f"the {machine.part}{'s' if many else ''} {', '.join(left_out)} {'were' if many else 'was'} not judged"
+        out.append(Cut(CutKind.WHEELS, tuple(left_out), text))
+    unjudged = [axle for axle in machine.axles if _unjudged(judged.found, axle)]
+    if unjudged:
+        names = join_words([axle.removesuffix("_steer") for axle in unjudged])
+        out.append(Cut(CutKind.STEERING, tuple(unjudged), f"the {names} steering was not judged"))
     out += [
-        f"{AT_TIMES}{missing * line.dt:.1f} s of {line.size * line.dt:.1f} s, without data, the {axle.removesuffix('_steer')} steering was not judged"
+        Cut(
+            CutKind.DATA,
+            (axle,),
+            f"for {missing * line.dt:.1f} s of {line.size * line.dt:.1f} s, without data, the {axle.removesuffix('_steer')} "
+            "steering was not judged",
+        )
         for axle in machine.axles
         if not _unjudged(judged.found, axle) and (missing := _without_data(judged.found, axle)) > _MISSING * line.size
     ]
     cut = (line.start_ns - judged.recorded.first_ns) * 1e-9
     rest = (judged.recorded.last_ns - line.start_ns) * 1e-9 - line.size * line.dt
     if max(cut, rest) > _CUT_S:
-        out.append(
-            f"{CUT}{line.size * line.dt:.1f} s of {(judged.recorded.last_ns - judged.recorded.first_ns) * 1e-9:.1f} s of the log were judged"
-        )
+        whole = (judged.recorded.last_ns - judged.recorded.first_ns) * 1e-9
+        out.append(Cut(CutKind.LOG, (), f"only {line.size * line.dt:.1f} s of {whole:.1f} s of the log were judged"))
     return tuple(out)
 
 

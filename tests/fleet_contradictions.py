@@ -19,7 +19,7 @@ from diagnosis.results.vocabulary import Leave, Verdict
 
 def fleet_contradictions(document: FleetDocument) -> list[str]:
     """One sentence for each contradiction in a ``fleet.json`` and what is made of it; empty where there is none."""
-    return [*_lists(document), *_headline(document), *_table(document), *_endings(document)]
+    return [*_lists(document), *_headline(document), *_table(document), *_endings(document), *_words(document)]
 
 
 def _lists(document: FleetDocument) -> Iterator[str]:
@@ -65,6 +65,18 @@ def _table(document: FleetDocument) -> Iterator[str]:
         worst = mission["faults"][0] if mission["faults"] else None
         if worst is not None and (row["worst_mode"] == UNCLEAR) != bool(worst.get("unclear")):
             yield f"{mission['name']}: fleet.csv calls its worst fault {row['worst_mode']!r}"
+
+
+def _words(document: FleetDocument) -> Iterator[str]:
+    """One word for one notion, on the page, in the document and in the table."""
+    page = re.sub(r"<(script|style).*?</\1>|<[^>]*>", " ", build_fleet_page(document), flags=re.DOTALL)
+    baseline = document["baseline"]
+    notes = [] if baseline is None else [f["note"] for f in baseline["faults"]]
+    for text in (page, *document["verdict"]["text"], *notes):
+        if found := re.search(
+            r"\bassess\w*|without (control )?signal|too briefly", re.sub(r"[Nn]ot assessed", "", text)
+        ):
+            yield f"the fleet says {text[max(0, found.start() - 40) : found.end() + 20]!r}"
 
 
 def _endings(document: FleetDocument) -> Iterator[str]:

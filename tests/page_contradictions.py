@@ -8,10 +8,13 @@ from typing import Any
 
 from diagnosis.comparison.words import coverage_head
 from diagnosis.report.confidence import going_out, judged
-from diagnosis.report.fault_times import when_words
+from diagnosis.report.fault_times import times_words, when_words
+from diagnosis.report.machine_picture import machine_picture
 from diagnosis.report.tables import clearing_sentences
+from diagnosis.report.timeline import timeline
 
 _END_S = 1.0
+_ALL = 0.99
 
 
 def of_judged(report: Mapping[str, Any]) -> Iterator[str]:
@@ -75,7 +78,63 @@ def of_previous(report: Mapping[str, Any]) -> Iterator[str]:
         yield f"{head}: {both[0]['component']} {both[0]['side']} was in both"
 
 
+def of_standings(report: Mapping[str, Any]) -> Iterator[str]:
+    """How many parts are cleared: in the facts, the timeline's lanes and the picture of the machine."""
+    found = re.match(r"\d+ of \d+ parts judged, (none|\d+) cleared", judged(report))  # type: ignore[arg-type]
+    if found is None:
+        return
+    cleared = 0 if found.group(1) == "none" else int(found.group(1))
+    lanes = timeline(report, report["log"]["duration_s"])  # type: ignore[arg-type]
+    told = re.search(r"(\d+) cleared", lanes.summary)
+    remarked = {(f["component"], side) for f in report["intervals"] if f["severity"] == "info" for side in _sides(f)}
+    if (
+        not cleared - len(remarked) <= (int(told.group(1)) if told else 0) <= cleared
+    ):  # what has a remark has a lane of its own
+        yield f"{found.group(0)!r}, and the timeline: {lanes.summary!r}"
+    of_lanes = [lane.state for lane in lanes.quiet].count("healthy")
+    if of_lanes > cleared:
+        yield f"{found.group(0)!r}, and {of_lanes} lanes of the timeline have the symbol of health"
+    healthy = machine_picture(report).count(">Healthy<")  # type: ignore[arg-type]
+    if 2 * healthy > cleared:
+        yield f"{found.group(0)!r}, and the picture calls {healthy} wheels healthy"
+
+
+def _sides(fault: Mapping[str, Any]) -> tuple[str, ...]:
+    return ("sensor", "actuator") if fault["side"] == "sensor_or_actuator" else (fault["side"],)
+
+
+def of_acts(report: Mapping[str, Any]) -> Iterator[str]:
+    """What an action says of a fault, and what an open point says of the same one."""
+    verdict = report["verdict"]
+    repaired = {f for a in verdict["actions"] if "repair" in a["lead"] for f in a["faults"]}
+    for row in verdict["to_clear"]:
+        for verb, name in re.findall(r"^(repair|check) the [^(]*\((F\d+)\)", row["act"]):
+            if (verb == "repair") != (name in repaired):
+                yield f"{name} is to be {verb}ed to clear it, and its action is {verdict['actions']!r:.120}"
+
+
+def of_times(report: Mapping[str, Any]) -> Iterator[str]:
+    """What the verdict's sentence says to last to the end of the log, below which an action says when it ended."""
+    faults = {f["id"]: f for f in report["intervals"]}
+    for action in report["verdict"]["actions"]:
+        mine = [faults[f] for f in action["faults"]]
+        said = times_words(mine, report)  # type: ignore[arg-type]
+        if any("lasts to the end" in when_words(f, report) for f in mine) and "lasts to the end" not in said:  # type: ignore[arg-type]
+            yield f"action {action['n']} has a fault that lasts to the end, and says {said!r}"
+
+
+def of_sizes(report: Mapping[str, Any]) -> Iterator[str]:
+    """A loss that is missing, or whose bounds are open, without a reason; one that is known, with one."""
+    for fault in report["intervals"]:
+        e, total = fault["epsilon"], fault["mode"] in ("stuck", "no_signal")
+        if fault["mode"] == "outside_table" and e is not None:
+            continue
+        open_ = e is None or (e["low"] < _ALL if total else e["low"] <= 0.0 or e["high"] >= 1.0)
+        if open_ and not fault["size_note"]:
+            yield f"{fault['id']}: nothing says why its ε̂ is {e}"
+
+
 def of_page(report: Mapping[str, Any]) -> Iterator[str]:
     """All of them."""
-    for rule in (of_judged, of_going_out, of_endings, of_previous):
+    for rule in (of_judged, of_going_out, of_endings, of_previous, of_standings, of_acts, of_times, of_sizes):
         yield from rule(report)

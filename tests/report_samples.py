@@ -267,6 +267,7 @@ def _report(
             "status": status,
             "cleared": status in {"ready", "watch"},
             "not_cleared": "",
+            "to_clear": [],
             "title": f"{len(worst)} faults to repair, {len(faults) - len(worst)} to watch"
             if faults
             else "No fault found",

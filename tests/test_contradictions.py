@@ -27,6 +27,7 @@ from replay.simulation.run import simulate_mission
 from tests import fleet_samples as samples
 from tests.campaigns import campaign_of_rows
 from tests.contradictions import contradictions
+from tests.coverage_changes import changed_coverage, judged_side
 from tests.fleet_contradictions import fleet_contradictions
 
 Document = dict[str, Any]
@@ -129,18 +130,8 @@ def _lasting(d: Document) -> None:
 
 
 def _in_both(d: Document) -> None:
-    side = {
-        "tier": "model",
-        "driving_s": 44.5,
-        "decided_s": 44.5,
-        "judged_s": 44.5,
-        "assessed": True,
-        "shown": True,
-        "long_enough": True,
-    }
-    row = {"component": "RL", "kind": "wheel", "side": "sensor", "older": side, "newer": side, "change": "lost"}
     d["previous"] = {
-        "coverage": [row],
+        "coverage": [changed_coverage(judged_side())],
         "order": "earlier",
         "mission": {"files": ["a.mcap"]},
         "counts": {},
@@ -162,11 +153,21 @@ def _two_remedies(d: Document) -> None:
     ]
 
 
+def _other_act(d: Document) -> None:
+    act = f"check the part ({_first(d, 'high')['id']}) and repair what is found, then diagnose the next mission"
+    d["verdict"]["to_clear"].append({"reason": "It deviates.", "act": act, "parts": [], "fault": "", "why": ""})
+
+
+def _no_reason(d: Document) -> None:
+    fault = next(f for f in d["intervals"] if f["mode"] == "inefficient")
+    fault["epsilon"]["low"] = 0.0
+
+
 @pytest.mark.parametrize(
     "spoil",
     [
         *(_calm, _advice, _minority, _size, _late, _softer, _healthy, _untold, _sum, _unmoved, _moment),
-        *(_not_judged, _lasting, _in_both, _two_remedies),
+        *(_not_judged, _lasting, _in_both, _two_remedies, _other_act, _no_reason),
     ],
 )
 def test_a_spoilt_result_is_seen(result: tuple[Document, Columns], spoil: Callable[[Document], None]) -> None:

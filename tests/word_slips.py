@@ -10,6 +10,7 @@ _SLIPS = {
     "a sentence that begins small": r"[.!?] (?!wheel\.|steer\.|imu\.|mfhca|filterpy|e\.g)[a-z]",
     "empty brackets": r"\(\s*\)",
     "one of many": r"\b1 (faults|parts|wheels|missions|samples|reasons|checks|seconds)\b",
+    "another word for what is said so elsewhere": r"judged too briefly|control signal|assessed the part",
     "a number that is none": r"\b(nan|inf|None)\b",
 }
 _NO_SENTENCES = ("path", "sha256", "channel", "name", "source")

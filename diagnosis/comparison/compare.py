@@ -131,7 +131,8 @@ def compare_reports(
     if difference and not force:
         raise ConfigError(f"{difference}; compare two missions of one machine, or add --force")
     had, has = sides_of(older), sides_of(newer)
-    faults = tuple(match_faults(found_faults(older, had), found_faults(newer, has), had, has))
+    words = words_of(newer["machine"])
+    faults = tuple(match_faults(found_faults(older, had), found_faults(newer, has), had, has, words))
     axles = {*older["machine"]["axles"], *newer["machine"]["axles"]}
     outcomes: list[str] = [c.trend or c.status for c in faults]
     return Comparison(
@@ -144,7 +145,7 @@ def compare_reports(
         coverage=coverage_changes(had, has, axles),
         metrics=_metrics(older, newer),
         notes=tuple(_notes(older, newer, a, b, difference)),
-        words=words_of(newer["machine"]).row(),
+        words=words.row(),
     )
 
 

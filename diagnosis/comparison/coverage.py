@@ -89,7 +89,7 @@ def sides_of(report: ReportDocument) -> dict[Part, SideCoverage]:
     for row in report["coverage"]:
         judged = sum(v for k, v in row["seconds"].items() if k in DECIDED)
         decided, driving, tier = row["decided_driving_s"], row["driving_s"], row["tier"]
-        limited = is_limited(report["verdict"]["scope"], row["component"])
+        limited = is_limited(report["verdict"], row["component"])
         shown = not limited and (row["component"], row["side"]) not in open_
         long_enough = tier is not Tier.NONE and is_judged(decided, driving, least)
         assessed = shown and long_enough

@@ -11,6 +11,7 @@ from diagnosis.results.comparison_document import Change, Status, Trend
 from diagnosis.results.document import IntervalRow, ReportDocument, StateRow
 from diagnosis.results.ending import HEALTHY_S, healthy_after
 from diagnosis.results.fault_rows import mode_words
+from diagnosis.results.machine_words import MachineWords
 from diagnosis.results.size_rows import EpsilonRow
 from diagnosis.results.vocabulary import Kind, Severity, Tier
 from diagnosis.results.wheel_model import RESOLUTION
@@ -145,7 +146,11 @@ def _keys(component: str, side: Side) -> list[tuple[str, Side]]:
 
 
 def match_faults(
-    older: Sequence[FoundFault], newer: Sequence[FoundFault], older_sides: Sides, newer_sides: Sides
+    older: Sequence[FoundFault],
+    newer: Sequence[FoundFault],
+    older_sides: Sides,
+    newer_sides: Sides,
+    words: MachineWords,
 ) -> list[FaultChange]:
     """Match faults one to one: same side and row, then same row where one side is not told apart, then same side.
 
@@ -155,6 +160,8 @@ def match_faults(
         From `found_faults`.
     older_sides, newer_sides : Mapping
         What was assessed, by component and side.
+    words : MachineWords
+        How to speak of the machine.
 
     Returns
     -------
@@ -173,10 +180,12 @@ def match_faults(
             left.remove(a)
             out.append(_both(a, b))
         open_ = rest
-    out += [_change("new", None, b, note=_unseen_before(b, older_sides)) for b in open_]
+    out += [_change("new", None, b, note=_unseen_before(b, older_sides, words)) for b in open_]
     for a in left:
-        why = _why_not_assessed(a, newer_sides)
-        out.append(_change("not_seen_again" if why else "resolved", a, None, note=why or _other_faults(a, newer)))
+        why = _why_not_assessed(a, newer_sides, words)
+        out.append(
+            _change("not_seen_again" if why else "resolved", a, None, note=why or _other_faults(a, newer, words))
+        )
     return sorted(out, key=_order)
 
 
@@ -254,48 +263,48 @@ def _duration(a: FoundFault, b: FoundFault) -> int:
     return -1 if all(x > _LONGER * y for x, y in pairs) else 0
 
 
-def _unseen_before(b: FoundFault, sides: Sides) -> str:
+def _unseen_before(b: FoundFault, sides: Sides, words: MachineWords) -> str:
     keys = _keys(b.component, b.side)
     for key in keys:
         side = sides.get(key)
         if side is None or not side.assessed:
-            part = "This part" if len(keys) == 1 else f"The {key[1]}"
-            words = "not assessed" if side is None else side.short_words
-            return f"{part} was {words} in the older mission: the fault may be older."
+            part = "This part" if len(keys) == 1 else f"The {words.part_name(b.kind, key[1])}"
+            how = "not judged" if side is None else side.short_words
+            return f"{part} was {how} in the older mission: the fault may be older."
     return ""
 
 
-def _other_faults(a: FoundFault, newer: Sequence[FoundFault]) -> str:
+def _other_faults(a: FoundFault, newer: Sequence[FoundFault], words: MachineWords) -> str:
     """Say that a part whose fault is gone has another one, or that its fault may be taken for one of the other side."""
     keys = set(_keys(a.component, a.side))
     near = [b for b in newer if b.component == a.component and b.severity is not Severity.INFO]
     own = [b for b in near if keys & set(_keys(b.component, b.side))]
     if own:
-        words = join_words(list(dict.fromkeys(mode_words(b.side, b.mode) for b in own)))
-        return f"The part is not healthy: in the newer mission it is {words}."
+        modes = join_words(list(dict.fromkeys(mode_words(b.side, b.mode) for b in own)))
+        return f"The part is not healthy: in the newer mission it is {modes}."
     other = next((b for b in near if Tier.DIRECT not in (a.tier, b.tier)), None)
     if other is None:
         return ""
     return (
-        f"In the newer mission the {other.side} of {a.component} is {mode_words(other.side, other.mode)}; without second "
-        "measurements one can be taken for the other."
+        f"In the newer mission the {words.part_words(other.kind, other.component, other.side)} is "
+        f"{mode_words(other.side, other.mode)}; without second measurements one can be taken for the other."
     )
 
 
-def _why_not_assessed(a: FoundFault, sides: Sides) -> str:
+def _why_not_assessed(a: FoundFault, sides: Sides, words: MachineWords) -> str:
     """Sentence that says why a fault that is gone cannot count as resolved, empty where it can."""
     for key in _keys(a.component, a.side):
-        side = sides.get(key)
+        side, part = sides.get(key), words.part_name(a.kind, key[1])
         if side is None:
-            return f"The newer result does not hold the {key[1]}."
+            return f"The newer result does not hold the {part}."
         if not side.assessed:
-            return f"In the newer mission the {key[1]} was {side.words}."
+            return f"In the newer mission the {part} was {side.words}."
         small = a.epsilon is not None and a.epsilon["low"] < RESOLUTION[key[1]]
         if side.tier is Tier.TRACKING and not a.mode.total:
-            return f"In the newer mission the {key[1]} was judged by its tracking alone, which does not show this row."
+            return f"In the newer mission the {part} was judged by its tracking alone, which does not show this row."
         if side.tier.strength < a.tier.strength and not a.mode.total and small:
             return (
-                f"In the newer mission the {key[1]} was judged by weaker evidence ({side.tier}, not {a.tier}), which "
+                f"In the newer mission the {part} was judged by weaker evidence ({side.tier}, not {a.tier}), which "
                 f"mostly does not name a loss below about {100 * RESOLUTION[key[1]]:.0f} % there."
             )
     if a.recovered and a.severity is not Severity.INFO:

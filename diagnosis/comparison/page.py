@@ -36,7 +36,7 @@ _DEFINITIONS = (
     "Changed: another row or side, another severity, ε̂ of each mission outside the other's 95 % bounds and 0.05 apart, or time that changed "
     "by more than a factor of two, both in seconds and as a share of the judged time, and by a second at least.",
     "Worse: a higher severity, else a larger ε̂ or more time.",
-    "Resolved: not found again although the side was assessed in the newer mission (with evidence, for the seconds that the "
+    "Resolved: not found again although the part was judged long enough in the newer mission (with evidence, for the seconds that the "
     "verdict “ready” takes, and for four fifths of its driving), and the part was not healthy again before its mission ended. "
     "Otherwise a missing fault is “not seen again, no repair shown”: what comes and goes is gone at any time.",
     "Tracking error: mean |e| while driving. Control effort: mean |u_a| while driving. Both depend on what was driven.",

@@ -10,6 +10,7 @@ import numpy as np
 from diagnosis.decision.severity import halved_words, unanswered
 from diagnosis.decision.short import main_reason, main_state, short_parts, unjudged_axles
 from diagnosis.decision.wording import count_words, join_words
+from diagnosis.results.assessed import Cut
 from diagnosis.results.assessment import Assessment
 from diagnosis.results.clearing import Checked
 from diagnosis.results.detectability import Detectable, Deviation
@@ -48,7 +49,7 @@ class Reservations:
         What the log lost.
     open : tuple[Checked, ...]
         Checks that do not clear their part.
-    scope : tuple[str, ...]
+    scope : tuple[Cut, ...]
         Why what was judged is not the whole mission.
     events : tuple[MachineEvent, ...]
         What happened to the machine as a whole.
@@ -67,7 +68,7 @@ class Reservations:
     not_compared: bool = False
     damage: tuple[str, ...] = ()
     open: tuple[Checked, ...] = ()
-    scope: tuple[str, ...] = ()
+    scope: tuple[Cut, ...] = ()
     events: tuple[MachineEvent, ...] = ()
     hints: tuple[str, ...] = ()
     misplaced: tuple[str, ...] = ()
@@ -143,7 +144,7 @@ def doubt_of(watch: Sequence[FaultInterval], against: Reservations) -> str:
         out.append("a loss that lasts the whole mission would not show")
     if against.hints:
         out.append("the machine's settings do not fit the log")
-    out += against.scope
+    out += [cut.text for cut in against.scope]
     out += dict.fromkeys(event.doubt for event in against.events)
     if against.open:
         out.append(open_words(against.open))

@@ -21,7 +21,7 @@ from diagnosis.decision.endings import endings_of
 from diagnosis.decision.short import ToClear, exempt_axles
 from diagnosis.decision.to_clear import to_clear
 from diagnosis.decision.wording import actions_of, count_faults, join_words, misplaced_words, sentence_of
-from diagnosis.results.assessed import AT_TIMES, CUT, is_judged
+from diagnosis.results.assessed import Cut, is_judged
 from diagnosis.results.assessment import STATES, Assessment
 from diagnosis.results.clearing import Check, Checked
 from diagnosis.results.detectability import Detectable
@@ -66,7 +66,7 @@ class Decision:
         Whether the machine may go out: ``ready``, or faults to watch in a mission that is ``ready`` but for them.
     not_cleared : str
         Why ``watch`` gives no such leave, to follow *not cleared:*; empty otherwise.
-    scope : tuple[str, ...]
+    scope : tuple[Cut, ...]
         Why what was judged is not the whole mission.
     to_clear : tuple[ToClear, ...]
         What stands against ``ready`` beside the faults, and what would clear it.
@@ -79,7 +79,7 @@ class Decision:
     actions: tuple[ActionRow, ...] = ()
     cleared: bool = False
     not_cleared: str = ""
-    scope: tuple[str, ...] = ()
+    scope: tuple[Cut, ...] = ()
     to_clear: tuple[ToClear, ...] = ()
 
     def row(self, more_caveats: Sequence[str] = ()) -> VerdictRow:
@@ -90,10 +90,11 @@ class Decision:
             "not_cleared": self.not_cleared,
             "title": self.title,
             "text": self.text,
-            "scope": list(self.scope),
+            "scope": [cut.text for cut in self.scope],
+            "cuts": [cut.row() for cut in self.scope],
             "caveats": [*self.caveats, *more_caveats],
             "actions": list(self.actions),
-            "to_clear": [{"reason": x.reason, "act": x.act} for x in self.to_clear],
+            "to_clear": [x.row() for x in self.to_clear],
         }
 
 
@@ -109,7 +110,7 @@ def decide(
     driving_s: Mapping[Part, float] | None = None,
     model: WheelModelFit | None = None,
     checks: Sequence[Checked] = (),
-    scope: Sequence[str] = (),
+    scope: Sequence[Cut] = (),
     events: Sequence[MachineEvent] = (),
     hints: Sequence[str] = (),
     misplaced: Sequence[str] = (),
@@ -147,7 +148,7 @@ def decide(
         Wheel models behind the judgement, where any.
     checks : Sequence[Checked]
         What is asked once more before a machine is cleared.
-    scope : Sequence[str]
+    scope : Sequence[Cut]
         Why what was judged is not the whole mission.
     events : Sequence[MachineEvent]
         What happened to the machine as a whole and is no part's fault.
@@ -309,8 +310,8 @@ def _without_faults(
         title = "No fault found, but a file was left out" if apart else "No fault found in a damaged log"
         return Decision(Verdict.NOT_ASSESSED, title, text)
     if against.scope:
-        text = f"No fault was found, but {join_words(list(against.scope))}."
-        at_times = all(reason.startswith((CUT, AT_TIMES)) for reason in against.scope)
+        text = f"No fault was found, but {join_words([cut.text for cut in against.scope])}."
+        at_times = all(cut.kind.of_time for cut in against.scope)
         title = f"No fault found, not {'the whole mission' if at_times else 'all parts'} judged"
         return Decision(Verdict.NOT_ASSESSED, title, text)
     if against.open:

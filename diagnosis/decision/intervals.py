@@ -9,6 +9,7 @@ import numpy as np
 
 from diagnosis.decision.advice import check_of_all
 from diagnosis.decision.severity import severity_of
+from diagnosis.decision.size_notes import size_note
 from diagnosis.results.assessment import STATES, Assessment, Finding
 from diagnosis.results.machine_words import MachineWords
 from diagnosis.results.result import Epsilon, FaultInterval, StateSpan
@@ -49,6 +50,7 @@ def intervals_of(
                 hypotheses=f.hypotheses,
                 severity=severity,
                 advice=advice,
+                size_note=size_note(f, f.epsilon, kind),
                 check=check_of_all(kind, component, f.side, f.mode, f.hypotheses, words, machine.advice),
                 evidence=f.evidence,
                 tier=f.tier,

@@ -92,7 +92,7 @@ def _severity_of_total(
         )
     if finding.side is Side.ACTUATOR:
         return Severity.HIGH, words.fill(
-            "Stop at once and repair: the {valve} does not answer its command (Assumption 2)."
+            "Stop at once and repair: the {valve} does not answer its command (the paper’s Assumption 2)."
         )
     if finding.side is Side.SENSOR_OR_ACTUATOR:
         part = words.part_name(kind, Side.ACTUATOR)
@@ -102,10 +102,10 @@ def _severity_of_total(
         )
     if seconds <= limits.brief:
         return Severity.LOW, (
-            f"Tolerable: no longer than {limits.brief:g} s (Assumption 1). Check plug and cable at the next service."
+            f"Tolerable: no longer than {limits.brief:g} s (the paper’s Assumption 1). Check plug and cable at the next service."
         )
     return Severity.HIGH, (
-        f"Stop and repair the sensor: it delivered nothing usable for more than {limits.brief:g} s (Assumption 1)."
+        f"Stop and repair the sensor: it delivered nothing usable for more than {limits.brief:g} s (the paper’s Assumption 1)."
     )
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,6 +10,7 @@ import numpy as np
 from diagnosis.decision.wording import join_words
 from diagnosis.results.assessed import is_judged, needed_s
 from diagnosis.results.assessment import STATES, Assessment
+from diagnosis.results.document import ToClearRow
 from diagnosis.results.machine_words import MachineWords
 from diagnosis.results.vocabulary import Kind, Tier
 from replay.faults import DECIDED, Side, State
@@ -26,10 +27,42 @@ _NO_DRIVE = "no {valve} is seen there"  # ends the reason of a wheel whose effor
 
 @dataclass(frozen=True)
 class ToClear:
-    """What keeps a machine from being cleared, in a sentence, and what would clear it, to follow *to clear it*."""
+    """What keeps a machine from being cleared, and what would clear it.
+
+    Attributes
+    ----------
+    reason : str
+        A sentence.
+    act : str
+        What would clear it, to follow *to clear it*.
+    parts : tuple[Part, ...]
+        The parts that it is of; empty where it is of the whole machine.
+    fault : str
+        The fault that alone is the reason, by its name; else empty.
+    why : str
+        Of parts that were not judged why not, without their names; else empty.
+    """
 
     reason: str
     act: str
+    parts: tuple[Part, ...] = ()
+    fault: str = ""
+    why: str = ""
+
+    def row(self) -> ToClearRow:
+        """The same for ``report.json``."""
+        return {
+            "reason": self.reason,
+            "act": self.act,
+            "parts": [{"component": component, "side": side} for component, side in self.parts],
+            "fault": self.fault,
+            "why": self.why,
+        }
+
+
+def sides_of(parts: Iterable[tuple[str, Side]]) -> tuple[Part, ...]:
+    """Components with each of their sides, once."""
+    return tuple(dict.fromkeys((component, side.value) for component, both in parts for side in both.sides))
 
 
 def short_parts(
@@ -77,12 +110,14 @@ def short_parts(
         who, why = words.listed(kind, parts), f" ({reason})" if reason else ""
         named = act.replace("{who}", f"the {who}").replace("{c}", _components(parts))
         if silent:
-            out.append(ToClear(f"Not judged: {who}{why}.", named))
+            out.append(ToClear(f"Not judged: {who}{why}.", named, tuple(parts), why=reason))
             continue
         judged = _span([decided_s[part] for part in parts], ".1f")
         asked = [needed_s(driven.get(part, 0.0), limits.min_assessed) for part in parts]
         needed = _span(asked if max(asked) - min(asked) >= 1.0 else [max(asked)], ".3g")
-        out.append(ToClear(f"{who}: judged for {judged} s of {words.moving}, of {needed} s needed{why}.", named))
+        out.append(
+            ToClear(f"{who}: judged for {judged} s of {words.moving}, of {needed} s needed{why}.", named, tuple(parts))
+        )
     return out
 
 
@@ -108,7 +143,7 @@ def unjudged_axles(axles: Sequence[Part], assessments: Mapping[Part, Assessment]
         if reason.endswith(_NOT_LOGGED)
         else "steer from stop to stop twice at standstill and several times while driving, with the log running"
     )
-    return ToClear(f"Not judged: {who} ({reason}).", act)
+    return ToClear(f"Not judged: {who} ({reason}).", act, tuple(axles), why=reason)
 
 
 def exempt_axles(

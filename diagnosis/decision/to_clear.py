@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 
 from diagnosis.decision.caveats import Reservations, doubts_of, furthest_first
-from diagnosis.decision.short import Part, ToClear, short_parts, unjudged_axles
-from diagnosis.decision.wording import count_words, join_words
-from diagnosis.results.assessed import is_judged
+from diagnosis.decision.short import Part, ToClear, short_parts, sides_of, unjudged_axles
+from diagnosis.decision.wording import count_words, join_words, remedy_words
+from diagnosis.results.assessed import CutKind, is_judged
 from diagnosis.results.assessment import Assessment
 from diagnosis.results.clearing import MAY_EXPLAIN, Check, Checked, lasts_in, share_covered
 from diagnosis.results.left_out import is_left_out
@@ -17,7 +17,6 @@ from diagnosis.results.vocabulary import Kind, Severity, Tier
 from replay.faults import Side, State
 from replay.machine.config import Limits
 
-_STEERING = "steering was not judged"
 _NAMED = 2  # open checks
 _STEER = "steer from stop to stop twice at standstill, and watch whether the axle follows"
 _STEERED = (Check.STILL, Check.RATE, Check.LASTING_RATE)
@@ -72,6 +71,7 @@ def to_clear(
                 ToClear(
                     f"{who}: no single fault explains the residual.",
                     f"inspect these parts, and log {second}{other}",
+                    sides_of((c, Side.SENSOR_OR_ACTUATOR) for c in sorted(parts)),
                 )
             )
     if against.not_compared:
@@ -94,7 +94,7 @@ def to_clear(
                 else "copy the log from the machine once more, or record another mission",
             )
         )
-    cut = [text for text in against.scope if not text.endswith(_STEERING)]  # which has a reason of its own below
+    cut = [cut.text for cut in against.scope if cut.kind in (CutKind.LOG, CutKind.WHEELS)]
     if cut:
         out.append(
             ToClear(
@@ -102,17 +102,26 @@ def to_clear(
                 "diagnose the whole log, with every part (no --start, --end, --wheel)",
             )
         )
+    gaps = [cut for cut in against.scope if cut.kind is CutKind.DATA]
+    if gaps:
+        out.append(
+            ToClear(
+                f"{_sentence(join_words([cut.text for cut in gaps]))}.",
+                "record again, with the steering in the log all the time",
+                sides_of((c, Side.SENSOR_OR_ACTUATOR) for cut in gaps for c in cut.components),
+            )
+        )
     steered = [k for k in assessments if k[0] in axles]
     unjudged = [k for k in steered if assessments[k].tier is Tier.NONE]
     dark = [unjudged_axles(unjudged, assessments, words)] if unjudged else []
-    first = len(cut) < len(against.scope)  # the verdict's own reason comes first
+    first = any(cut.kind is CutKind.STEERING for cut in against.scope)  # the verdict's own reason comes first
     out += dark if first else []
     out += _of_doubts(faults, words)
     at_rest = {k for k, state in against.open_state.items() if state is State.NOT_EXCITED}  # exempt: its checks count
     brief = [k for k in steered if k not in {*unjudged, *at_rest} and _brief(k, decided_s, driven, limits)]
     twice = {c for (c, side), a in assessments.items() if a.tier is Tier.DIRECT and side == Side.SENSOR}
     blamed = {k: f for k, c in enumerate(against.open) if (f := _meanwhile(c, faults)) is not None}
-    deviating = _of_faults([(against.open[k], f) for k, f in blamed.items()], words)
+    deviating = _of_faults([(against.open[k], f) for k, f in blamed.items()], faults, words)
     told = {component for component, _ in (*unjudged, *brief)}  # what has them judged lets their checks pass
     left = [c for k, c in enumerate(against.open) if k not in blamed]
     deviating += _of_checks([c for c in left if c.component not in told or not _asks_for_steering(c, twice)], twice)
@@ -154,13 +163,17 @@ def _of_doubts(faults: Sequence[FaultInterval], words: MachineWords) -> list[ToC
     return [
         ToClear(
             f"{f.id}: {doubt}.",
-            f"repair the {words.part_words(f.kind, f.component, f.side)} ({f.id}), then diagnose the next mission",
+            f"{remedy_words(f, faults, words)}, then diagnose the next mission",
+            sides_of([(f.component, f.side)]),
+            f.id,
         )
         for f, doubt in doubts_of(faults, words)
     ]
 
 
-def _of_faults(blamed: Sequence[tuple[Checked, FaultInterval]], words: MachineWords) -> list[tuple[Checked, ToClear]]:
+def _of_faults(
+    blamed: Sequence[tuple[Checked, FaultInterval]], faults: Sequence[FaultInterval], words: MachineWords
+) -> list[tuple[Checked, ToClear]]:
     """Checks that deviate while faults last, or just after, those of one fault together: of each component the furthest beyond its limit.
 
     Each with the furthest of its checks.
@@ -175,10 +188,10 @@ def _of_faults(blamed: Sequence[tuple[Checked, FaultInterval]], words: MachineWo
     out = []
     for (name, when), mine in by.items():
         fault = mine[0][1]
-        part = words.part_words(fault.kind, fault.component, fault.side)
         point = ToClear(
             f"{when} {name}, which may explain it: {_some([check.text for check, _ in mine])}.",
-            f"repair the {part} ({name}), then diagnose the next mission",
+            f"{remedy_words(fault, faults, words)}, then diagnose the next mission",
+            sides_of((check.component, check.side) for check, _ in mine),
         )
         out.append((mine[0][0], point))
     return out
@@ -201,10 +214,10 @@ def _of_checks(checks: Sequence[Checked], twice: Collection[str]) -> list[tuple[
     for c in furthest_first(checks):
         worst.setdefault(c.component, c)
     alike: dict[str, list[str]] = {}
-    leading: dict[str, Checked] = {}
+    same: dict[str, list[Checked]] = {}
     for first in worst.values():
         act = _act(first, twice)
-        leading.setdefault(act, first)
+        same.setdefault(act, []).append(first)
         texts = alike.setdefault(act, [])
         if first.check is Check.LASTING_RATE and texts:
             continue  # one axle against the other: said of the one is said of both
@@ -214,7 +227,10 @@ def _of_checks(checks: Sequence[Checked], twice: Collection[str]) -> list[tuple[
         else:  # the yaw rate does not say which axle it is
             other = next(c.component for c in checks if c.text == texts[twin])
             texts[twin] = texts[twin].replace(f" {other} ", f" {other} or {first.component} ", 1)
-    return [(leading[act], ToClear(f"{_sentence(_some(texts))}.", act)) for act, texts in alike.items()]
+    return [
+        (same[act][0], ToClear(f"{_sentence(_some(texts))}.", act, sides_of((c.component, c.side) for c in same[act])))
+        for act, texts in alike.items()
+    ]
 
 
 def _same_but_name(text: str, check: Checked) -> bool:

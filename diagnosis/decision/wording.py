@@ -68,6 +68,16 @@ def _order(faults: Sequence[FaultInterval]) -> str:
     return "Check at the next service" if worst.mode.total else "Check"
 
 
+def remedy_words(fault: FaultInterval, faults: Sequence[FaultInterval], words: MachineWords) -> str:
+    """What the action of a fault's part comes to, by what is open for it: ``check the FR drive valve (F1) and repair what is found``.
+
+    `faults`: all of the mission, for the worst of a part decides.
+    """
+    part = f"the {words.part_words(fault.kind, fault.component, fault.side)} ({fault.id})"
+    stop = any((f.component, f.side) == (fault.component, fault.side) and f.severity is Severity.HIGH for f in faults)
+    return f"repair {part}" if stop else f"check {part} and repair what is found"
+
+
 def _urgency(worst: FaultInterval) -> int:
     """Place of a part among the actions, by its worst fault; equal ones keep their order."""
     if worst.severity is Severity.HIGH:

@@ -17,6 +17,7 @@ from diagnosis.pages.mode_style import mode_style
 
 #: Blocks of variables of the dark theme in `shared_style`.
 DARK = re.compile(r"\[data-theme=dark\] \{([^}]*)\}")
+_UNIT = re.compile(r"(?<=\d) (?=(?:%|°|m/s|rad/s|rad|[km]?m|[mk]?Hz|ms|min|[shd]|MB)(?!\w))")
 #: Style, scripts and templates that several pages share.
 SHARED = Path(__file__).parent
 POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:; base-uri 'none'; form-action 'none'"
@@ -47,10 +48,18 @@ def environment(folder: Path) -> jinja2.Environment:
         loader=jinja2.FileSystemLoader([folder, SHARED]),
         autoescape=True,
         undefined=jinja2.StrictUndefined,
+        finalize=unbroken,
         trim_blocks=True,
         lstrip_blocks=True,
         bytecode_cache=_compiled_before(),
     )
+
+
+def unbroken(value: object) -> object:
+    """A text whose numbers stay on the line of their unit; what is markup already, or no text, as it is."""
+    if isinstance(value, str) and not isinstance(value, Markup):
+        return _UNIT.sub("\u00a0", value)
+    return value
 
 
 class _Kept(jinja2.FileSystemBytecodeCache):

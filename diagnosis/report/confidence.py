@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import re
-
 from diagnosis.comparison.coverage import SideCoverage, sides_of
-from diagnosis.results.document import IntervalRow, ReportDocument, ToClearRow, VerdictRow
+from diagnosis.report.standing import Standing, standings_of
+from diagnosis.results.document import IntervalRow, ReportDocument, VerdictRow
 from diagnosis.results.fault_rows import state_label
 from diagnosis.results.machine_words import words_of
-from diagnosis.results.vocabulary import Kind, Leave, Severity, Tier, Verdict
+from diagnosis.results.vocabulary import Kind, Leave, Tier, Verdict
 from replay.faults import Side, State
 
 _WORDS = ((0.99, "Practically certain"), (0.9, "Very likely"), (0.7, "Likely"))
@@ -75,11 +74,6 @@ def _judged_words(share: float, moving: str) -> str:
     return f"{_share(share)} of its {moving} was judged"
 
 
-_WORTH_A_WORD = 0.05  # probability of an alternative
-#: Begins a reason that is a fault's own, which the verdict's actions say.
-OF_A_FAULT = re.compile(r"F\d+: ")
-
-
 def _likely(p: float) -> str:
     return next((words for least, words in _WORDS if round(p, 3) >= least), "Possible" if p < 0.5 else "Probable")
 
@@ -89,28 +83,22 @@ def judged(report: ReportDocument) -> str:
 
     Empty where there are none; `judged_means` says what the words mean.
     """
-    sides, words, axles = sides_of(report), words_of(report["machine"]), report["machine"]["axles"]
-    short = [part for part, s in sides.items() if not s.long_enough]
-    if not sides:
+    parts, words, axles = standings_of(report), words_of(report["machine"]), report["machine"]["axles"]
+    if not parts:
         return ""
-    cleared = len(_cleared(report))
+    short = [part for part, s in parts.items() if s in (Standing.NOT_LONG_ENOUGH, Standing.NOT_JUDGED)]
+    cleared = sum(s is Standing.CLEARED for s in parts.values())
     many = str(cleared) if cleared else "none"
     out = [
-        f"{len(sides) - len(short)} of {len(sides)} parts judged, {many} cleared{'' if cleared else _why_none(report)}"
+        f"{len(parts) - len(short)} of {len(parts)} parts judged, {many} cleared{'' if cleared else _why_none(report)}"
     ]
-    for how, some in (("not judged long enough:", True), ("not judged:", False)):
+    for how in (Standing.NOT_LONG_ENOUGH, Standing.NOT_JUDGED):
         told = [
             words.listed(kind, mine)
             for kind in (Kind.WHEEL, Kind.STEER)
-            if (
-                mine := [
-                    part
-                    for part in short
-                    if (part[0] in axles) is (kind is Kind.STEER) and _partly(sides[part]) is some
-                ]
-            )
+            if (mine := [part for part in short if (part[0] in axles) is (kind is Kind.STEER) and parts[part] is how])
         ]
-        out += [f"{how} {'; '.join(told)}"] if told else []
+        out += [f"{how}: {'; '.join(told)}"] if told else []
     return "; ".join(out)
 
 
@@ -129,63 +117,14 @@ def judged_means(report: ReportDocument) -> str:
 def _why_none(report: ReportDocument) -> str:
     """Why no part is cleared, to follow *none cleared*."""
     rows = report["verdict"].get("to_clear")
-    if rows is None:
+    if rows is None or any("parts" not in row for row in rows):
         return ", for this report does not say what is open"
     if not any(side.long_enough for side in sides_of(report).values()):
         return ", for none was judged long enough"
-    whole = next((row["reason"] for row in rows if not _named(row, report)), "")
+    whole = next((row["reason"] for row in rows if not row["parts"]), "")
     if whole:
         return f": {whole[:1].lower()}{whole[1:].rstrip('.')}"
     return ", for each that was judged has a fault or is named in what is open"
-
-
-def _named(row: ToClearRow, report: ReportDocument) -> set[str]:
-    """Components that an open point names."""
-    components = {r["component"] for r in report["coverage"]}
-    return {c for c in components if re.search(rf"(?<!\w){re.escape(c.removesuffix('_steer'))}(?!\w)", row["reason"])}
-
-
-def _cleared(report: ReportDocument) -> list[tuple[str, str]]:
-    """Parts that were judged and of which nothing is open; none where something is open that names no part, or that is not said."""
-    if "to_clear" not in report["verdict"]:
-        return []
-    verdict = report["verdict"]
-    faults = [f for f in report["intervals"] if f["severity"] != Severity.INFO]
-    faulty: set[tuple[str, str]] = {(f["component"], s) for f in faults for s in Side(f["side"]).sides}
-    faulty |= {  # parts that a fault may be of as well
-        (f["component"], s)
-        for f in faults
-        for h in f["hypotheses"]
-        if h["mode"] != State.HEALTHY and h["side"] in set(Side) and h["p"] >= _WORTH_A_WORD
-        for s in Side(h["side"]).sides
-    }
-    faulty |= {(row["component"], row["side"]) for row in report["detectability"]["rows"] if row["size"] == 0.0}
-    named: set[tuple[str, str]] = set()
-    for row in verdict["to_clear"]:
-        if OF_A_FAULT.match(row["reason"]):
-            continue  # its part is among the faulty ones
-        mine = _named(row, report)
-        if not mine:
-            return []
-        named |= {(c, s) for c in mine for s in _sides_named(row["reason"], c, report)}
-    if verdict["status"] == Verdict.NOT_ASSESSED and not named:
-        return []
-    return [part for part, s in sides_of(report).items() if s.assessed and part not in faulty and part not in named]
-
-
-def _sides_named(reason: str, component: str, report: ReportDocument) -> tuple[str, ...]:
-    """Sides of a component that an open point is of: one where it begins with that part alone, else both."""
-    head = re.split(r"[(:]", reason.removeprefix("Not judged: "), maxsplit=1)[0]
-    kind = Kind.STEER if component in report["machine"]["axles"] else Kind.WHEEL
-    words = words_of(report["machine"])
-    sides = (Side.SENSOR.value, Side.ACTUATOR.value)
-    mine = tuple(s for s in sides if re.search(rf"\b{re.escape(words.part_name(kind, Side(s)))}\b", head))
-    return mine if mine and " or " not in head else sides
-
-
-def _partly(side: SideCoverage) -> bool:
-    """Whether a part that was not judged long enough was judged at all."""
-    return side.tier is not Tier.NONE and side.decided_s > _NOTHING * side.driving_s
 
 
 def sure_of_verdict(report: ReportDocument) -> str:

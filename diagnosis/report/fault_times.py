@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from diagnosis.pages.labels import UNDATED_NS, clock, span, utc
 from diagnosis.results.document import IntervalRow, ReportDocument
 from diagnosis.results.ending import Ending, ending_of
@@ -30,3 +32,19 @@ def when_words(fault: IntervalRow, report: ReportDocument) -> str:
     if ending is Ending.ENDED:
         return f"{fault['id']} {began} and ended at {until}, {rest} before the log does"
     return f"{fault['id']} {began} and was last seen at {until}, {rest} before the log ends; its part was not seen healthy since"
+
+
+def times_words(faults: Sequence[IntervalRow], report: ReportDocument) -> str:
+    """The same of one part's faults: of the most urgent one, and of the last, which says how it stands with the part; empty for none.
+
+    Parameters
+    ----------
+    faults : Sequence[IntervalRow]
+        Of one part, the most urgent first.
+    report : ReportDocument
+        The document.
+    """
+    if not faults:
+        return ""
+    last = max(faults, key=lambda f: f["stop_s"])
+    return "; ".join(when_words(f, report) for f in ([faults[0]] if last is faults[0] else [faults[0], last]))

@@ -8,10 +8,9 @@ from dataclasses import dataclass
 
 from markupsafe import Markup
 
-from diagnosis.comparison.coverage import sides_of
 from diagnosis.pages.labels import span
 from diagnosis.pages.svg import badge, text
-from diagnosis.report.judged_parts import judged_sides
+from diagnosis.report.standing import Standing, standings_of
 from diagnosis.results.candidates import label_of
 from diagnosis.results.document import IntervalRow, ReportDocument, WheelPlace
 from diagnosis.results.machine_words import HYDRAULIC, MachineWords, words_of
@@ -36,11 +35,10 @@ def condition(
     component: str,
     kind: Kind,
     faults: Sequence[IntervalRow],
-    judged: Mapping[tuple[str, str], bool],
-    enough: Mapping[tuple[str, str], str] | None = None,
+    standings: Mapping[tuple[str, str], Standing],
     words: MachineWords = HYDRAULIC,
 ) -> Condition:
-    """Worst fault of a component, or whether it was judged at all; what is of severity *info* is a remark.
+    """Worst fault of a component, or how its parts stand; what is of severity *info* is a remark.
 
     Parameters
     ----------
@@ -50,17 +48,15 @@ def condition(
         Which of the two.
     faults : Sequence[IntervalRow]
         The report's intervals.
-    judged : Mapping[tuple[str, str], bool]
-        Whether any time of a component and side was decided.
-    enough : Mapping[tuple[str, str], str] or None
-        What keeps each part from a verdict of *ready*, in words; empty where nothing does; None: not known.
+    standings : Mapping[tuple[str, str], Standing]
+        How each component and side stands; those that are missing were not judged.
     words : MachineWords
         How to speak of the machine.
     """
     every = [f for f in faults if f["component"] == component and f["kind"] == kind]
     mine = [f for f in every if f["severity"] != Severity.INFO]
     if every and not mine:
-        found = condition(component, kind, [], judged, enough, words)
+        found = condition(component, kind, [], standings, words)
         remark = f"{len(every)} remark{'s' * (len(every) > 1)}"
         return Condition(found.state, (*found.lines, remark), every[0]["id"], f"{found.title}; {remark}")
     if mine:
@@ -73,20 +69,17 @@ def condition(
         heading = name[0].upper() + name[1:]
         title = f"{component}: {name} {label}, {length}{', ' + more[0] if more else ''}"
         return Condition(worst["mode"], (heading, label, length, *more), worst["id"], title)
-    sides = {side: done for (c, side), done in judged.items() if c == component}
-    open_sides = [words.part_name(kind, side) for side, done in sides.items() if not done]
-    kept = {words.part_name(kind, side): why for (c, side), why in (enough or {}).items() if c == component and why}
-    brief = list(kept)
-    if not sides or len(open_sides) == len(sides):
-        return Condition(State.NOT_ASSESSED, ("Not assessed",), "", f"{component}: not assessed")
-    if brief and not open_sides:
-        who = brief[0] if len(brief) < len(sides) else ""
-        lines = ("No fault found", *((who,) if who else ()), ", ".join(dict.fromkeys(kept.values())))
-        return Condition(State.NOT_ASSESSED, lines, "", f"{component}: {', '.join(x.lower() for x in lines)}")
-    if open_sides:
-        lines = ("No fault found", f"{open_sides[0]}", "not assessed")
-        return Condition(State.NOT_ASSESSED, lines, "", f"{component}: no fault found, {open_sides[0]} not assessed")
-    return Condition(State.HEALTHY, ("Healthy",), "", f"{component}: no fault found")
+    own = {words.part_name(kind, side): how for (c, side), how in standings.items() if c == component}
+    open_ = {name: how for name, how in own.items() if how is not Standing.CLEARED}
+    if own and not open_:
+        return Condition(State.HEALTHY, ("Healthy",), "", f"{component}: no fault found")
+    if all(how is Standing.NOT_JUDGED for how in own.values()):
+        return Condition(State.NOT_ASSESSED, ("Not judged",), "", f"{component}: not judged")
+    alike = len(open_) == len(own) and len(set(open_.values())) == 1
+    said = list(dict.fromkeys(open_.values())) if alike else [f"{name} {how}" for name, how in open_.items()]
+    return Condition(
+        State.NOT_ASSESSED, ("No fault found", *said), "", f"{component}: {', '.join(('no fault found', *said))}"
+    )
 
 
 def _urgency(fault: IntervalRow) -> tuple[int, int, float]:
@@ -133,13 +126,9 @@ def open_axles(report: ReportDocument) -> list[str]:
 
 def _conditions(report: ReportDocument) -> dict[str, Condition]:
     """What the picture says of every wheel and axle, by name."""
-    machine, faults, judged = report["machine"], report["intervals"], judged_sides(report)
-    enough = {
-        key: "" if side.assessed else "not cleared" if side.long_enough else "judged too briefly"
-        for key, side in sides_of(report).items()
-    }
+    machine, faults, standings = report["machine"], report["intervals"], standings_of(report)
     parts = ((Kind.WHEEL, machine["wheels"]), (Kind.STEER, machine["axles"]))
-    return {c: condition(c, kind, faults, judged, enough, words_of(machine)) for kind, names in parts for c in names}
+    return {c: condition(c, kind, faults, standings, words_of(machine)) for kind, names in parts for c in names}
 
 
 def machine_picture(report: ReportDocument) -> Markup:

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from diagnosis.decision.wording import join_words
 from diagnosis.pages import labels
-from diagnosis.pages.environment import SHARED, asset, environment, shared_style
+from diagnosis.pages.environment import SHARED, asset, environment, shared_style, unbroken
 from diagnosis.pages.scripts import packed, packed_plotly, script_policy
 from diagnosis.pages.svg import icon
 from diagnosis.report import tables
@@ -51,7 +51,16 @@ _FIRST = _ASSETS / "data.js"
 #: Scripts that a page holds packed, and expands when it is opened.
 _MAIN = tuple(
     _ASSETS / name
-    for name in ("figure_looks.js", "plot.js", "export.js", "explorer.js", "sight.js", "address.js", "page.js")
+    for name in (
+        "figure_looks.js",
+        "plot.js",
+        "export.js",
+        "explorer.js",
+        "sight.js",
+        "address.js",
+        "stage.js",
+        "page.js",
+    )
 )
 #: Scripts that it expands when its first plot is drawn.
 _LATER = tuple(
@@ -234,7 +243,7 @@ def _headed(rows: Markup, heads: Sequence[str]) -> Markup:
 
 def _coded(text: str) -> Markup:
     """A text whose commands and names, between backticks, are set as such."""
-    return Markup(re.sub(r"`([^`]+)`", r"<code>\1</code>", str(escape(text))))
+    return Markup(re.sub(r"`([^`]+)`", r"<code>\1</code>", str(escape(unbroken(text)))))
 
 
 @lru_cache

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -10,7 +9,6 @@ from markupsafe import Markup
 
 from diagnosis.pages.labels import UNDATED_NS, clock, mode_legend, number, sat_text, utc, utc_mark
 from diagnosis.report.confidence import (
-    OF_A_FAULT,
     going_out,
     headline,
     holds_open,
@@ -31,7 +29,7 @@ from diagnosis.report.data_tables import (
     signal_row,
 )
 from diagnosis.report.edges import time_words
-from diagnosis.report.fault_times import when_words
+from diagnosis.report.fault_times import times_words
 from diagnosis.report.judged_parts import judged_sides
 from diagnosis.results.candidates import label_of
 from diagnosis.results.document import (
@@ -156,6 +154,7 @@ def _fault(fault: IntervalRow, words: MachineWords) -> Context:
         ),
         "figures": figures,
         "check": fault.get("check", ""),
+        "size_note": fault.get("size_note", ""),
         "percent": percent(fault["probability"]),
     }
 
@@ -177,17 +176,15 @@ def clearing_sentences(verdict: VerdictRow) -> list[tuple[str, str]]:
     """What keeps the machine from being cleared and what would clear it, but for what the verdict's own sentences and actions say."""
     text = verdict["text"]
     rows = [
-        r
-        for r in verdict.get("to_clear", [])
-        if not _said(r, text) and not (verdict["actions"] and OF_A_FAULT.match(r["reason"]))
+        r for r in verdict.get("to_clear", []) if not _said(r, text) and not (verdict["actions"] and r.get("fault"))
     ]
     return [(_begun(row["reason"]), "" if row["act"] in text else row["act"]) for row in rows]
 
 
 def _said(row: ToClearRow, text: str) -> bool:
     """Whether the verdict's sentences give a reason, or why parts were not judged together with what would clear them."""
-    why = re.search(r"^Not judged: .* \((.*)\)\.$", row["reason"])
-    return row["reason"] in text or (why is not None and why[1] in text and row["act"] in text)
+    why = row.get("why", "")
+    return row["reason"] in text or (bool(why) and why in text and row["act"] in text)
 
 
 def _begun(text: str) -> str:
@@ -229,7 +226,8 @@ def _action(action: ActionRow, intervals: Mapping[str, IntervalRow], report: Rep
         "state": first["mode"] if first else "warning",
         "severity": action["severity"],
         "sure": sure_of(first, report) if first else "",
-        "when": when_words(first, report) if first else "",
+        "of": f" of {first['id']}" if first and len(faults) > 1 else "",
+        "when": times_words([intervals[f] for f in faults], report),
     }
 
 

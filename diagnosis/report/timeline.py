@@ -9,9 +9,9 @@ from itertools import groupby
 
 import numpy as np
 
-from diagnosis.comparison.coverage import sides_of
 from diagnosis.pages.labels import clock, fault_title, span
 from diagnosis.report.judged_parts import kind_of
+from diagnosis.report.standing import Standing, standings_of
 from diagnosis.results.candidates import label_of
 from diagnosis.results.document import IntervalRow, PhaseRow, ReportDocument
 from diagnosis.results.fault_rows import state_label
@@ -213,13 +213,11 @@ def timeline(report: ReportDocument, duration: float, bars: Collection[str] | No
         Names of the faults that get a bar of their own, the others are part of their lane's line; None: all.
     """
     faults, machine_words = report["intervals"], words_of(report["machine"])
-    sides = sides_of(report)
-    brief = {key for key, side in sides.items() if not side.assessed}
-    seen = {key for key, side in sides.items() if side.long_enough}
+    standings = standings_of(report)
     cause = causes([f for f in faults if bars is None or f["id"] in bars])
     lanes: list[Lane] = []
     quiet: list[Lane] = []
-    counts: dict[str, int] = {}
+    counts: dict[Standing, int] = {}
     for (c, kind, side), spans in _spans_by_lane(report).items():
         mine = [f for f in faults if f["component"] == c and f["kind"] == kind and side in Side(f["side"]).sides]
         group = lanes if mine else quiet
@@ -228,9 +226,9 @@ def timeline(report: ReportDocument, duration: float, bars: Collection[str] | No
             group.append(_faulty_lane(c, side, mine, spans, duration, bars, cause, first, machine_words))
             continue
         state = _main_state(spans)
-        words = "healthy" if state == State.HEALTHY else f"{state_label(state).lower()} throughout"
-        if state == State.HEALTHY and (c, side) in brief:
-            state, words = State.NOT_ASSESSED, "not cleared" if (c, side) in seen else "not judged long enough"
+        words = standings.get((c, side), Standing.NOT_JUDGED)
+        if state == State.HEALTHY and words is not Standing.CLEARED:
+            state = State.NOT_ASSESSED
         counts[words] = counts.get(words, 0) + 1
         name = machine_words.part_name(kind, side)
         group.append(Lane(c, name, state, _lines(spans, side, duration), (), "", first, side))

@@ -118,17 +118,42 @@ class ActionRow(TypedDict):
     severity: Severity
 
 
+class PartRow(TypedDict):
+    """One side of one wheel, joint or axle."""
+
+    component: str
+    side: str
+
+
 class ToClearRow(TypedDict):
-    """What keeps the machine from being cleared, in a sentence, and what would clear it, to follow *to clear it*."""
+    """What keeps the machine from being cleared, in a sentence, and what would clear it, to follow *to clear it*.
+
+    `parts` has the parts that it is of, empty where it is of the whole machine; `fault` the fault that alone is the reason, else empty;
+    `why` of parts that were not judged why not, else empty. Results of earlier versions lack these three.
+    """
 
     reason: str
     act: str
+    parts: NotRequired[list[PartRow]]
+    fault: NotRequired[str]
+    why: NotRequired[str]
+
+
+class CutRow(TypedDict):
+    """In which way what was judged is not the whole mission: ``log`` or ``data`` (of its time), ``wheels`` or ``steering`` (of the machine).
+
+    `components` has the wheels or axles that it is of; empty: the whole machine.
+    """
+
+    kind: str
+    components: list[str]
 
 
 class VerdictRow(TypedDict):
     """Whether the machine may go out, and why not; `scope` has why what was judged is not the whole mission.
 
-    `to_clear` has each reason against *ready* beside the faults; results of earlier versions lack it.
+    `cuts` has the kind of each reason in `scope`, `to_clear` each reason against *ready* beside the faults; results of earlier versions
+    lack them.
     """
 
     status: Verdict
@@ -137,6 +162,7 @@ class VerdictRow(TypedDict):
     title: str
     text: str
     scope: list[str]
+    cuts: NotRequired[list[CutRow]]
     caveats: list[str]
     actions: list[ActionRow]
     to_clear: NotRequired[list[ToClearRow]]
@@ -172,6 +198,7 @@ class IntervalRow(TypedDict):
     tier: Tier
     detected_s: Seconds | None
     check: NotRequired[str]
+    size_note: NotRequired[str]
 
 
 class StateRow(TypedDict):

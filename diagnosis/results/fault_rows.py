@@ -31,7 +31,7 @@ class FaultRow:
     label : str
         Heading: ``No signal``.
     words : str
-        To follow *was*: ``without control signal``.
+        To follow *was*: ``without signal``.
     title : str
         Title of a fault whose size is known, with any of ``{part}``, ``{mean}`` and ``{rms}`` of the saturation term and
         ``{lost}`` [%]; without it, or with a size not known, part and label.
@@ -65,9 +65,7 @@ FAULT_ROWS: tuple[FaultRow, ...] = (
         "{part} noisy, {rms} r.m.s. of noise",
     ),
     FaultRow(Side.ACTUATOR, FaultMode.STUCK, 0.05, "Stuck", "stuck", "{part} stuck at {mean}"),
-    FaultRow(
-        Side.ACTUATOR, FaultMode.NO_SIGNAL, 0.05, "No signal", "without control signal", "{part}: no control signal"
-    ),
+    FaultRow(Side.ACTUATOR, FaultMode.NO_SIGNAL, 0.05, "No signal", "without signal", "{part}: no signal"),
     FaultRow(
         Side.ACTUATOR,
         FaultMode.INEFFICIENT,

@@ -120,6 +120,8 @@ class FaultInterval:
         where that is not known.
     check : str
         How a technician checks the part.
+    size_note : str
+        Why ε̂ is missing, or a bound of it open; else empty.
     """
 
     id: str
@@ -141,6 +143,7 @@ class FaultInterval:
     tier: Tier
     detected_s: float | None = None
     check: str = ""
+    size_note: str = ""
 
 
 @dataclass(frozen=True)

@@ -101,15 +101,15 @@ def _gone(f: FleetFault, b: Machine | None) -> tuple[FaultChange, FleetFault, No
     if known is not None and known.repaired_ns is not None and known.status == "repaired":
         return "resolved", f, None, f"repaired on {utc_moment(known.repaired_ns)}"
     if known is not None:  # found in this audit too, and refuted since
-        return "resolved", f, None, f"not in the last {known.clean} missions that assessed it"
+        return "resolved", f, None, f"not in the last {known.clean} missions that judged it"
     again = any(r.result.start_ns == last and r.name == f.last.name for r in b.dated)
     assessed = sum(r.assessed(f.component, f.side, b.limits) for r in later)
     if assessed:
-        return "resolved", f, None, f"not in {assessed} later mission{'s' if assessed > 1 else ''} that assessed it"
+        return "resolved", f, None, f"not in {assessed} later mission{'s' if assessed > 1 else ''} that judged it"
     if again:
         return "not_seen_again", f, None, "the same mission is judged differently, and no mission is later"
     if later:
-        return "not_seen_again", f, None, "no longer assessed"
+        return "not_seen_again", f, None, "no longer judged long enough"
     return "not_seen_again", f, None, "no mission is later"
 
 
@@ -117,7 +117,7 @@ def _unseen(a: Machine | None, f: FleetFault) -> str:
     if a is None or not a.runs:
         return "the earlier audit has no judged mission of the machine"
     if not any(r.assessed(f.component, f.side, a.limits) for r in a.runs):
-        return "the part was not assessed in the earlier audit: the fault may be older"
+        return "the part was not judged long enough in the earlier audit: the fault may be older"
     return ""
 
 

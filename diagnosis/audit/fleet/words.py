@@ -13,7 +13,7 @@ from diagnosis.audit.trends.trend import Forecast
 from diagnosis.decision.wording import join_words
 from diagnosis.pages.labels import utc, utc_moment
 from diagnosis.results.candidates import UNCLEAR
-from diagnosis.results.fault_rows import mode_words
+from diagnosis.results.fault_rows import state_label
 from diagnosis.results.left_out import only_left_out
 from diagnosis.results.machine_words import MachineWords
 from diagnosis.results.vocabulary import Leave, Verdict
@@ -38,12 +38,12 @@ def round_to(value: float, digits: int = 2) -> str:
 
 def fault_words(f: FleetFault, words: MachineWords) -> str:
     """Part and row: ``RL drive valve inefficient``."""
-    return f"{words.part_words(f.kind, f.component, f.side)} {UNCLEAR if f.unclear else mode_words(f.side, f.mode)}"
+    return f"{words.part_words(f.kind, f.component, f.side)} {UNCLEAR if f.unclear else state_label(f.mode, f.side).lower()}"
 
 
 def found_in(missions: int, assessed: int) -> str:
-    """In how many missions a fault was found: ``in 3 of the 14 missions that assessed the part``."""
-    return f"in {missions} of the {count(assessed, 'mission')} that assessed the part"
+    """In how many missions a fault was found: ``in 3 of the 14 missions that judged the part``."""
+    return f"in {missions} of the {count(assessed, 'mission')} that judged the part"
 
 
 def missions_words(all_missions: int, counted: int) -> str:
@@ -183,7 +183,7 @@ def headline(
     if status is Verdict.READY and any(lost):
         status, tag = Verdict.WATCH, "a loss beyond its limit"
     if unknown and status is Verdict.READY:
-        status, tag = Verdict.NOT_ASSESSED, "not all assessed"
+        status, tag = Verdict.NOT_ASSESSED, "not all judged"
         title += f", but {count(unknown, 'log')} of no known machine {_was(unknown)} not judged"
     return status, tag, title
 

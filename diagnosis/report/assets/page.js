@@ -100,36 +100,7 @@
 
   const mark = (name) => Now.t !== null && Now.set(Now.t, { [name]: Now.t });
 
-  let pictures = null;
-  // Plots whose time in view does not hold the clock's move there, with the clock at a place of the view: 0 its beginning, 0.5 its middle.
-  const reach = (place) => {
-    const [a, b] = evidence?.drawn && Now.t !== null ? evidence.range : [Now.t, Now.t];
-    if (Now.t < a || Now.t > b) evidence.pan((Now.t - a) / (b - a) - place);
-  };
-  root.addEventListener("now", () => {
-    for (const f of Object.values(figures)) if (f?.drawn) f.read().show();
-    if (Now.playing) reach(0);
-    Data.later().then(() => { (pictures ??= new Pictures(document)).show(); return replay?.show(); });
-  });
-
-  // Machine, path and plots on one stage, set up when it is first played or scrubbed.
-  let replay = null, staged = null;
-  const stage = () => (staged ??= Data.later().then(() => {
-    replay = new Replay(one);
-    pictures?.remove();
-    pictures = new Pictures(document);
-    figures.stage = replay.figure;
-    replay.open().catch(failed("#events-none"));
-  }));
-  const play = () => one("#replay") && stage().then(() => replay.play());
-  one("#scrub")?.addEventListener("input", (e) => { Now.set(+e.target.value, { held: true }); reach(0.5); stage(); });
-  one("#events")?.addEventListener("click", (e) => { const b = e.target.closest("button"); if (b) { Now.set(+b.dataset.at, { held: true }); reach(0.5); } });
-  // The cursor may as well be led along the timeline.
-  one("#timeline")?.addEventListener("pointermove", (e) => {
-    const box = e.target.closest(".track")?.getBoundingClientRect();
-    if (box && view.n) Now.set(view.duration * Math.min(1, Math.max(0, (e.clientX - box.left) / box.width)));
-  });
-  one("#timeline")?.addEventListener("pointerleave", () => Now.leave());
+  const stage = new Stage(one, figures, (where) => failed(where));
 
   function follow(figure, range, where = "#linked") {
     if (figure && one(where).checked && figure.range.some((v, i) => Math.abs(v - range[i]) > 1e-9)) figure.zoom(range);
@@ -227,7 +198,7 @@
     csv: ({ dataset: { of } }) => figures[of].rows.length && figures[of].csv().then((text) => Export.save(`${fileName(of)}.csv`, "text/csv", text)),
     image: ({ dataset: { of, form } }) => figures[of].drawn && Export.image(figures[of], fileName(of), form),
     ratio: (b) => look({ ratio: !looks.ratio }, b),
-    robust, play,
+    robust, play: () => stage.play(),
     taller: () => active()?.stretch(2),
     json: () => Export.json(current),
     table: () => Export.table(),
@@ -260,7 +231,7 @@
       "+": () => active()?.scale(0.5), "=": () => active()?.scale(0.5), "-": () => active()?.scale(2),
       ",": () => cursor(-1), ".": () => cursor(1), "<": () => cursor(-10), ">": () => cursor(10), a: () => mark("a"), b: () => mark("b"),
       Escape: () => Now.set(null, { a: null, b: null, held: false }), y: robust, z: () => active()?.stretch(2), Z: () => active()?.stretch(0.5),
-      p: play, w: () => { const e = one("#whatif"); if (e) { e.open = true; Sight.go("#whatif"); one("#whatif-mode").focus({ preventScroll: true }); } },
+      p: actions.play, w: () => { const e = one("#whatif"); if (e) { e.open = true; Sight.go("#whatif"); one("#whatif-mode").focus({ preventScroll: true }); } },
       g: () => { Sight.go("#evidence"); one("#figure")?.focus({ preventScroll: true }); },
       s: () => one("#find")?.focus(), t: actions.theme, "?": actions.help,
     }[e.key];

@@ -129,8 +129,8 @@ class Replay {
         const ratio = now && top && top.v > 0 && Math.abs(now.v) > top.v ? `; the residual is ${Now.number(+(Math.abs(now.v) / top.v).toPrecision(2))} times its threshold` : "";
         const whole = mine.find((f) => f.start <= t && t < f.stop), first = shares.length ? words[shares[0].m] : "";
         const then = first && whole && whole.words !== first ? ` at first; the whole of it is ${whole.words}` : "", little = near(s) ? "" : "; no fault is stated here";
-        out.push({ t: s.start, sure: 1, words: `${clock(s.start)} · ${part.words}: the probability that it deviates passes ${Now.number(100 * limit)} %${first ? `, ${first} ${Math.round(100 * shares[0].p)} %${then}` : ""}${ratio}${little}.` });
-        out.push({ t: s.stop, sure: 1, words: `${clock(s.stop)} · ${part.words}: the probability that it deviates falls below ${Now.number(100 * limit)} % again.` });
+        out.push({ t: s.start, sure: 1, words: `${clock(s.start)} · ${part.words}: the probability that it deviates passes ${Now.number(100 * limit)}\u00a0%${first ? `, ${first} ${Math.round(100 * shares[0].p)} %${then}` : ""}${ratio}${little}.` });
+        out.push({ t: s.stop, sure: 1, words: `${clock(s.stop)} · ${part.words}: the probability that it deviates falls below ${Now.number(100 * limit)}\u00a0% again.` });
       }
     }
     return out;
@@ -161,14 +161,14 @@ class Replay {
       if (part.faults.length) {
         const f = part.faults.find((x) => x.start <= t && t < x.stop);
         part.modes.forEach(({ m }, i) => { part.bar.children[i].style.width = `${f?.mode === m ? 100 * f.p : 0}%`; });
-        part.says.textContent = f ? `${f.words} ${Math.round(100 * f.p)} %` : "no fault stated";
+        part.says.textContent = f ? `${f.words} ${Math.round(100 * f.p)}\u00a0%` : "no fault stated";
         part.bar.setAttribute("aria-label", `${part.words}: ${part.says.textContent}`);
         continue;
       }
       const shares = await Promise.all(part.modes.map(({ channel }) => Data.at(channel, t).then(([a, b]) => (a + b) / 2)));
       let top = -1;
       shares.forEach((p, i) => { part.bar.children[i].style.width = `${100 * (p || 0)}%`; if (p > (shares[top] ?? -1)) top = i; });
-      const most = top < 0 ? "not judged" : `${Data.view.words[part.side][part.modes[top].m]} ${Math.round(100 * shares[top])} %`, slight = top >= 0 && part.modes[top].m !== "healthy" && !Data.view.faults.some((f) => Replay.of(f, part) && f.start <= t && t < f.stop);
+      const most = top < 0 ? "not judged" : `${Data.view.words[part.side][part.modes[top].m]} ${Math.round(100 * shares[top])}\u00a0%`, slight = top >= 0 && part.modes[top].m !== "healthy" && !Data.view.faults.some((f) => Replay.of(f, part) && f.start <= t && t < f.stop);
       if (slight) for (const share of part.bar.children) share.style.width = "0";
       part.says.textContent = slight ? "no fault stated" : most;
       part.bar.setAttribute("aria-label", `${part.words}: ${part.says.textContent}`);

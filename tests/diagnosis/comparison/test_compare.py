@@ -127,7 +127,7 @@ def test_how_far_the_part_of_a_new_fault_was_assessed_before(row: dict[str, Any]
 
 def test_the_side_of_a_new_fault_of_either_side_that_was_not_assessed_before_is_named() -> None:
     found = compared(report(FL_actuator=NOTHING), later(fault("FL", "sensor_or_actuator", "inefficient")))
-    assert only(found).note == "The actuator was not judged in the older mission: the fault may be older."
+    assert only(found).note == "The drive valve was not judged in the older mission: the fault may be older."
 
 
 @pytest.mark.parametrize(
@@ -173,7 +173,10 @@ def test_a_part_that_the_newer_result_leaves_out_is_not_resolved() -> None:
     newer = later()
     newer["coverage"] = [r for r in newer["coverage"] if r["component"] != "FR"]
     found = compared(report(fault("FR", "sensor", "stuck")), newer)
-    assert (only(found).status, only(found).note) == ("not_seen_again", "The newer result does not hold the sensor.")
+    assert (only(found).status, only(found).note) == (
+        "not_seen_again",
+        "The newer result does not hold the speed sensor.",
+    )
 
 
 @pytest.mark.parametrize(
@@ -268,7 +271,7 @@ def test_a_model_may_tell_the_same_fault_as_one_of_the_other_side(tier: str, not
     older = report(fault("FR", "sensor", "noisy", tier=tier))
     found = compared(older, later(fault("FR", "actuator", "inefficient", tier=tier)))
     gone = next(c for c in found.faults if c.status == "resolved")
-    assert ("the actuator of FR is inefficient" in gone.note) == noted
+    assert ("the FR drive valve is inefficient" in gone.note) == noted
 
 
 def test_narrow_bounds_do_not_make_a_small_difference_a_change() -> None:
@@ -342,6 +345,7 @@ def test_gone_in_a_part_of_a_mission_or_beside_an_open_check_is_not_resolved() -
     older = report(fault("FR", "sensor", "stuck"))
     window = later()
     window["verdict"]["scope"] = ["only 29.5 s of 60.0 s of the log were judged"]
+    window["verdict"]["cuts"] = [{"kind": "log", "components": []}]
     open_check = {
         "component": "FR",
         "side": "sensor_or_actuator",

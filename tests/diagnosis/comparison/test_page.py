@@ -57,12 +57,14 @@ def test_the_page_says_what_became_of_each_fault() -> None:
     assert "no longer judged long enough" in seen
     gone = words(page(report("FR", "M", fault("FR")), report("FR", "M", decided=50.0)))
     assert "Not seen again, no repair shown (1)" in gone
-    assert "In the newer mission the sensor was judged for 50.0 s of 100.0 s driving, which is too little." in gone
+    assert (
+        "In the newer mission the speed sensor was judged for 50.0 s of 100.0 s driving, which is too little." in gone
+    )
     assert "Resolved (" not in gone
 
 
 def test_no_fault_is_said_with_what_it_does_not_mean() -> None:
-    assert "Parts that were not assessed may have faults" in words(page(report("FR", "M"), report("FR", "M")))
+    assert "Parts that were not judged may have faults" in words(page(report("FR", "M"), report("FR", "M")))
 
 
 def test_names_are_text_and_the_page_runs_and_fetches_nothing() -> None:

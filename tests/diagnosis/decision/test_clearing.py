@@ -9,6 +9,7 @@ import pytest
 
 from diagnosis.decision.decide import Decision, decide
 from diagnosis.decision.intervals import intervals_of
+from diagnosis.results.assessed import Cut, CutKind
 from diagnosis.results.assessment import Assessment
 from diagnosis.results.clearing import CHECK_WORDS, Check, Checked, clearing_rows
 from diagnosis.results.machine_words import HYDRAULIC
@@ -51,7 +52,7 @@ def test_faults_to_watch_are_not_cleared_beside_an_open_check() -> None:
 
 
 def test_a_part_of_a_mission_clears_nothing() -> None:
-    got = verdict(machine(), scope=("only 29.5 s of 60.0 s of the log were judged",))
+    got = verdict(machine(), scope=(Cut(CutKind.LOG, (), "only 29.5 s of 60.0 s of the log were judged"),))
     assert (got.status, got.cleared) == ("not_assessed", False)
     assert "29.5 s of 60.0 s" in got.text
 

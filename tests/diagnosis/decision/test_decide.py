@@ -199,7 +199,9 @@ def test_faults_to_watch_are_cleared_only_where_all_else_is_ready() -> None:
         "It may have lost 61 %: check it before the machine goes out again."
     ]
     assert str(verdict(half).actions[0]["text"]).startswith("Before the machine goes out, check the FR drive valve")
-    assert [x.act for x in verdict(half).to_clear] == ["repair the FR drive valve (F1), then diagnose the next mission"]
+    assert [x.act for x in verdict(half).to_clear] == [
+        "check the FR drive valve (F1) and repair what is found, then diagnose the next mission"
+    ]
     odd = parts | {("FL", "sensor"): replace(parts["FL", "sensor"], unexplained_s=6.0)}
     assert verdict(odd).not_cleared == "a residual is not explained by any fault"
 
@@ -340,7 +342,7 @@ def test_the_sentence_names_parts_in_the_order_of_the_actions_with_what_they_los
         )
     )
     assert got.text == ("The FL drive valve was faulty for 9.0 s in 3 faults; the FR speed sensor was stuck for 9.0 s.")
-    assert "without control signal for 4.0 s, stuck for 2.0 s" in str(got.actions[0]["text"])
+    assert "without signal for 4.0 s, stuck for 2.0 s" in str(got.actions[0]["text"])
     assert "inefficient (40 % lost, 95 % bounds 39 to 41 %) for 3.0 s" in str(got.actions[0]["text"])
 
 

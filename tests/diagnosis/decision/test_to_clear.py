@@ -7,6 +7,7 @@ import numpy as np
 from diagnosis.decision.caveats import Reservations
 from diagnosis.decision.intervals import intervals_of
 from diagnosis.decision.to_clear import to_clear
+from diagnosis.results.assessed import Cut, CutKind
 from diagnosis.results.assessment import CODE, Assessment, unassessed
 from diagnosis.results.clearing import Check, Checked
 from diagnosis.results.machine_words import HYDRAULIC
@@ -122,7 +123,9 @@ def test_unjudged_steering_has_one_reason() -> None:
     axle = {
         ("front", s): unassessed(N, State.NOT_ASSESSED, "nothing of it is in the log") for s in ("sensor", "actuator")
     }
-    (one,) = told(Reservations(scope=("the front steering was not judged",)), {**PARTS, **axle})
+    (one,) = told(
+        Reservations(scope=(Cut(CutKind.STEERING, ("front",), "the front steering was not judged"),)), {**PARTS, **axle}
+    )
     assert "front steering sensor and front steering valve (nothing of it is in the log)" in one
     assert "log steer.<part>.phi" in one
 

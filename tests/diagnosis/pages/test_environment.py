@@ -7,8 +7,10 @@ from pathlib import Path
 
 import jinja2
 import pytest
+from markupsafe import Markup
 
 from diagnosis.pages import environment as pages
+from diagnosis.pages.environment import unbroken
 
 
 def _page(folder: Path) -> str:
@@ -52,3 +54,17 @@ def test_without_bytecode_nothing_is_kept(templates: Path, monkeypatch: pytest.M
     monkeypatch.setattr(sys, "dont_write_bytecode", True)
     assert _page(templates) == "Wheel &lt;FL&gt;"
     assert not list((templates.parent / "pages" / "__pycache__").iterdir())
+
+
+@pytest.mark.parametrize(
+    ("text", "kept"),
+    [
+        ("95 % bounds, 0.3 m/s for 10.0 s", "95\u00a0% bounds, 0.3\u00a0m/s for 10.0\u00a0s"),
+        ("3 samples of 2 machines", "3 samples of 2 machines"),
+        ("of 57 shells at 50 Hz", "of 57 shells at 50\u00a0Hz"),
+    ],
+)
+def test_a_number_stays_on_the_line_of_its_unit(text: str, kept: str) -> None:
+    assert unbroken(text) == kept
+    assert unbroken(Markup(text)) == text
+    assert unbroken(7) == 7

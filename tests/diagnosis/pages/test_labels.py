@@ -102,7 +102,7 @@ def test_titles_of_all_rows_with_their_sizes() -> None:
         "FR speed sensor: no signal",
         "FR speed sensor inefficient, 12 % lost",
         "FR speed sensor noisy, 0.0307 m/s r.m.s. of noise",
-        "FR drive valve: no control signal",
+        "FR drive valve: no signal",
         "FR drive valve inefficient, 12 % lost",
         "FR drive valve disturbed, 0.0307 m/s r.m.s. of noise",
         "FR speed sensor or drive valve: no signal",

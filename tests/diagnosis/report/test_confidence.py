@@ -88,6 +88,7 @@ def test_a_fault_of_a_part_that_was_hardly_judged_may_last_for_longer() -> None:
 
 def test_phrase_of_a_verdict() -> None:
     done = samples.report_with(coverage=[row("sensor", 98.0), row("actuator", 90.0, tier="model")])
+    del done["verdict"]["to_clear"]
     assert sure_of_verdict(done) == (
         "All 2 wheel parts were judged, each for at least 90 % of its driving, by second measurements and a model of the "
         "wheels."
@@ -137,7 +138,8 @@ def test_parts_that_were_judged_and_those_that_were_cleared_are_counted_apart() 
     about = {"status": "watch", "cleared": True, "to_clear": []}
     found = samples.report_with(coverage=rows, intervals=[watched], verdict=about)
     assert judged(found) == "4 of 4 parts judged, 3 cleared"
-    about["to_clear"] = [{"reason": "F1: the FR speed sensor may have lost 51 %.", "act": "repair it"}]
+    own = {"reason": "F1: the FR speed sensor may have lost 51 %.", "act": "check it", "fault": "F1"}
+    about["to_clear"] = [own | {"parts": [{"component": "FR", "side": "sensor"}]}]
     assert judged(samples.report_with(coverage=rows, intervals=[watched], verdict=about)) == (
         "4 of 4 parts judged, 3 cleared"
     )
@@ -149,19 +151,22 @@ def test_parts_that_were_judged_and_those_that_were_cleared_are_counted_apart() 
     assert judged(samples.report_with(coverage=rows, intervals=[unclear], verdict=about)) == (
         "4 of 4 parts judged, 2 cleared"  # the valve may be it as well
     )
-    about["to_clear"] = [{"reason": "The speed of FL per opening is 30 % below the others'.", "act": "lift it"}]
+    fl = [{"component": "FL", "side": side} for side in ("actuator", "sensor")]
+    about["to_clear"] = [
+        {"reason": "The speed of FL per opening is 30 % below the others'.", "act": "lift it", "parts": fl}
+    ]
     assert judged(samples.report_with(coverage=rows, intervals=[watched], verdict=about)) == (
         "4 of 4 parts judged, 1 cleared"
     )
-    for reason, cleared in (
-        ("Not judged: FL drive valve (its command is not logged).", 2),  # the sensor beside it is not named
-        ("FL speed sensor or drive valve: no single fault explains the residual.", 1),
+    for reason, parts, cleared in (
+        ("Not judged: FL drive valve (its command is not logged).", fl[:1], 2),  # the sensor beside it is not named
+        ("FL speed sensor or drive valve: no single fault explains the residual.", fl, 1),
     ):
-        about["to_clear"] = [{"reason": reason, "act": "log it"}]
+        about["to_clear"] = [{"reason": reason, "act": "log it", "parts": parts}]
         assert judged(samples.report_with(coverage=rows, intervals=[watched], verdict=about)) == (
             f"4 of 4 parts judged, {cleared} cleared"
         )
-    about["to_clear"] = [{"reason": "Several wheels swing together.", "act": "lower the gains"}]
+    about["to_clear"] = [{"reason": "Several wheels swing together.", "act": "lower the gains", "parts": []}]
     assert judged(samples.report_with(coverage=rows, intervals=[watched], verdict=about)) == (
         "4 of 4 parts judged, none cleared: several wheels swing together"
     )

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from diagnosis.report.fault_times import when_words
+from diagnosis.report.fault_times import times_words, when_words
 from tests import report_samples as samples
 
 HEALTHY = {"component": "FR", "side": "actuator", "state": "healthy", "start_s": 80.0, "stop_s": 100.0, "reason": ""}
@@ -24,3 +24,18 @@ def test_onset_clock_time_and_end(start: float, stop: float, words: str) -> None
     report["states"] = []
     if stop < 99.0:
         assert when_words(fault, report).endswith("before the log ends; its part was not seen healthy since")
+
+
+def test_of_several_faults_of_a_part_the_most_urgent_and_the_last_are_told() -> None:
+    first, last, between = (
+        samples.fault(id=name, component="FR", side="actuator", start_s=start, stop_s=stop)
+        for name, start, stop in (("F1", 20.0, 30.0), ("F4", 90.0, 100.0), ("F2", 50.0, 60.0))
+    )
+    report = samples.report_with(intervals=[first, between, last], states=[])
+    report["log"] |= {"duration_s": 100.0}
+    both = times_words([first, between, last], report)
+    assert both.startswith("F1 began at 0:20.000")
+    assert both.endswith("and lasts to the end of the log")
+    assert "F2" not in both
+    assert times_words([last, first], report) == when_words(last, report)
+    assert times_words([], report) == ""

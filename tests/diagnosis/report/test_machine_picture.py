@@ -7,10 +7,12 @@ import pytest
 
 from diagnosis.report.machine_picture import condition, machine_picture
 from diagnosis.report.path_picture import path_picture
+from diagnosis.report.standing import Standing
 from diagnosis.report.thumbnail import thumbnail
 from diagnosis.results.vocabulary import Kind
 from tests import report_samples as samples
 
+CLEARED = {("FR", side): Standing.CLEARED for side in ("sensor", "actuator")}
 FAULT = samples.fault(start_s=3.0, stop_s=4.0)
 
 
@@ -33,11 +35,10 @@ def test_any_number_of_wheels_without_geometry(count: int) -> None:
 
 
 def test_part_that_was_never_judged_is_not_called_healthy() -> None:
-    judged = {("FR", "sensor"): True, ("FR", "actuator"): False}
-    half = condition("FR", Kind.WHEEL, [], judged)
-    assert (half.state, half.lines) == ("not_assessed", ("No fault found", "drive valve", "not assessed"))
-    assert condition("FR", Kind.WHEEL, [], {}).state == "not_assessed"
-    assert condition("FR", Kind.WHEEL, [], {("FR", "sensor"): True}).state == "healthy"
+    half = condition("FR", Kind.WHEEL, [], CLEARED | {("FR", "actuator"): Standing.NOT_JUDGED})
+    assert (half.state, half.lines) == ("not_assessed", ("No fault found", "drive valve not judged"))
+    none = condition("FR", Kind.WHEEL, [], {})
+    assert (none.state, none.lines) == ("not_assessed", ("Not judged",))
 
 
 def test_thumbnail_keeps_gaps_and_clips_to_the_mission() -> None:
@@ -61,12 +62,15 @@ def test_path_breaks_at_gaps_and_survives_standing_still() -> None:
     assert path_picture(np.zeros(100), np.zeros(100), 0.0, 0.1, [FAULT]).count('class="mark') == 1
 
 
-def test_a_part_that_was_judged_too_briefly_is_not_called_healthy() -> None:
-    judged = {("FR", "sensor"): True, ("FR", "actuator"): True}
-    short = condition("FR", Kind.WHEEL, [], judged, {("FR", "sensor"): "", ("FR", "actuator"): "judged too briefly"})
-    assert short.state == "not_assessed"
-    assert short.lines == ("No fault found", "drive valve", "judged too briefly")
-    assert condition("FR", Kind.WHEEL, [], judged, dict.fromkeys(judged, "")).lines == ("Healthy",)
+def test_a_part_that_is_not_cleared_is_not_called_healthy() -> None:
+    short = {("FR", "actuator"): Standing.NOT_LONG_ENOUGH}
+    one = condition("FR", Kind.WHEEL, [], CLEARED | short)
+    assert (one.state, one.lines) == ("not_assessed", ("No fault found", "drive valve not judged long enough"))
+    each = condition("FR", Kind.WHEEL, [], {("FR", "sensor"): Standing.NOT_CLEARED} | short)
+    assert each.lines == ("No fault found", "speed sensor not cleared", "drive valve not judged long enough")
+    both = condition("FR", Kind.WHEEL, [], dict.fromkeys(CLEARED, Standing.NOT_CLEARED))
+    assert both.lines == ("No fault found", "not cleared")
+    assert condition("FR", Kind.WHEEL, [], CLEARED).lines == ("Healthy",)
 
 
 def test_long_words_stand_in_several_lines() -> None:
@@ -88,8 +92,8 @@ def test_long_words_stand_in_several_lines() -> None:
     words = re.findall(r'class="side[^"]*">([^<]*)<', machine_picture(report))
     assert words == [
         "No fault found",
-        "judged too",
-        "briefly",
+        "not judged long",
+        "enough",
         "Speed sensor or",
         "drive valve",
         "outside the",
@@ -100,11 +104,10 @@ def test_long_words_stand_in_several_lines() -> None:
 
 
 def test_what_is_of_little_severity_is_a_remark_and_paints_no_part() -> None:
-    judged = {("FR", "sensor"): True, ("FR", "actuator"): True}
     faint = samples.fault(mode="noisy", severity="info", start_s=30.0, stop_s=30.013)
-    found = condition("FR", Kind.WHEEL, [faint], judged)
+    found = condition("FR", Kind.WHEEL, [faint], CLEARED)
     assert (found.state, found.lines, found.fault) == ("healthy", ("Healthy", "1 remark"), faint["id"])
-    assert condition("FR", Kind.WHEEL, [faint, samples.fault(id="F2")], judged).state == "stuck"
+    assert condition("FR", Kind.WHEEL, [faint, samples.fault(id="F2")], CLEARED).state == "stuck"
 
 
 def test_a_drive_to_stop_at_once_for_comes_before_a_sensor_as_among_the_actions() -> None:

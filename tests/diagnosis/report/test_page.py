@@ -31,6 +31,9 @@ SAMPLES: list[Callable[[], tuple[dict[str, Any], samples.Columns]]] = [
 ]
 
 
+NBSP = "\u00a0"  # between a number and its unit
+
+
 class Tree(HTMLParser):
     """Tags with attributes, and the text of scripts and of everything else."""
 
@@ -56,7 +59,7 @@ class Tree(HTMLParser):
             attrs, text = self.scripts[-1]
             self.scripts[-1] = (attrs, text + data)
         elif self._in != "style":
-            self.words.append(data)
+            self.words.append(data.replace(NBSP, " "))
 
     @property
     def text(self) -> str:
@@ -248,7 +251,7 @@ def test_unlikely_explanations_are_named_without_a_bar() -> None:
         {"side": "sensor", "mode": "noisy", "p": 1e-300},
     ]
     text = build_page(report, columns)
-    assert "Below 0.1 %: speed sensor noisy." in text
+    assert "Below 0.1&nbsp;%: speed sensor noisy." in text
     assert text.count('<b class="noisy"') == 0
     assert "--limit:90%" in text
 

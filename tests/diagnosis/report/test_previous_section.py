@@ -9,6 +9,7 @@ from diagnosis.report.page import build_page
 from diagnosis.report.previous import previous_section
 from diagnosis.results.document import ReportDocument
 from tests import report_samples as samples
+from tests.coverage_changes import changed_coverage, judged_side
 from tests.whole_documents import whole_report
 
 
@@ -79,20 +80,8 @@ def test_losses_are_listed_where_they_differ() -> None:
 
 
 def test_parts_that_were_judged_in_both_missions_are_not_said_to_be_judged_in_one() -> None:
-    side = {
-        "tier": "model",
-        "driving_s": 44.5,
-        "decided_s": 44.5,
-        "judged_s": 44.5,
-        "assessed": True,
-        "shown": True,
-        "long_enough": True,
-    }
-    checked, brief = (
-        side | {"assessed": False, "shown": False},
-        side | {"assessed": False, "long_enough": False, "decided_s": 9.0},
-    )
-    row = {"component": "RL", "kind": "wheel", "side": "sensor", "older": side, "change": "lost"}
+    checked = judged_side(assessed=False, shown=False)
+    brief = judged_side(assessed=False, long_enough=False, decided_s=9.0)
     report = with_previous(earlier(), earlier())
     for newer, head, words in (
         ([checked], "Judged in both missions, its checks passed in one only", "a check is open now"),
@@ -103,7 +92,7 @@ def test_parts_that_were_judged_in_both_missions_are_not_said_to_be_judged_in_on
             "no longer judged long enough",
         ),
     ):
-        report["previous"]["coverage"] = [{**row, "newer": x} for x in newer]  # type: ignore[typeddict-item]
+        report["previous"]["coverage"] = [changed_coverage(x) for x in newer]  # type: ignore[typeddict-item]
         section = previous_section(report)
         assert section is not None
         assert section["coverage_head"] == head

@@ -30,7 +30,7 @@ def test_lanes_with_and_without_faults() -> None:
         ("front", "steering sensor"),
     ]
     assert len(t.quiet) == 7
-    assert t.summary == "7 lanes without a fault: 6 healthy, 1 not assessed throughout"
+    assert t.summary == "7 lanes without a fault: 6 cleared, 1 not judged"
 
 
 def test_fault_that_is_not_isolated_stands_on_both_lanes() -> None:
@@ -57,10 +57,11 @@ def test_faults_that_may_follow_from_another_are_faded() -> None:
     assert causes([stuck, loss(component="FL")]) == {}
 
 
-def test_a_part_that_was_judged_too_briefly_does_not_count_as_healthy() -> None:
+def test_a_part_that_was_not_judged_long_enough_does_not_count_as_healthy() -> None:
     rows = [("sensor", 60.0), ("actuator", 18.0)]
     report = samples.report_with(
         machine={"wheels": ["FR"]},
+        verdict={"status": "watch", "cleared": False, "to_clear": []},
         states=[
             {"component": "FR", "side": side, "state": "healthy", "start_s": 0.0, "stop_s": s, "reason": ""}
             for side, s in rows
@@ -79,7 +80,7 @@ def test_a_part_that_was_judged_too_briefly_does_not_count_as_healthy() -> None:
     )
     t = timeline(report, 66.0)
     assert [lane.state for lane in t.quiet] == ["healthy", "not_assessed"]
-    assert t.summary == "2 lanes without a fault: 1 healthy, 1 not judged long enough"
+    assert t.summary == "2 lanes without a fault: 1 cleared, 1 not judged long enough"
 
 
 def bar(left: float, width: float) -> Bar:

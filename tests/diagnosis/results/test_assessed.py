@@ -1,8 +1,14 @@
 from __future__ import annotations
 
+from typing import Any
+
 import pytest
 
-from diagnosis.results.assessed import is_judged, is_limited
+from diagnosis.results.assessed import Cut, CutKind, is_judged, is_limited
+
+
+def verdict(*cuts: Cut) -> Any:
+    return {"scope": [cut.text for cut in cuts], "cuts": [cut.row() for cut in cuts]}
 
 
 @pytest.mark.parametrize(
@@ -15,8 +21,16 @@ def test_a_part_is_judged_for_the_least_time_and_four_fifths_of_its_driving(
 
 
 def test_steering_that_was_not_judged_cuts_nothing_of_the_wheels() -> None:
-    assert not is_limited(["the front and rear steering was not judged"], "FR")
-    assert is_limited(["the wheel FR was not judged", "only 20.0 s of 60.0 s of the log were judged"], "FL")
-    gap = ["for 6.0 s of 60.0 s, without data, the front steering was not judged"]
-    assert is_limited(gap, "front")
-    assert not is_limited(gap, "rear")
+    steering, wheel = Cut(CutKind.STEERING, ("front", "rear"), "…"), Cut(CutKind.WHEELS, ("FR",), "…")
+    assert not is_limited(verdict(steering), "FR")
+    assert is_limited(verdict(wheel, Cut(CutKind.LOG, (), "…")), "FL")
+    gap = verdict(Cut(CutKind.DATA, ("front_steer",), "…"))
+    assert is_limited(gap, "front_steer")
+    assert not is_limited(gap, "rear_steer")
+
+
+def test_a_report_that_does_not_say_of_what_it_is_cut_limits_every_part() -> None:
+    earlier = verdict(Cut(CutKind.STEERING, ("front",), "…"))
+    del earlier["cuts"]
+    assert is_limited(earlier, "FR")
+    assert not is_limited({**earlier, "scope": []}, "FR")

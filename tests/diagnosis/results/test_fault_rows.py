@@ -23,7 +23,7 @@ from replay.faults import DECIDED, TABLE_MODES, TABLE_ROWS, FaultMode, Side, Sta
 def test_words_of_the_paper() -> None:
     assert mode_words("actuator", "noisy") == "disturbed"
     assert mode_words("sensor", "noisy") == "noisy"
-    assert mode_words("actuator", "no_signal") == "without control signal"
+    assert mode_words("actuator", "no_signal") == "without signal"
     for side in Side:
         for mode in FaultMode:
             assert mode_words(side, mode)

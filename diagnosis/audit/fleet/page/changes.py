@@ -44,7 +44,7 @@ def changes_of(b: ShownBaseline | None, words: Mapping[str, MachineWords]) -> Co
     coverage = [
         {
             "change": c["change"],
-            "words": {"lost": "no longer assessed", "gained": "assessed now"}[c["change"]],
+            "words": {"lost": "no longer judged long enough", "gained": "judged long enough now"}[c["change"]],
             "part": f"{c['machine']}: {words.get(c['machine'], HYDRAULIC).part_words(c['kind'], c['component'], c['side'])}",
         }
         for c in b["coverage"]

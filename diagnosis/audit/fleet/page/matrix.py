@@ -69,7 +69,9 @@ def _cell(part: PartRow | None, count: int, most: int, judged: bool) -> Markup:
     if part is None or not count:
         if part is not None and part["assessed"]:
             return Markup('<td class="nil"><span class="sr">0</span></td>')
-        return Markup('<td class="blind" title="never assessed">–<span class="sr"> never assessed</span></td>')
+        return Markup(
+            '<td class="blind" title="never judged long enough">–<span class="sr"> never judged long enough</span></td>'
+        )
     level = 1 + (_LEVELS - 1) * (count - 1) // max(1, most - 1)
     modes = Markup("").join(
         Markup('<span class="m">{}<b>{}</b><span class="sr"> {}</span></span>').format(

@@ -36,32 +36,32 @@ from diagnosis.results.candidates import UNCLEAR
 from diagnosis.results.fault_rows import state_label
 from diagnosis.results.machine_words import words_of
 from diagnosis.results.vocabulary import Leave, Verdict
-from replay.faults import SCALED
+from replay.faults import SCALED, FaultMode
 
 _HERE = Path(__file__).parent
 _FAULTS = 400
 _COURSE = 5  # missions whose ε̂ a fault's course names
 _OPEN_ROWS = 40
-_BLIND = 100  # machines whose parts that were not assessed are listed
+_BLIND = 100  # machines whose parts that were not judged are listed
 _FAILURES = 1000
 _FILTER = (Verdict.STOP, Verdict.WATCH, Verdict.READY, Verdict.NOT_ASSESSED)
 _UNITS = {"hours": "h", "days": "d"}
 _STATUS = {"new": "New", "recurring": "Recurring", "once": "Once", "past": "Past", "repaired": "Repaired"}
 _DEFINITIONS = (
-    "The verdict of a machine is that of its last mission that could be assessed. It is worse where no later mission assessed "
+    "The verdict of a machine is that of its last mission that could be judged. It is worse where no later mission judged "
     "the part of an earlier fault. A machine counts as ready only if no mission without a verdict may be later. A log that cannot "
     "be read or has no date may be later, unless an earlier audit run read it before that mission began. A log without a "
     "verdict and without a machine counts for the only machine with judged missions in its folder. Missions count but "
     "cannot be ordered if their log has no date, if its date is more than a day after an audit read it, or if they start "
     "at the same moment.",
-    "New: in the last mission of the machine and in no earlier one, of which at least one assessed the part. Recurring: in several missions. "
-    "Past: not found in the last three missions that assessed the part. Faults of severity “info” are left out.",
+    "New: in the last mission of the machine and in no earlier one, of which at least one judged the part. Recurring: in several missions. "
+    "Past: not found in the last three missions that judged the part. Faults of severity “info” are left out.",
     "A fault of high severity that no longer shows may be a loose contact. It stays open until the repair of its part is recorded "
-    "(mfhca audit --repaired), or until ten missions are clean that would have shown it: the part was assessed, and by its report the "
+    "(mfhca audit --repaired), or until ten missions are clean that would have shown it: the part was judged, and by its report the "
     "mission would have shown such a fault of ten seconds more often than not. Repaired: not found since the repair.",
     "Missions with a report count. A copy of a log, a log that was not read and one that is not audited yet are missions that "
     "do not count in machines, faults and trends.",
-    "Assessed, or judged long enough: judged for the seconds that the verdict “ready” takes, and for four fifths of its driving. Check before it goes out: the missions do not tell that the machine is sound.",
+    "A mission judged a part, or judged it long enough: decided, healthy or faulty, for the seconds that the verdict “ready” takes and for four fifths of its driving. Check before it goes out: the missions do not tell that the machine is sound.",
     "Trend: weighted line through the missions' ε̂ over time, each over its whole mission, while a fault's ε̂ is that of the fault's own time; it is fitted by least squares, so that a time counts by the square of the speed, opening or angle in it, and a loss of half of the mission may be more or less than half of it; the spread from mission to mission is estimated with it. "
     "Outliers (×) are excluded. A step or bend (↓ ↑ ∠), such as a repair, starts a new line. "
     "The band is its 90 % interval, the bar on the limit the 90 % interval of the crossing.",
@@ -189,7 +189,11 @@ def _css() -> str:
 def _environment() -> jinja2.Environment:
     made = environment(_HERE)
     made.filters |= {"state": state_label, "grouped": labels.grouped}
-    made.globals |= {"mark": mark, "legend": LEGEND, "verdicts": [(v, v.short) for v in _FILTER]}
+    made.globals |= {
+        "mark": mark,
+        "legend": [(s, labels.mode_legend(FaultMode(s)) if s in set(FaultMode) else state_label(s)) for s in LEGEND],
+        "verdicts": [(v, v.short) for v in _FILTER],
+    }
     return made
 
 
@@ -270,7 +274,9 @@ def _fault(f: FleetFaultRow, document: ShownDocument, directions: Mapping[tuple[
         direction = directions.get((f["machine"], f["component"], f["side"]), "not_known")
         notes += [direction] if direction != "not_known" else []
     if found and "lasting" in found[-1]:
-        notes.append("lasts to the end of the log" if found[-1]["lasting"] else "last seen before the end of the log")
+        notes.append(
+            "lasts to the end of the log" if found[-1]["lasting"] else "ended, or last seen before the end of the log"
+        )
     if f["status"] == "repaired" and f["repaired_ns"] is not None:
         notes.append(f"repaired on {labels.utc_moment(f['repaired_ns'])}")
     elif f["repaired_ns"] is not None:
@@ -280,7 +286,7 @@ def _fault(f: FleetFaultRow, document: ShownDocument, directions: Mapping[tuple[
         notes.append(f"open{open_words(True, f['clean'], f['needed']) or none}")
     elif f["since"]:
         last_ones = f"last {count(f['since'], 'mission')}" if f["since"] > 1 else "last mission"
-        notes.append(f"not in the {last_ones} that assessed it")
+        notes.append(f"not in the {last_ones} that judged it")
     return {
         "machine": document["machines"][f["machine"]]["label"],
         "symbol": labels.known(f["mode"]),

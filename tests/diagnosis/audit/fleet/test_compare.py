@@ -1,4 +1,4 @@
-"""An audit against an earlier one: nothing that is no longer assessed counts as resolved."""
+"""An audit against an earlier one: nothing that is no longer judged counts as resolved."""
 
 from __future__ import annotations
 
@@ -56,8 +56,8 @@ def test_a_growing_store(tmp_path: Path, later: list[Sample], outcome: str, word
     ("newer", "outcome", "words"),
     [
         ([Sample("b", day=1.0)], "resolved", "later mission"),
-        ([Sample("b", day=1.0, blind=[VALVE])], "not_seen_again", "no longer assessed"),
-        ([Sample("b", day=1.0, parts=[("FR", "sensor")])], "not_seen_again", "no longer assessed"),
+        ([Sample("b", day=1.0, blind=[VALVE])], "not_seen_again", "no longer judged long enough"),
+        ([Sample("b", day=1.0, parts=[("FR", "sensor")])], "not_seen_again", "no longer judged long enough"),
         ([Sample("b", day=-1.0)], "not_seen_again", "no mission is later"),
         ([Sample("a")], "not_seen_again", "judged differently"),
         ([Sample("b", "HX-2", day=1.0)], "not_seen_again", "no judged mission"),

@@ -88,7 +88,7 @@ def test_the_matrix_counts_missions_by_part_and_tells_none_from_not_assessed(tmp
     ((label, cells, total),) = m.rows
     assert (label, total, m.quiet) == ("HX-1", 4, 1)
     text = [re.sub(r"<[^>]*>", " ", str(c)).split() for c in cells]
-    assert text[0] == ["–", "never", "assessed"]
+    assert text[0] == ["–", "never", "judged", "long", "enough"]
     assert text[1] == ["0"]
     assert text[6] == ["1", "Inefficient"]
     assert text[7] == ["2", "Inefficient", "1", "Stuck"]

@@ -1,0 +1,62 @@
+"""Why the size of a fault is not known, or open to a side, in a sentence."""
+
+from __future__ import annotations
+
+from diagnosis.results.assessment import Finding
+from diagnosis.results.result import Epsilon
+from diagnosis.results.vocabulary import Kind, Tier
+from replay.faults import FaultMode
+
+_WHOLE = 0.995  # of ε: what a page rounds to all
+_NONE = 0.005
+
+
+def size_note(finding: Finding, epsilon: Epsilon | None, kind: Kind) -> str:
+    """Why ε̂ of a fault is missing, or bounded to one side at most; empty where both bounds say something.
+
+    Parameters
+    ----------
+    finding : Finding
+        The fault.
+    epsilon : Epsilon or None
+        Its ε̂ as it is stated, with its 95 % bounds.
+    kind : Kind
+        Of its part.
+    """
+    if epsilon is None:
+        return _missing(finding.mode)
+    if finding.mode is FaultMode.OUTSIDE_TABLE:
+        return ""
+    if finding.mode.total:
+        if epsilon.low >= _WHOLE:
+            return ""
+        return "By its row all is lost (ε̂ = 1); the lower bound is less, for other rows come into question, too."
+    low, high = epsilon.low <= _NONE, epsilon.high >= _WHOLE
+    if not (low or high):
+        return ""
+    open_ = (
+        "Neither bound of ε̂ says anything, so that from nothing to all may be lost"
+        if low and high
+        else "The lower bound of ε̂ is open, so that nothing may be lost"
+        if low
+        else "The upper bound of ε̂ is open, so that all may be lost"
+    )
+    return f"{open_}: {_why(finding, kind)}."
+
+
+def _missing(mode: FaultMode) -> str:
+    """Why there is no ε̂ at all."""
+    if mode.varying:
+        return "No ε̂ is stated: what varies does not tell how much of the signal itself is lost."
+    if mode is FaultMode.OUTSIDE_TABLE:
+        return "No ε̂ is stated: what deviates is no share of the signal."
+    return "No ε̂ is stated: the readings do not tell how much is lost."
+
+
+def _why(finding: Finding, kind: Kind) -> str:
+    """What keeps a bound of ε̂ open."""
+    if finding.mode.varying:
+        return "noise hides how much of the signal itself is left"
+    if finding.tier is Tier.MODEL and kind is Kind.WHEEL:
+        return "the bounds hold how far a model of the wheel may itself be off; a second measurement narrows them"
+    return "in the time of the fault the part was moved too little, or deviates too unevenly, to say more"
