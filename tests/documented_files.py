@@ -51,7 +51,7 @@ def _mission(seed: int, faults: tuple[FaultSpec, ...] = ()) -> SimulatedMission:
     start = 1_760_000_000_000_000_000 + seed * day_ns
     return simulate_mission(
         SimulationOptions(
-            scenario="healthy", seed=seed, duration_s=30.0, rate_hz=50.0, imu=False, start_ns=start, faults=faults
+            scenario="healthy", seed=seed, duration_s=40.0, rate_hz=50.0, imu=False, start_ns=start, faults=faults
         )
     )
 
