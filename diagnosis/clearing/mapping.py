@@ -17,7 +17,8 @@ from diagnosis.clearing.still import rate_of
 _LAG_S = 0.3  # of what follows a command
 _MOVED = 0.3  # of the largest value: less of it says nothing
 _LEAST_S = 5.0
-_AGAINST = -0.8  # correlation
+_AGAINST, _MOVES_AGAINST = -0.8, -0.5  # correlation, about zero and about the means
+_STEADY, _SMALL = 0.1, 0.1  # of its size: a command that varies by less, a reading that is less
 _APART, _EVEN = 0.08, 0.12  # of a factor from a known one, and how much it may vary [ln]
 _TRACKS = 0.3  # by how much a loop usually stays behind its command [ln]
 _GEARED = 1.2
@@ -116,7 +117,7 @@ def _hints(
     ratios = {i: _ratio(*pair) for i, pair in pairs.items()}
     usual = float(np.median([r for r in ratios.values() if np.isfinite(r)] or [0.0]))
     for i, (y, x) in pairs.items():
-        if _alike(y, x) < _AGAINST:
+        if _against(y, x):
             text = f"{names[i]} runs against {what} throughout: {_LOOK}"
             yield Hint(_part(names[i]), backwards=True, text=text)
         elif sizes and (
@@ -133,6 +134,16 @@ def _moving(y: Array, x: Array) -> tuple[Array, Array]:
 
 def _part(name: str) -> str:
     return name.split(".")[1]
+
+
+def _against(y: Array, x: Array) -> bool:
+    """Whether y is −x by and large, and moves so: a reading that stays where it is runs nowhere."""
+    moves = float(np.std(x)) < _STEADY * _rms(x) or _alike(y - y.mean(), x - x.mean()) < _MOVES_AGAINST
+    return _alike(y, x) < _AGAINST and moves and _rms(y) > _SMALL * _rms(x)
+
+
+def _rms(x: Array) -> float:
+    return float(np.sqrt(np.mean(x * x)))
 
 
 def _alike(y: Array, x: Array) -> float:

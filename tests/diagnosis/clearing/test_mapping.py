@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from diagnosis.clearing.mapping import mapping_hints
@@ -82,3 +83,12 @@ def test_parts_that_count_backwards_are_named_and_nothing_that_a_model_claims_of
     assert not [f for f in report["intervals"] if f["component"] == "RR"]
     assert report["verdict"]["status"] == "not_assessed"
     assert "wheel.RR.v runs against its commanded speed" in report["verdict"]["text"]
+
+
+@pytest.mark.parametrize("value", [-0.02, -0.3])
+def test_a_reading_that_stays_where_it_is_runs_against_nothing(value: float) -> None:
+    """Held beyond its middle while its command is mostly on the other side."""
+    mission = simulated()
+    asked = mission.columns["steer.front.phi_ref"]
+    columns = {**mission.columns, "steer.front.phi": np.full(asked.size, value), "steer.front.phi_ref": np.abs(asked)}
+    assert not [h for h in mapping_hints(in_cells(replace(mission, columns=columns), base=True)) if h.backwards]
