@@ -279,10 +279,12 @@ def test_a_first_and_a_last_tick_that_are_cut_off() -> None:
     assert np.abs(found[0] - true).max() <= 10_000_000
 
 
-def test_bunches_that_a_gateway_hands_on_at_once_are_spread_over_the_time_before() -> None:
+@pytest.mark.parametrize("every", [1, 4])
+def test_bunches_that_a_gateway_hands_on_at_once_are_spread_over_the_time_before(every: int) -> None:
+    """Also of a node that says each value `every` times."""
     true = T0 + np.arange(2000, dtype=np.int64) * 5_000_000
     handed = (true // 40_000_000 + 1) * 40_000_000
-    found = spread_ticks(handed + np.arange(2000) % 8 * 7_000, np.arange(2000))
+    found = spread_ticks(handed + np.arange(2000) % 8 * 7_000, np.arange(2000) // every)
     assert found is not None
     assert found[1] == pytest.approx(40_000_000, rel=0.01)
     assert np.all(np.diff(found[0]) > 0)
