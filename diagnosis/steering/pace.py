@@ -76,7 +76,7 @@ def identified(
     noises : Sequence[SensorNoise]
         Of their angles.
     speed : Callable[[NDArray[np.intp]], Array]
-        Of driving at given steps [m/s].
+        Of driving at given steps [m/s], from shape (k,) to (k,).
     machine : Machine
         Its top speed and end stops.
     known : Sequence[SteeringPlant or None]

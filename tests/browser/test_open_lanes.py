@@ -41,4 +41,4 @@ def test_an_open_lane_says_how_near_each_check_came(open_page: OPEN) -> None:
     lane.locator("summary").click()
     expect(lane.locator(".part")).to_contain_text("against its second measurement")
     expect(lane.locator(".part")).to_contain_text("15 %, limit 25 %; largest at 1:07.5")
-    expect(lane.locator(".part")).to_contain_text(re.compile(r"Loss for 2 s\s*30 %"))
+    expect(lane.locator(".part")).to_contain_text(re.compile(r"Loss for 2\ss\s*30\s%"))

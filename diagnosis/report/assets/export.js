@@ -36,9 +36,9 @@ const Export = (() => {
     save("faults.csv", "text/csv", lines.map((l) => l.join(",")).join("\n") + "\n");
   }
 
-  // What the article of a fault says, as lines of text.
+  // What the article of a fault says, as lines of text; spaces that keep a line together are plain ones elsewhere.
   async function copy(article, button) {
-    const text = `${Data.view.name}\n${article.dataset.text}\n` + [...article.querySelectorAll("li, .advice, p.how")].map((e) => `- ${e.textContent.trim()}`).join("\n") + `\n${location.hash}\n`;
+    const lines = `${Data.view.name}\n${article.dataset.text}\n` + [...article.querySelectorAll("li, .advice, p.how")].map((e) => `- ${e.textContent.trim()}`).join("\n") + `\n${location.hash}\n`, text = lines.replaceAll("\u00a0", " ");
     try { await navigator.clipboard.writeText(text); } catch {
       const area = document.createElement("textarea");
       area.value = text;

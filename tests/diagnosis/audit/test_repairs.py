@@ -127,7 +127,7 @@ def test_an_open_fault_is_on_the_page_and_on_the_terminal(tmp_path: Path, capsys
     assert "Fault open, no repair recorded" in page
     assert "open, clean in 3 of the 10 missions that close it" in page
     assert document(tmp_path)["verdict"]["text"][0] == (
-        "HX-1 – fault open, no repair recorded: FR speed sensor without signal in 2 of the 11 missions that assessed the part, "
+        "HX-1 – fault open, no repair recorded: FR speed sensor no signal in 2 of the 11 missions that judged the part, "
         "clean in 3 of the 10 missions that close it."
     )
     listed = listed_machines(document(tmp_path))  # type: ignore[arg-type]
@@ -138,7 +138,7 @@ def test_an_open_fault_is_on_the_page_and_on_the_terminal(tmp_path: Path, capsys
 def test_a_repair_closes_what_was_found_before_it(tmp_path: Path) -> None:
     stored(tmp_path, course("..x....x..."))
     done = repair(tmp_path, "HX-1 FR sensor", 7.5)
-    assert done.told[0].closes == ("FR speed sensor without signal",)
+    assert done.told[0].closes == ("FR speed sensor no signal",)
     assert standing(tmp_path) == ("ready", "Ready", "repaired")
     day = utc_moment(at(7.5))
     assert f"repaired on {day}" in (tmp_path / "fleet.html").read_text(encoding="utf-8")
@@ -329,9 +329,9 @@ def test_what_stays_open_is_said(tmp_path: Path) -> None:
     either = Fault("FR", "sensor_or_actuator", "no_signal", "high")
     stored(tmp_path, [Sample("m", day=0.0, verdict="stop", faults=(SILENT, either))])
     first = repair(tmp_path, "HX-1 FR sensor", 3.0).told[0]
-    assert [w.split(":")[0] for w in first.closes] == ["FR speed sensor without signal"]
+    assert [w.split(":")[0] for w in first.closes] == ["FR speed sensor no signal"]
     (stays,) = first.stays
-    assert stays.startswith("FR speed sensor or drive valve without signal or motion: the repair of one side")
+    assert stays.startswith("FR speed sensor or drive valve no signal: the repair of one side")
     second = repair(tmp_path, "HX-1 FR drive valve", 4.0).told[0]
     assert (len(second.closes), second.stays) == (1, ())
     stored(tmp_path / "later", course("..x"))
@@ -352,7 +352,7 @@ def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeyp
     assert run(words) == 0
     shown = capsys.readouterr().out
     assert "Repair recorded: HX-1 FR sensor on 2025-10-20 00:00:00 UTC" in shown
-    assert "closes: FR speed sensor without signal" in shown
+    assert "closes: FR speed sensor no signal" in shown
     assert "Not assessed since the repair" in " ".join(shown.split())
     assert run([*words, "--json"]) == 0
     found = json.loads(capsys.readouterr().out)
