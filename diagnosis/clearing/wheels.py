@@ -175,9 +175,10 @@ def roughness_of(cells: Cells, speed: Array, reference: Array | None = None) -> 
     frame, floor = cells.frame, FLOOR * cells.machine.max_speed
     quick = _quick(speed)
     if reference is not None and speed.shape[1] == 1:
-        asked = np.abs(np.nan_to_num(_quick(reference)))
-        answers = [np.roll(asked, k, axis=0) for k in range(1 + round(_ANSWER_S / cells.dt))]
-        quick = np.maximum(np.abs(quick) - np.max(answers, axis=0), 0.0)
+        asked, late = np.abs(np.nan_to_num(_quick(reference))), round(_ANSWER_S / cells.dt)
+        jumps = np.where(asked > ROUGH * cells.machine.max_speed, asked, 0.0)
+        near = np.lib.stride_tricks.sliding_window_view(np.pad(jumps, ((late, 0), (0, 0))), late + 1, axis=0)
+        quick = np.maximum(np.abs(quick) - near.max(axis=-1), 0.0)
     much, size = frame.rms(quick), np.maximum(frame.rms(speed), floor)
     others = others_at(much / size)
     return Roughness(much, size, np.maximum(ROUGH, np.where(np.isfinite(others), _ROUGHER * others, 0.0)))

@@ -9,7 +9,7 @@ from diagnosis.evidence import ACTUATOR, SENSOR, Contribution, MissionView, Part
 from diagnosis.response.assess import assess_response
 from diagnosis.response.body import body_speeds
 from diagnosis.response.inputs import followers
-from diagnosis.response.lone import by_its_channel
+from diagnosis.response.lone import by_its_channel, not_shared
 from diagnosis.response.models import BLOCK_S
 from diagnosis.response.tracking import assess_tracking
 from diagnosis.results.assessment import Assessment
@@ -49,13 +49,17 @@ class TrackingEvidence:
         dt, limits = mission.timeline.dt, mission.machine.limits
         idle = together_idle(mission) | _never_moved(mission)
         yaw = mission.values("imu.yaw_rate") if mission.logged("imu.yaw_rate") else None
-        for wheel, data in followers(mission).items():
-            told = np.isfinite(data.asked).any()
-            if wheel not in mission.wheels or (wheel, SENSOR) in mission.known or not told:
+        drives = {
+            w: d
+            for w, d in followers(mission).items()
+            if (w, SENSOR) not in mission.known and np.isfinite(d.asked).any()
+        }
+        found = not_shared({w: by_its_channel(d, yaw, limits, dt) for w, d in drives.items()})
+        for wheel, data in drives.items():
+            if wheel not in mission.wheels:
                 continue
-            found = by_its_channel(data, yaw, limits, dt)
             command = np.where(idle, 0.0, data.asked)
-            both = assess_tracking(data.y, command, dt, limits, (data.name, "its command"), found)
+            both = assess_tracking(data.y, command, dt, limits, (data.name, "its command"), found[wheel])
             parts[wheel, SENSOR], parts[wheel, ACTUATOR] = both
         return Contribution(parts)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -63,6 +64,23 @@ def by_its_channel(data: FollowerData, yaw: Array | None, limits: Limits, dt: fl
     asked = np.abs(np.nan_to_num(data.asked)) > limits.driving_speed
     found += [by_itself(f) for f in broken_off(one.wheel, (), limits.driving_speed, data.asked)]
     return tuple(without_doubles([*(f for f in found if f is not None), *lost_of(wheel, data.lost, asked)]))
+
+
+def not_shared(found: Mapping[str, Sequence[Finding]]) -> dict[str, tuple[Finding, ...]]:
+    """Findings of several drives without those that another one has of the same kind at that time: the ground's, or the recorder's.
+
+    `found` by wheel; so is what is returned.
+    """
+    return {
+        w: tuple(
+            f
+            for f in mine
+            if not any(
+                f.mode is g.mode and f.start < g.stop and g.start < f.stop for o in found if o != w for g in found[o]
+            )
+        )
+        for w, mine in found.items()
+    }
 
 
 def _steady(asked: Array, dt: float) -> Flags:

@@ -7,7 +7,7 @@ import pytest
 from numpy.typing import NDArray
 
 from diagnosis.response.inputs import FollowerData, cell_of, cells
-from diagnosis.response.lone import by_its_channel
+from diagnosis.response.lone import by_its_channel, not_shared
 from diagnosis.response.tracking import assess_tracking
 from diagnosis.results.assessment import CODE
 from replay.faults import FaultMode, Side, State
@@ -107,3 +107,13 @@ def test_findings_stand_beside_what_following_shows() -> None:
     assert (sensor.states[PART] == CODE[State.STUCK]).all()
     assert (actuator.states[PART] == CODE[State.MASKED]).all()
     assert not (np.stack([sensor.states, actuator.states]) == CODE[State.HEALTHY]).any()
+
+
+def test_what_two_drives_show_at_once_is_no_sensors() -> None:
+    y = speed(2)
+    y[PART.start : PART.stop : 25] += 2.5
+    frozen = speed(3)
+    frozen[PART] = frozen[PART.start]
+    spiky, stuck = (by_its_channel(drive(x), None, LIMITS, DT) for x in (y, frozen))
+    assert not_shared({"R": spiky, "L": spiky}) == {"R": (), "L": ()}
+    assert not_shared({"R": spiky, "L": stuck}) == {"R": spiky, "L": stuck}
