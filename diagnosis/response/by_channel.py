@@ -16,7 +16,7 @@ from replay.faults import FaultMode
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
-_SPIKE_GAP_S, _LEAST_SPIKES = 10.0, 3
+SPIKE_GAP_S, LEAST_SPIKES = 10.0, 3
 _BEYOND, _LEAP = (
     3.0,
     100.0,
@@ -49,11 +49,11 @@ def spikes_of(wheel: Wheel, y: Array, driving_speed: float) -> list[Finding]:
         return []
     places = wheel.samples.step[wheel.samples.wild]
     beyond = _impossible(wheel, y, driving_speed)
-    groups = np.split(places, np.flatnonzero(np.diff(places) * wheel.dt > _SPIKE_GAP_S) + 1) if places.size else []
+    groups = np.split(places, np.flatnonzero(np.diff(places) * wheel.dt > SPIKE_GAP_S) + 1) if places.size else []
     out = []
     for group in groups:
         few = int(np.count_nonzero(np.isin(group, beyond)))
-        if group.size >= _LEAST_SPIKES:
+        if group.size >= LEAST_SPIKES:
             p, why = 0.97, "and no machine moves like that"
         elif few:
             p, why = _IMPOSSIBLE_P[few - 1], "further than any wheel can be set going and stopped between two readings"

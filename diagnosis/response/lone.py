@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.response.answering import MOVES, in_blocks
-from diagnosis.response.by_channel import broken_off, lost_of
+from diagnosis.response.by_channel import LEAST_SPIKES, SPIKE_GAP_S, broken_off, lost_of
 from diagnosis.response.channel import Samples, holds_of, samples_of
 from diagnosis.response.identification import without_command
 from diagnosis.response.inputs import FollowerData, cell_of
@@ -27,6 +27,7 @@ Flags = NDArray[np.bool_]
 _BY_CHANNEL = FaultMode.STUCK, FaultMode.NOISY  # what needs no command
 _OWN = 2  # of the channel's longest holds, that may be faults
 _STEADY_S, _LEAST = 1.0, 40  # for which a command rests; readings meanwhile that show how the channel changes
+_BEYOND = 2.0  # times the fastest of the driving, or of what is asked for: so far off is a wild reading
 _LIVES = 0.5  # of them: so many change
 _ONLY_ASKED = (
     0.85  # that it is stuck, by a command that changed meanwhile, of a channel not known to change under one that rests
@@ -52,6 +53,7 @@ def by_its_channel(data: FollowerData, yaw: Array | None, limits: Limits, dt: fl
     samples = samples_of(data.y, data.fresh)
     if samples.step.size < _LEAST or not np.isfinite(samples.value).any():
         return ()
+    samples = _beyond_driving(samples, data, dt)
     one = in_blocks(data, without_command(-(-size // cell)), (data.y, samples), (), (cell, width), limits, dt)
     holds = holds_of(samples, MOVES * limits.driving_speed, dt)
     habit = float(holds[_OWN]) if holds.size > _OWN else 0.0
@@ -81,6 +83,21 @@ def not_shared(found: Mapping[str, Sequence[Finding]]) -> dict[str, tuple[Findin
         )
         for w, mine in found.items()
     }
+
+
+def _beyond_driving(samples: Samples, data: FollowerData, dt: float) -> Samples:
+    """Samples of which only wild readings count as such that are far beyond all others, and the command, and come again and again.
+
+    What is read now and then leaves few readings of a short motion; neighbours count once, for a wrong position makes two wrong speeds.
+    """
+    top = max(float(np.nanmax(np.abs(samples.value))), float(np.nanmax(np.abs(data.asked), initial=0.0)))
+    far = samples.wild & (np.abs(data.y[samples.step]) > _BEYOND * top)
+    first = np.flatnonzero(np.diff(np.r_[False, far].astype(np.int8)) == 1)
+    groups = np.split(first, np.flatnonzero(np.diff(samples.step[first]) * dt > SPIKE_GAP_S) + 1)
+    wild = np.zeros_like(samples.wild)
+    for group in groups:
+        wild[group] = group.size >= LEAST_SPIKES
+    return samples._replace(wild=wild)
 
 
 def _steady(asked: Array, dt: float) -> Flags:

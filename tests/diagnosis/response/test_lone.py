@@ -73,6 +73,22 @@ def test_spikes_are_the_sensors() -> None:
     assert stated(y) == [(Side.SENSOR, FaultMode.NOISY)]
 
 
+@pytest.mark.parametrize("number", [1, 2])
+def test_a_wrong_position_now_and_then_is_a_recorders(number: int) -> None:
+    y = speed(2)
+    for k in range(number):
+        y[PART.start + 40 * k] += 40.0
+        y[PART.start + 40 * k + 1] -= 40.0
+    assert stated(y) == []
+
+
+def test_short_motions_that_are_read_now_and_then_are_no_spikes() -> None:
+    asked = np.zeros(N)
+    for k in range(310, 490, 20):
+        asked[k : k + 2] = 0.8
+    assert stated(asked + 0.002 * np.random.default_rng(1).normal(size=N), asked) == []
+
+
 def test_silence_is_the_sensors() -> None:
     y = speed(2)
     y[PART] = np.nan
