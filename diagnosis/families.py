@@ -8,9 +8,9 @@ from __future__ import annotations
 
 from diagnosis.channels.family import DeadSensors
 from diagnosis.direct.family import DirectEvidence
-from diagnosis.drives.family import DriveEvidence, TrackingEvidence
+from diagnosis.drives.family import DriveEvidence
 from diagnosis.evidence import EvidenceFamily
-from diagnosis.response.family import ResponseEvidence
+from diagnosis.response.family import ResponseEvidence, TrackingEvidence
 from diagnosis.steering.family import SteeringEvidence
 from diagnosis.wheels.family import WheelEvidence
 

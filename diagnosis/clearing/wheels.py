@@ -33,6 +33,7 @@ CREEPING, _CREEPS_ALIKE = (
 #: elsewhere [ln]: dead bands differ. Healthy wheels of seven machines with valves, a tuning mission each, had 0.14 at most.
 _CREEPING_RESPONSE = 0.75
 OPENING = 0.03  # of full opening: likewise
+_ANSWER_S = 0.5  # within which a drive jumps as its command did
 ROUGH, _ROUGHER = 0.15, 5.0  # quick changes: share of the speed, times those of the other wheels
 LATE_S = 0.2
 #: How much more of a partial loss the speed per opening shows than a carried wheel's speed alone: its controller asks for more.
@@ -60,7 +61,7 @@ def wheel_checks(cells: Cells, clear_at: float) -> Iterator[Checked]:
         slow = responses_of(cells, speed, used, reference, CREEPING * USUAL_TOP).windows
         slow[np.isfinite(windows)] = np.nan
     limits = response_limits(responses, twice, clear_at, cells.carried_shares)
-    tracking, rough = _tracking(cells, speed, reference), _rough_beside_others(roughness_of(cells, speed))
+    tracking, rough = _tracking(cells, speed, reference), _rough_beside_others(roughness_of(cells, speed, reference))
     rough = np.fmax(rough, wild_readings(cells, speed, FLOOR * cells.machine.max_speed))
     worst_tracking = [float(x) for x in largest(tracking)]
     delays = late(speed, reference, cells.dt)
@@ -169,14 +170,25 @@ class Roughness(NamedTuple):
     limit: Array
 
 
-def roughness_of(cells: Cells, speed: Array) -> Roughness:
-    """Quick changes of speeds (cells, wheels)."""
+def roughness_of(cells: Cells, speed: Array, reference: Array | None = None) -> Roughness:
+    """Quick changes of speeds (cells, wheels); a lone drive, beside which no other shows it, may jump as its command did just before."""
     frame, floor = cells.frame, FLOOR * cells.machine.max_speed
-    quick = np.full(speed.shape, np.nan)
-    quick[1:-1] = speed[1:-1] - (speed[:-2] + speed[1:-1] + speed[2:]) / 3.0
+    quick = _quick(speed)
+    if reference is not None and speed.shape[1] == 1:
+        asked, late = np.abs(np.nan_to_num(_quick(reference))), round(_ANSWER_S / cells.dt)
+        jumps = np.where(asked > ROUGH * cells.machine.max_speed, asked, 0.0)
+        near = np.lib.stride_tricks.sliding_window_view(np.pad(jumps, ((late, 0), (0, 0))), late + 1, axis=0)
+        quick = np.maximum(np.abs(quick) - near.max(axis=-1), 0.0)
     much, size = frame.rms(quick), np.maximum(frame.rms(speed), floor)
     others = others_at(much / size)
     return Roughness(much, size, np.maximum(ROUGH, np.where(np.isfinite(others), _ROUGHER * others, 0.0)))
+
+
+def _quick(x: Array) -> Array:
+    """What a cell has beside the mean of it and its neighbours, shape of `x` (cells, wheels)."""
+    quick = np.full(x.shape, np.nan)
+    quick[1:-1] = x[1:-1] - (x[:-2] + x[1:-1] + x[2:]) / 3.0
+    return quick
 
 
 def _rough_beside_others(r: Roughness) -> Array:

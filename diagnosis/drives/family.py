@@ -1,13 +1,11 @@
-"""Single drives as families of evidence: by their effort, or by whether they follow their commands."""
+"""Single drives, by their effort, as a family of evidence."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from diagnosis.channels.standstill import STILL, together_idle
 from diagnosis.drives.assess import assess_drive
 from diagnosis.drives.inputs import DriveData, drive_data
-from diagnosis.drives.tracking import assess_tracking
 from diagnosis.evidence import ACTUATOR, SENSOR, Contribution, MissionView, Part
 from diagnosis.results.assessment import Assessment, unassessed
 from diagnosis.results.vocabulary import Tier
@@ -34,33 +32,6 @@ class DriveEvidence:
                 both = assess_drive(drive, mission.machine.limits)
             parts[wheel, SENSOR], parts[wheel, ACTUATOR] = both
         return Contribution(parts)
-
-
-class TrackingEvidence:
-    """A drive whose effort is not logged, by whether it follows its command."""
-
-    tier = Tier.TRACKING
-
-    def assess(self, mission: MissionView) -> Contribution:
-        """Judge drives that no stronger evidence has judged."""
-        parts: dict[Part, Assessment] = {}
-        dt, limits = mission.timeline.dt, mission.machine.limits
-        idle = together_idle(mission) | _never_moved(mission)
-        for wheel in _alone(mission):
-            if _drive(mission, wheel) is None:
-                speed = f"wheel.{wheel}.v"
-                command = np.where(idle, 0.0, mission.command(wheel))
-                both = assess_tracking(mission.values(speed), command, dt, limits, (speed, "its command"))
-                parts[wheel, SENSOR], parts[wheel, ACTUATOR] = both
-        return Contribution(parts)
-
-
-def _never_moved(mission: MissionView) -> bool:
-    """Whether the only drive is judged by the odometry of a machine that stood still from end to end: no part of it is to blame."""
-    if len(mission.machine.wheels) != 1 or not mission.logged("odom.x"):
-        return False
-    fastest = np.nanmax(np.abs(mission.values(f"wheel.{mission.machine.wheels[0]}.v")), initial=0.0)
-    return bool(fastest <= STILL * mission.machine.limits.driving_speed)
 
 
 def _alone(mission: MissionView) -> list[str]:

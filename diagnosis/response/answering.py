@@ -53,7 +53,7 @@ def wheels_of(
     dt : float
         Step [s].
     """
-    cell, width = steps
+    cell, _ = steps
     out: dict[str, Judged] = {}
     channels: dict[str, tuple[Samples, Response | None]] = {}
     for w, d in data.items():
@@ -74,22 +74,52 @@ def wheels_of(
             continue
         # a wheel that makes nothing of its command, alone or as all do, is judged by the others, and by its channel
         response = without_command(-(-y.size // cell)) if found is None else found
-        if response.answered and samples.wild.any():
-            around = response.reach(d.commands, cell, dt, y.size)
-            samples = samples_of(np.where(hidden[w], np.nan, y), d.fresh, around)
-        blocks = blocks_of(samples, response, cell, width, y.size)
-        moves = np.abs(np.nan_to_num(blocks.mean))
-        if response.answered:
-            moves = np.maximum(np.maximum(np.abs(blocks.low), np.abs(blocks.high)), moves)
-        driving = moves > MOVES * limits.driving_speed
-        jumps, calm = jumps_of(samples, blocks, width, dt)
-        wheel = Wheel(d.name, samples, blocks, jumps, dt, "")
         others = tuple(o.y for k, o in data.items() if k != w)
-        start = np.zeros((0, STATES))
-        out[w] = Judged(
-            d, response, wheel, driving, start, [], None, calm, alone=not others, others=others, odd=doubts.get(w, "")
-        )
+        seen = np.where(hidden[w], np.nan, y), samples
+        out[w] = in_blocks(d, response, seen, others, steps, limits, dt)._replace(odd=doubts.get(w, ""))
     return out
+
+
+def in_blocks(
+    data: FollowerData,
+    response: Response,
+    seen: tuple[Array, Samples],
+    others: tuple[Array, ...],
+    steps: tuple[int, int],
+    limits: Limits,
+    dt: float,
+) -> Judged:
+    """A wheel's readings in blocks, and when it drives; nothing is judged yet.
+
+    Parameters
+    ----------
+    data : FollowerData
+        The wheel.
+    response : Response
+        How it answers its command.
+    seen : tuple[Array, Samples]
+        Readings that are looked at, shape (n,) [m/s], and their samples.
+    others : tuple[Array, ...], each of shape (n,)
+        Readings of all other wheels [m/s].
+    steps : tuple[int, int]
+        In a cell and in a block.
+    limits : Limits
+        ``driving_speed``.
+    dt : float
+        Step [s].
+    """
+    (y, samples), (cell, width) = seen, steps
+    if response.answered and samples.wild.any():
+        samples = samples_of(y, data.fresh, response.reach(data.commands, cell, dt, y.size))
+    blocks = blocks_of(samples, response, cell, width, y.size)
+    moves = np.abs(np.nan_to_num(blocks.mean))
+    if response.answered:
+        moves = np.maximum(np.maximum(np.abs(blocks.low), np.abs(blocks.high)), moves)
+    driving = moves > MOVES * limits.driving_speed
+    jumps, calm = jumps_of(samples, blocks, width, dt)
+    wheel = Wheel(data.name, samples, blocks, jumps, dt, "")
+    start = np.zeros((0, STATES))
+    return Judged(data, response, wheel, driving, start, [], None, calm, alone=not others, others=others)
 
 
 def _turns(y: Array, limits: Limits, dt: float) -> bool:

@@ -25,31 +25,25 @@ from diagnosis.response.effort import idle_drives, idle_spans, own_pull, powered
 from diagnosis.response.ground import by_drag, by_slip
 from diagnosis.response.gyro import wrong_gyro
 from diagnosis.response.inputs import FollowerData, cell_of, cells
-from diagnosis.response.joint import cut, joint_of
-from diagnosis.response.kernel import posterior
 from diagnosis.response.late import late_neighbour, late_wheels, left_open, smallest_delay
 from diagnosis.response.machine import Judged, lasting_losses, otherwise, standstills, unexplained, unlike
 from diagnosis.response.models import (
     BLOCK_S,
-    MEAN_FAULTY_S,
-    MEAN_HEALTHY_S,
     Beside,
     Blocks,
-    scores,
 )
 from diagnosis.response.power import powers_of, unshown
 from diagnosis.response.rivals import (
     by_each_other,
     held_back_together,
-    jumped,
     others_fault,
-    shared,
     told_and_doing_alike,
 )
 from diagnosis.response.runs_on import running_on
 from diagnosis.response.sides import sides_of
 from diagnosis.response.sideways import crossed, goes_sideways
-from diagnosis.response.spells import spells_of, until_back, where_asked
+from diagnosis.response.spells import until_back, where_asked
+from diagnosis.response.states import judge
 from diagnosis.response.turning import turning_of, turns_other_way, turns_with, unasked_turn, wrong_yaw_rate
 from diagnosis.results.assessment import CODE, Assessment, Finding
 from replay.faults import State
@@ -59,7 +53,6 @@ from replay.machine.geometry import Geometry
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
-_AT_A_JUMP = 0.1, 0.3  # probability that a fault begins, or ends, where the channel jumps
 _OWN, _OTHERS = 4, 2  # holds of a channel that may be faults: of the one in question, and of each other
 _LEAST_S = 1.0
 _HIDES = "the speed varies so much beside what its command, or other channels, make likely that half of it would not show for ten seconds"
@@ -140,7 +133,7 @@ def assess_response(
     }
     names = {w: j.data.name for w, j in found.items()}
     beside, by_motion, left_notes = views(names, {w: j.wheel.blocks for w, j in found.items()}, geometry, bodies)
-    judged = {w: _judge(j, beside.get(w), dt, width) for w, j in found.items()}
+    judged = {w: judge(j, beside.get(w), dt, width) for w, j in found.items()}
     turned = {w: [s for s in j.spells if unasked_turn(w, s, judged, geometry, yaw)] for w, j in judged.items()}
     slips = {w: [s for s in j.spells if by_slip(s, w, judged, bodies.yaw)] for w, j in judged.items()}
     kept = {
@@ -233,29 +226,6 @@ def _unproved(sensor: Assessment, where: Flags) -> Assessment:
         return sensor
     doubted = bool((sensor.states == CODE[State.NOT_ASSESSED]).any())
     return _doubted(sensor, [where], f"{sensor.reasons[State.NOT_ASSESSED]}; or {_HIDES}" if doubted else _HIDES)
-
-
-def _judge(one: Judged, beside: Beside | None, dt: float, width: int) -> Judged:
-    block_s, blocks = width * dt, one.wheel.blocks
-    if beside is not None:  # what shakes other wheels too is no sensor's noise
-        blocks = blocks._replace(usual=np.maximum(blocks.usual, beside.rough))
-    rolled = one.data.rolled
-    joint = None if rolled is None else joint_of(blocks, cells(rolled, width), beside)
-    score = scores(blocks, one.driving, block_s, beside, None if joint is None else joint.view)
-    places = one.wheel.samples.step[one.wheel.jumps.place] // width
-    enters, leaves = np.full((2, len(score)), [[-np.expm1(-block_s / t)] for t in (MEAN_HEALTHY_S, MEAN_FAULTY_S)])
-    enters[places], leaves[places] = _AT_A_JUMP
-    p = posterior(score, enters, leaves)
-    return one._replace(
-        posterior=p,
-        spells=[s if jumped(one, s) else shared(s, beside) for s in cut(spells_of(p, block_s), joint, blocks)],
-        speed=None if beside is None else beside.speed,
-        across=None if beside is None else beside.across,
-        joint=joint,
-        wheel=one.wheel._replace(
-            blocks=blocks, compared="" if beside is None else beside.compared, own=beside is not None and beside.own
-        ),
-    )
 
 
 def _drives(

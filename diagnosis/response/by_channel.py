@@ -16,7 +16,7 @@ from replay.faults import FaultMode
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
-_SPIKE_GAP_S, _LEAST_SPIKES = 10.0, 3
+SPIKE_GAP_S, LEAST_SPIKES = 10.0, 3
 _BEYOND, _LEAP = (
     3.0,
     100.0,
@@ -49,11 +49,11 @@ def spikes_of(wheel: Wheel, y: Array, driving_speed: float) -> list[Finding]:
         return []
     places = wheel.samples.step[wheel.samples.wild]
     beyond = _impossible(wheel, y, driving_speed)
-    groups = np.split(places, np.flatnonzero(np.diff(places) * wheel.dt > _SPIKE_GAP_S) + 1) if places.size else []
+    groups = np.split(places, np.flatnonzero(np.diff(places) * wheel.dt > SPIKE_GAP_S) + 1) if places.size else []
     out = []
     for group in groups:
         few = int(np.count_nonzero(np.isin(group, beyond)))
-        if group.size >= _LEAST_SPIKES:
+        if group.size >= LEAST_SPIKES:
             p, why = 0.97, "and no machine moves like that"
         elif few:
             p, why = _IMPOSSIBLE_P[few - 1], "further than any wheel can be set going and stopped between two readings"
@@ -121,10 +121,13 @@ def lost_of(wheel: Wheel, lost: Sequence[tuple[int, int]], driving: Flags) -> li
     return out
 
 
-def broken_off(wheel: Wheel, others: Sequence[Array], driving_speed: float) -> list[Finding]:
+def broken_off(
+    wheel: Wheel, others: Sequence[Array], driving_speed: float, asked: Array | None = None
+) -> list[Finding]:
     """Findings of a speed that falls to 0 from one reading to the next, and stays there, while another wheel goes on turning.
 
-    For wheels of which no command says what they should do: a drive takes its time to stop.
+    For wheels of which no command says what they should do: a drive takes its time to stop. A lone one is held against its
+    command, from which no answer was found; it must come back at once as well, and must not stop like that where it is told to.
 
     Parameters
     ----------
@@ -134,30 +137,47 @@ def broken_off(wheel: Wheel, others: Sequence[Array], driving_speed: float) -> l
         Readings of the other wheels [m/s].
     driving_speed : float
         Speed from which a wheel drives [m/s].
+    asked : Array or None, shape (n,)
+        Commanded speed of the only drive [m/s].
     """
     step, value = wheel.samples.step, np.nan_to_num(wheel.samples.value)
     size = np.abs(np.nan_to_num(wheel.samples.change))
     edge = np.flatnonzero(np.diff(np.r_[False, value == 0.0, False].astype(np.int8)))
     spans = [(a, b) for a, b in zip(edge[::2].tolist(), edge[1::2].tolist(), strict=True) if a > 0]
+    goes_on = others if asked is None else (asked,)
+    if asked is not None:
+        spans = [
+            (a, b) for a, b in spans if b < step.size and _turn((asked,), int(step[a]), int(step[b]), driving_speed)
+        ]
     ends = np.r_[[a for a, _ in spans], [b for _, b in spans if b < value.size]].astype(np.intp)
-    turning = size[(value != 0.0) & ~np.isin(np.arange(value.size), ends)]
-    if not others or turning.size < _LEAST_TURNING:
+    turning = size[((value != 0.0) if asked is None else (size > 0.0)) & ~np.isin(np.arange(value.size), ends)]
+    if not goes_on or turning.size < _LEAST_TURNING:
         return []
     least = max(_SUDDEN * float(np.quantile(turning, 0.99)), _TURNING * driving_speed)
     out = []
     for a, b in spans:
         first, last = int(step[a]), int(step[b]) if b < step.size else int(step[-1]) + 1
         at_once = [size[a] > least, b < size.size and size[b] > least]
-        if (last - first) * wheel.dt < _DEAD_S or not any(at_once):
+        if (last - first) * wheel.dt < _DEAD_S or not any(at_once) or not (asked is None or all(at_once)):
             continue
-        moves = np.max([np.abs(np.nan_to_num(y[first:last])) for y in others], axis=0) > driving_speed
-        if np.mean(moves) < _OTHERS_MOVE:
+        if not _turn(goes_on, first, last, driving_speed):
             continue
         text = (
             f"{wheel.name} {'fell to 0' if at_once[0] else 'rose from 0'} from one reading to the next and read 0 for "
-            f"{(last - first) * wheel.dt:.1f} s while another {{wheel}} went on turning; nothing says what it should have done."
+            f"{(last - first) * wheel.dt:.1f} s while "
+            + (
+                "another {wheel} went on turning; nothing says what it should have done."
+                if asked is None
+                else "its command went on, and was back at its speed from one reading to the next: it takes longer to stop or start."
+            )
         )
         p = _BREAKS_OFF_P[all(at_once)]
         sensor = SENSOR_SHARE if wheel.sharp else 0.5
         out.append(sensor_finding(first, last, FaultMode.NO_SIGNAL, p, Epsilon(1.0, 1.0, 1.0), None, (text,), sensor))
     return out
+
+
+def _turn(speeds: Sequence[Array], first: int, last: int, driving_speed: float) -> bool:
+    """Whether the largest of some speeds, each of shape (n,) [m/s], is one of driving in most of the steps [first, last)."""
+    moves = np.max([np.abs(np.nan_to_num(y[first:last])) for y in speeds], axis=0) > driving_speed
+    return bool(np.mean(moves) >= _OTHERS_MOVE)

@@ -1,12 +1,17 @@
-"""Drives with command and speed alone as a family of evidence."""
+"""Drives with command and speed alone as families of evidence: by how they answer, or whether they follow at all."""
 
 from __future__ import annotations
 
+import numpy as np
+
+from diagnosis.channels.standstill import STILL, together_idle
 from diagnosis.evidence import ACTUATOR, SENSOR, Contribution, MissionView, Part
 from diagnosis.response.assess import assess_response
 from diagnosis.response.body import body_speeds
 from diagnosis.response.inputs import followers
+from diagnosis.response.lone import by_its_channel, not_shared
 from diagnosis.response.models import BLOCK_S
+from diagnosis.response.tracking import assess_tracking
 from diagnosis.results.assessment import Assessment
 from diagnosis.results.machine_event import not_following, other_yaw_rate
 from diagnosis.results.vocabulary import Tier
@@ -31,3 +36,37 @@ class ResponseEvidence:
                 parts[wheel, SENSOR], parts[wheel, ACTUATOR] = judged.parts[wheel]
         events = (*map(not_following, judged.events), *map(other_yaw_rate, judged.gyro))
         return Contribution(parts, events=events)
+
+
+class TrackingEvidence:
+    """A drive whose effort is not logged, and of which no answer is found, by whether it follows its command, and by its channel alone."""
+
+    tier = Tier.TRACKING
+
+    def assess(self, mission: MissionView) -> Contribution:
+        """Judge drives that no stronger evidence has judged."""
+        parts: dict[Part, Assessment] = {}
+        dt, limits = mission.timeline.dt, mission.machine.limits
+        idle = together_idle(mission) | _never_moved(mission)
+        yaw = mission.values("imu.yaw_rate") if mission.logged("imu.yaw_rate") else None
+        drives = {
+            w: d
+            for w, d in followers(mission).items()
+            if (w, SENSOR) not in mission.known and np.isfinite(d.asked).any()
+        }
+        found = not_shared({w: by_its_channel(d, yaw, limits, dt) for w, d in drives.items()})
+        for wheel, data in drives.items():
+            if wheel not in mission.wheels:
+                continue
+            command = np.where(idle, 0.0, data.asked)
+            both = assess_tracking(data.y, command, dt, limits, (data.name, "its command"), found[wheel])
+            parts[wheel, SENSOR], parts[wheel, ACTUATOR] = both
+        return Contribution(parts)
+
+
+def _never_moved(mission: MissionView) -> bool:
+    """Whether the only drive is judged by the odometry of a machine that stood still from end to end: no part of it is to blame."""
+    if len(mission.machine.wheels) != 1 or not mission.logged("odom.x"):
+        return False
+    fastest = np.nanmax(np.abs(mission.values(f"wheel.{mission.machine.wheels[0]}.v")), initial=0.0)
+    return bool(fastest <= STILL * mission.machine.limits.driving_speed)

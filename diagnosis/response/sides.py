@@ -83,7 +83,7 @@ def sides_of(
         long = (spell.stop - spell.start) * width * dt >= _LEAST_S
         found = finding_of(spell, *_shown_by(one, spell)) if long and spell.p >= LEAST_P else None
         if found is not None:
-            findings.append(_by_itself(found) if one.alone else _undriven(found) if one.rolls else shaken(found, one))
+            findings.append(by_itself(found) if one.alone else _undriven(found) if one.rolls else shaken(found, one))
         elif one.posterior[spell.start : spell.stop].argmax(axis=1).min() > NOISY and _entered_calmly(
             one, spell, width, dt
         ):
@@ -92,7 +92,7 @@ def sides_of(
         findings.extend(broken_off(wheel, one.others, limits.driving_speed))
     there = np.isfinite(one.data.y)
     driving = np.repeat(one.driving, width)[:size]
-    findings = _without_doubles([*findings, *late, *lost_of(wheel, one.data.lost, driving)])
+    findings = without_doubles([*findings, *late, *lost_of(wheel, one.data.lost, driving)])
     sensor = np.where(driving, CODE[State.HEALTHY], CODE[State.NOT_EXCITED]).astype(np.int8)
     unseen = not one.response.answered and one.speed is None
     sensor[np.repeat(doubtful | (one.driving & unseen), width)[:size]] = CODE[State.NOT_ASSESSED]
@@ -118,7 +118,7 @@ def _uncommanded(one: Judged, cell: int, size: int) -> Flags:
     return np.repeat(~np.isfinite(one.data.commands).all(axis=1), cell)[:size]
 
 
-def _by_itself(found: Finding) -> Finding:
+def by_itself(found: Finding) -> Finding:
     """A finding on the only drive, less sure where its command alone contradicts it: a machine may be stopped, or driven otherwise."""
     if found.side is not Side.SENSOR_OR_ACTUATOR:
         return found
@@ -153,7 +153,7 @@ def _shown_by(one: Judged, spell: Spell) -> tuple[Wheel, Array | None]:
     return one.wheel._replace(compared=view.compared, own=False), view.speed
 
 
-def _without_doubles(findings: Sequence[Finding]) -> list[Finding]:
+def without_doubles(findings: Sequence[Finding]) -> list[Finding]:
     """In order of time; of two that say the same of the same time, as spikes and noise do, the longer one."""
     kept: list[Finding] = []
     for f in sorted(findings, key=lambda f: f.start - f.stop):

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from diagnosis.clearing import yaw
 from diagnosis.clearing.axles import _parted
+from diagnosis.clearing.cells import Frame
 from diagnosis.clearing.checks import checks_of
 from diagnosis.clearing.measure import off_commands
 from diagnosis.clearing.still import commanded_still, dead_bands
-from diagnosis.clearing.wheels import most_carried, most_creeping
+from diagnosis.clearing.wheels import ROUGH, most_carried, most_creeping, roughness_of
 from diagnosis.results.clearing import Check, Checked
 from diagnosis.results.machine_words import HYDRAULIC
 from replay.faults import FaultMode, FaultSpec, Side
@@ -357,3 +359,16 @@ def test_where_an_opening_is_no_speed_nothing_clears_what_lies_behind_a_drive(mo
     assert not [
         c for c in checks_of(in_cells(mission, base=True), HYDRAULIC) if c.check is Check.BEHIND
     ]  # carried or not
+
+
+@pytest.mark.filterwarnings("ignore:Mean of empty slice")  # no other wheel
+@pytest.mark.parametrize(("wheels", "spikes", "doubted"), [(1, False, False), (1, True, True), (2, False, True)])
+def test_a_lone_drive_may_jump_as_its_command_does(wheels: int, *, spikes: bool, doubted: bool) -> None:
+    asked = np.where(np.arange(100) % 40 < 20, 1.0, 0.0)[:, None]
+    speed = np.r_[np.zeros((2, 1)), asked[:-2]]
+    if spikes:
+        speed[::7] += 0.6
+    beside = [np.full((100, wheels - 1), 0.5)]
+    cells = SimpleNamespace(frame=Frame(100, 30, 5), machine=SimpleNamespace(max_speed=1.2), dt=0.1)
+    rough = roughness_of(cells, np.hstack([speed, *beside]), np.hstack([asked, *beside]))  # type: ignore[arg-type]
+    assert bool(np.nanmax(rough.quick[:, 0] / rough.size[:, 0]) > ROUGH) is doubted

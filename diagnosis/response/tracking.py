@@ -6,6 +6,7 @@ while its command goes on. Whether the motor or its sensor stopped cannot be tol
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -78,7 +79,7 @@ def estimate_lag(response: Array, command: Array, dt: float) -> int:
 
 
 def assess_tracking(
-    v: Array, v_ref: Array, dt: float, limits: Limits, names: tuple[str, str]
+    v: Array, v_ref: Array, dt: float, limits: Limits, names: tuple[str, str], by_channel: Sequence[Finding] = ()
 ) -> tuple[Assessment, Assessment]:
     """Judge a drive by whether it follows its command at all.
 
@@ -92,11 +93,13 @@ def assess_tracking(
         ``driving_speed`` is the speed above which the drive is commanded to move.
     names : tuple[str, str]
         Names of the two signals, for the text.
+    by_channel : Sequence[Finding]
+        What the measured speed shows alone.
 
     Returns
     -------
     tuple[Assessment, Assessment]
-        Sensor and actuator; the same finding stands on both, as ``sensor_or_actuator``.
+        Sensor and actuator; what may be either stands on both, as ``sensor_or_actuator``.
     """
     lag = estimate_lag(v, v_ref, dt)
     reference = shifted(v_ref, lag)
@@ -108,21 +111,33 @@ def assess_tracking(
     last, proved = _last_motion(v, reference, lag, dt)
     small = _small_copy(v[last:], reference[last:], dt)
     found = None if small else _standstill(v, _Tracking(asked, driven, last, proved, lag), dt, names)
-    findings = () if found is None else (found,)
-    for finding in findings:
-        states[finding.start :] = CODE[State.NO_SIGNAL]
+    findings = sorted(
+        (
+            *(() if found is None else (found,)),
+            *(f for f in by_channel if found is None or f.mode is not found.mode or f.stop <= found.start),
+        ),
+        key=lambda f: f.start,
+    )
+    both = tuple(f for f in findings if len(f.side.sides) > 1)
+    drive = states.copy()
+    for f in findings:
+        states[f.start : f.stop] = CODE[State(f.mode.value)]
+        drive[f.start : f.stop] = CODE[State(f.mode.value) if f in both else State.MASKED]
     series = (("residual", np.where(np.isfinite(v), v - reference, np.nan)), ("expected", reference))
     pictured = Pictured.of(steps_of(findings, v.size, dt), series)
     reasons = {
         State.NOT_ASSESSED: f"it follows its command at {small:.2g} of its size: a wrong unit, a scaled or wrongly mapped channel"
         if small
-        else "without a {valve} command or a second measurement, only a standstill under command can be detected",
+        else "without a {valve} command or a second measurement, only a standstill under command, and a speed that is frozen, wild or noisy, can be detected",
         State.NOT_EXCITED: "nothing is commanded",
         State.NO_DATA: "no samples",
+        State.MASKED: "its {wheel.sensor} is faulty",
     }
     note = f"{names[0]} against {names[1]}: lag {lag * dt:.3g} s."
-    one = Assessment(states, reasons, findings, pictured.columns, Tier.TRACKING, (note,), closeups=pictured.closeups)
-    return one, Assessment(states.copy(), reasons, findings, {}, Tier.TRACKING, (note,))
+    sensor = Assessment(
+        states, reasons, tuple(findings), pictured.columns, Tier.TRACKING, (note,), closeups=pictured.closeups
+    )
+    return sensor, Assessment(drive, reasons, both, {}, Tier.TRACKING, (note,))
 
 
 def _small_copy(v: Array, reference: Array, dt: float) -> float:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from diagnosis.drives.tracking import assess_tracking, estimate_lag
+from diagnosis.response.tracking import assess_tracking, estimate_lag
 from diagnosis.results.assessment import CODE
 from replay.faults import FaultMode, Side, State
 from replay.machine.config import Limits
