@@ -115,7 +115,7 @@ def halved_words(side: Side, mode: FaultMode, epsilon: Epsilon | None) -> str:
         return ""
     if mode.varying:
         return "may give more noise than signal" if side is Side.SENSOR else "may follow noise more than its command"
-    return f"may have lost {round(100 * epsilon.high)} %" if mode.scaled else ""
+    return f"may have lost up to {round(100 * epsilon.high)} %" if mode.scaled else ""
 
 
 def unanswered(fault: FaultInterval) -> bool:

@@ -197,17 +197,26 @@ def _assessment(
         State.NOT_ASSESSED: _UNSEEN
         if unseen
         else "the speed is neither what its command nor what other channels make likely, and no known fault explains it",
-        State.NOT_EXCITED: "nothing is commanded",
+        State.NOT_EXCITED: _at_rest(one),
         State.NO_DATA: "no samples",
     }
     return Assessment(states, reasons, findings, pictured.columns, Tier.RESPONSE, notes, closeups=pictured.closeups)
+
+
+def _at_rest(one: Judged) -> str:
+    """Why nothing shows where a wheel stands still."""
+    return (
+        "nothing is commanded"
+        if np.isfinite(one.data.commands).any()
+        else "the wheel stands still, and no command is recorded"
+    )
 
 
 def _drive(one: Judged, states: NDArray[np.int8], findings: tuple[Finding, ...]) -> Assessment:
     hidden = _ALONE.replace("{name}", one.data.name.split(".")[1]) if one.alone else _HIDDEN
     reasons = {
         State.NOT_ASSESSED: _ROLLS if one.rolls else hidden,
-        State.NOT_EXCITED: "nothing is commanded",
+        State.NOT_EXCITED: _at_rest(one),
         State.NO_DATA: "no samples",
         State.MASKED: "its {wheel.sensor} is faulty",
     }

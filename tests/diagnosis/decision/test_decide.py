@@ -194,9 +194,9 @@ def test_faults_to_watch_are_cleared_only_where_all_else_is_ready() -> None:
     assert (damaged.status, damaged.cleared, damaged.not_cleared) == ("watch", False, "the log is damaged")
     half = machine(FR_actuator=assessed(finding(Side.ACTUATOR, FaultMode.INEFFICIENT, epsilon=0.6)))
     assert not verdict(half).cleared
-    assert verdict(half).not_cleared == "the FR drive valve may have lost 61 %"
+    assert verdict(half).not_cleared == "the FR drive valve may have lost up to 61 %"
     assert [f.advice for f in intervals_of(half, MACHINE, HYDRAULIC, 0, STEP)] == [
-        "It may have lost 61 %: check it before the machine goes out again."
+        "It may have lost up to 61 %: check it before the machine goes out again."
     ]
     assert str(verdict(half).actions[0]["text"]).startswith("Before the machine goes out, check the FR drive valve")
     assert [x.act for x in verdict(half).to_clear] == [
@@ -225,7 +225,7 @@ def test_every_reason_against_a_leave_is_in_the_list_once() -> None:
     reasons = [x.reason.partition(": ")[2] for x in got.to_clear]
     assert sorted(reasons) == [
         "the FL drive valve may follow noise more than its command.",
-        "the FL speed sensor may have lost 61 %.",
+        "the FL speed sensor may have lost up to 61 %.",
         "the FR drive valve may not answer.",
     ]
 

@@ -91,4 +91,7 @@ def test_advice_goes_by_the_bounds_that_are_stated() -> None:
     seen = replace(finding(Side.SENSOR, FaultMode.INEFFICIENT, epsilon=0.39), tier=Tier.MODEL)
     (got,) = intervals_of(machine(FL_sensor=assessed(seen)), MACHINE, HYDRAULIC, 0, STEP)
     assert got.epsilon is not None
-    assert got.advice == f"It may have lost {100 * got.epsilon.high:.0f} %: check it before the machine goes out again."
+    assert (
+        got.advice
+        == f"It may have lost up to {100 * got.epsilon.high:.0f} %: check it before the machine goes out again."
+    )

@@ -59,7 +59,7 @@ def test_other_rows_are_watched(side: Side, mode: FaultMode) -> None:
 @pytest.mark.parametrize(
     ("side", "mode", "words"),
     [
-        (Side.SENSOR, FaultMode.INEFFICIENT, "It may have lost 61 %: "),
+        (Side.SENSOR, FaultMode.INEFFICIENT, "It may have lost up to 61 %: "),
         (Side.SENSOR, FaultMode.NOISY, "It may give more noise than signal: "),
         (Side.ACTUATOR, FaultMode.NOISY, "It may follow noise more than its command: "),
     ],

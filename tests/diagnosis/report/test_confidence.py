@@ -138,7 +138,7 @@ def test_parts_that_were_judged_and_those_that_were_cleared_are_counted_apart() 
     about = {"status": "watch", "cleared": True, "to_clear": []}
     found = samples.report_with(coverage=rows, intervals=[watched], verdict=about)
     assert judged(found) == "4 of 4 parts judged, 3 cleared"
-    own = {"reason": "F1: the FR speed sensor may have lost 51 %.", "act": "check it", "fault": "F1"}
+    own = {"reason": "F1: the FR speed sensor may have lost up to 51 %.", "act": "check it", "fault": "F1"}
     about["to_clear"] = [own | {"parts": [{"component": "FR", "side": "sensor"}]}]
     assert judged(samples.report_with(coverage=rows, intervals=[watched], verdict=about)) == (
         "4 of 4 parts judged, 3 cleared"
