@@ -53,8 +53,8 @@ def missions_words(all_missions: int, counted: int) -> str:
 
 
 def open_words(is_open: bool, clean: int, needed: int) -> str:
-    """How far an open fault is refuted: ``, clean in 3 of the 10 missions that close it``; empty where it is not, or just found."""
-    return f", clean in {clean} of the {needed} missions that close it" if is_open and clean else ""
+    """How far an open fault is refuted: ``, not found by 3 of the 10 missions that close it``; empty where it is not, or just found."""
+    return f", not found by {clean} of the {needed} missions that close it" if is_open and clean else ""
 
 
 def repair_command(label: str, component: str, side: str) -> str:
@@ -119,7 +119,7 @@ def _since_repair(m: Machine, repaired_ns: int) -> str:
         if seen:
             days.setdefault(utc_moment(f.repaired_ns or 0), []).append((f, seen))
     shown = "; ".join(
-        f"{_parts(m, [f for f, _ in fs])} clean in {count(min(n for _, n in fs), 'mission')} since the repair on {d}"
+        f"{_parts(m, [f for f, _ in fs])} not found by {count(min(n for _, n in fs), 'mission')} since the repair on {d}"
         for d, fs in days.items()
     )
     if not waiting:

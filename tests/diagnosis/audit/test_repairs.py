@@ -118,17 +118,17 @@ def test_only_missions_count_that_would_have_shown_it(tmp_path: Path, share: flo
     stored(tmp_path, missions)
     assert standing(tmp_path)[0] == verdict
     page = build_fleet_page(document(tmp_path))
-    assert ("open, clean in none of the 10 missions that close it" in page) == (verdict == "stop")
+    assert ("open, for none of the missions since would have shown it" in page) == (verdict == "stop")
 
 
 def test_an_open_fault_is_on_the_page_and_on_the_terminal(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     stored(tmp_path, [*course("..x....x..."), Sample("z", "HX-2")])
     page = build_fleet_page(document(tmp_path))
     assert "Fault open, no repair recorded" in page
-    assert "open, clean in 3 of the 10 missions that close it" in page
+    assert "open, not found by 3 of the 10 missions that close it" in page
     assert document(tmp_path)["verdict"]["text"][0] == (
         "HX-1 – fault open, no repair recorded: FR speed sensor no signal in 2 of the 11 missions that judged the part, "
-        "clean in 3 of the 10 missions that close it."
+        "not found by 3 of the 10 missions that close it."
     )
     listed = listed_machines(document(tmp_path))  # type: ignore[arg-type]
     assert [(m.label, m.words) for m in listed] == [("HX-1", "Fault open, no repair recorded"), ("HX-2", "Ready")]
@@ -174,7 +174,7 @@ def test_each_repair_is_told_with_its_own_date(tmp_path: Path) -> None:
     early, late = utc_moment(at(0.5)), utc_moment(at(3.5))
     repair(tmp_path, "HX-1 FR actuator", 3.5)  # of which nothing was found: no part of the list
     words = (
-        f"FR speed sensor clean in 3 missions since the repair on {early}; "
+        f"FR speed sensor not found by 3 missions since the repair on {early}; "
         f"RL drive valve not judged since the repair on {late}"
     )
     assert standing(tmp_path)[:2] == ("not_assessed", words)

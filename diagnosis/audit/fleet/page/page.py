@@ -57,7 +57,7 @@ _DEFINITIONS = (
     "New: in the last mission of the machine and in no earlier one, of which at least one judged the part. Recurring: in several missions. "
     "Past: not found in the last three missions that judged the part. Faults of severity “info” are left out.",
     "A fault of high severity that no longer shows may be a loose contact. It stays open until the repair of its part is recorded "
-    "(mfhca audit --repaired), or until ten missions are clean that would have shown it: the part was judged, and by its report the "
+    "(mfhca audit --repaired), or until ten missions do not find it that would have shown it: the part was judged, and by its report the "
     "mission would have shown such a fault of ten seconds more often than not. Repaired: not found since the repair.",
     "Missions with a report count. A copy of a log, a log that was not read and one that is not audited yet are missions that "
     "do not count in machines, faults and trends.",
@@ -282,7 +282,7 @@ def _fault(f: FleetFaultRow, document: ShownDocument, directions: Mapping[tuple[
     elif f["repaired_ns"] is not None:
         notes.append(f"found again since the repair on {labels.utc_moment(f['repaired_ns'])}")
     if f["open"] and f["since"]:
-        none = f", clean in none of the {f['needed']} missions that close it"
+        none = ", for none of the missions since would have shown it"
         notes.append(f"open{open_words(True, f['clean'], f['needed']) or none}")
     elif f["since"]:
         last_ones = f"last {count(f['since'], 'mission')}" if f["since"] > 1 else "last mission"
