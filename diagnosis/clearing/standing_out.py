@@ -59,10 +59,10 @@ def what_stands_out(checks: Sequence[Checked], cells: Cells, words: MachineWords
     found = {component: fault for component, fault in jumping.items() if fault is not None}
     found |= {check.component: fault_of_angle(check, cells) for check in checks if _off_second_angle(check)}
     found |= {check.component: fault_of_axle(check, cells) for check in checks if _does_not_answer(check, cells)}
-    if (wheel := _alone(checks, cells)) is not None:
-        found[wheel.component] = fault_of_wheel(wheel, cells, alone=True)
-    elif not _stated(cells) and (wheel := _alone_not_following(checks, cells)) is not None:
-        found[wheel.component] = fault_of_wheel(wheel, cells, alone=False)
+    alone = _alone(checks, cells)
+    wheel = alone or (None if _stated(cells) else _alone_not_following(checks, cells))
+    if wheel is not None and (told := fault_of_wheel(wheel, cells, alone=alone is not None)) is not None:
+        found[wheel.component] = told
     return {
         component: replace(f, evidence=tuple(words.fill(text) for text in f.evidence)) for component, f in found.items()
     }
@@ -164,6 +164,8 @@ def without_followers(
     if culprit is None:
         return dict(assessments)
     shown = fault_of_wheel(culprit, cells, alone=False)
+    if shown is None:
+        return dict(assessments)
     return {
         part: without_findings(a, [f for f in a.findings if _during(f, shown)], cells.timeline.dt)
         if part[0] in cells.machine.wheels

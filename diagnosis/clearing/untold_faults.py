@@ -56,8 +56,8 @@ class _Shown:
     size: Array
 
 
-def fault_of_wheel(check: Checked, cells: Cells, *, alone: bool) -> Finding:
-    """The fault of a wheel whose speed per opening is not that of the others.
+def fault_of_wheel(check: Checked, cells: Cells, *, alone: bool) -> Finding | None:
+    """The fault of a wheel whose speed per opening is not that of the others; None where no window shows by how much.
 
     Parameters
     ----------
@@ -74,6 +74,8 @@ def fault_of_wheel(check: Checked, cells: Cells, *, alone: bool) -> Finding:
     lost, gained = (float(np.nansum(np.maximum(x - check.limit, 0.0))) for x in (-beside, beside))
     below = lost >= gained
     shown = _Shown(cells.frame, -beside if below else beside)
+    if not np.any(shown.size > 0.0):
+        return None
     start, stop, size, spread = _where(shown, cells)
     half = max(check.limit, 2.0 * spread)
     low, middle, high = (-np.expm1(-x if below else x) for x in (size - half, size, size + half))

@@ -9,6 +9,7 @@ import pytest
 
 from diagnosis.clearing.checks import checks_of
 from diagnosis.clearing.standing_out import what_stands_out, with_findings, without_explained, without_followers
+from diagnosis.clearing.untold_faults import fault_of_wheel
 from diagnosis.results.assessment import CODE, Assessment, Finding
 from diagnosis.results.clearing import Check, Checked
 from diagnosis.results.machine_event import foreign, swinging
@@ -154,3 +155,12 @@ def test_an_angle_that_is_off_its_second_measurement_all_the_time_is_its_sensors
     assert [f.mode for f in after["rear", "sensor"].findings] == [FaultMode.OUTSIDE_TABLE]
     (valve,) = after["rear", "actuator"].findings
     assert valve.probability == pytest.approx(0.65)
+
+
+def test_a_wheel_whose_speed_per_opening_no_window_shows_has_no_fault_of_a_size() -> None:
+    """One that hardly ever drives beyond creeping, as a sensor that is deaf to small values leaves it."""
+    cells = in_cells(simulated(), base=True)
+    still = {**cells.timeline.signals, "wheel.FR.v": np.full(cells.timeline.size, np.nan)}
+    deaf = replace(cells, timeline=replace(cells.timeline, signals=still), _kept={})
+    check = Checked(Kind.WHEEL, "FR", Side.SENSOR_OR_ACTUATOR, Check.RESPONSE, 1.0, 0.2)
+    assert fault_of_wheel(check, deaf, alone=False) is None
