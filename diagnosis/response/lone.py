@@ -28,6 +28,7 @@ _BY_CHANNEL = FaultMode.STUCK, FaultMode.NOISY  # what needs no command
 _OWN = 2  # of the channel's longest holds, that may be faults
 _STEADY_S, _LEAST = 1.0, 40  # for which a command rests; readings meanwhile that show how the channel changes
 _BEYOND = 2.0  # times the fastest of the driving, or of what is asked for: so far off is a wild reading
+_MOVING = 0.1  # of that speed: a reading of driving
 _LIVES = 0.5  # of them: so many change
 _ONLY_ASKED = (
     0.85  # that it is stuck, by a command that changed meanwhile, of a channel not known to change under one that rests
@@ -92,6 +93,8 @@ def _beyond_driving(samples: Samples, data: FollowerData, dt: float) -> Samples:
     """
     top = max(float(np.nanmax(np.abs(samples.value))), float(np.nanmax(np.abs(data.asked), initial=0.0)))
     far = samples.wild & (np.abs(data.y[samples.step]) > _BEYOND * top)
+    if np.count_nonzero(np.abs(samples.value[~samples.wild]) > _MOVING * top) < _LEAST:
+        far[:] = False  # of a channel that hardly moves beside them, nothing tells how fast it may be
     first = np.flatnonzero(np.diff(np.r_[False, far].astype(np.int8)) == 1)
     groups = np.split(first, np.flatnonzero(np.diff(samples.step[first]) * dt > SPIKE_GAP_S) + 1)
     wild = np.zeros_like(samples.wild)

@@ -82,6 +82,13 @@ def test_a_wrong_position_now_and_then_is_a_recorders(number: int) -> None:
     assert stated(y) == []
 
 
+def test_wild_readings_of_a_channel_that_hardly_moves_are_a_recorders() -> None:
+    y = 0.002 * np.random.default_rng(4).normal(size=N)
+    y[PART.start : PART.stop : 25] += 60.0
+    y[PART.start + 12 : PART.stop : 25] += 25.0
+    assert stated(y, np.full(N, 0.1)) == []
+
+
 def test_short_motions_that_are_read_now_and_then_are_no_spikes() -> None:
     asked = np.zeros(N)
     for k in range(310, 490, 20):
