@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from diagnosis.steering.blocks import SensorNoise, SteeringBlocks, window_means
 from diagnosis.steering.identification import LONG_S, identify_plants, usual_rate
 from diagnosis.steering.plant import LEAST_WINDOWS, SteeringPlant
-from diagnosis.steering.plant_fit import moving, tolerance_of
+from diagnosis.steering.plant_fit import packed, predicted_by, robust_loss, tolerance_of
 from diagnosis.steering.windows import Windows, windows_of
 from replay.machine.config import Machine
 from replay.signals.timeline import Timeline
@@ -129,8 +129,8 @@ class _Fit:
         """Mean robust loss of each axle that turns often enough."""
         if self.scale is None:
             return []
-        found = [axle.loss(self.scale) for axle in self.parts]
-        return [loss for loss, n in found if n >= LEAST_WINDOWS]
+        often = [axle for axle in self.parts if axle.plant.windows >= LEAST_WINDOWS]
+        return [robust_loss([axle.part], axle.constants, self.scale, _SHARES[-1]) for axle in often]
 
     def explains(self, other: _Fit, share: float) -> bool:
         """Whether it leaves less than a share of what another one leaves of every axle."""
@@ -149,18 +149,12 @@ class _Axle:
     """Windows of an axle, what its plant says of them at one pace [rad/s], and how its speed lies between the knots, shape (w, knots)."""
 
     def __init__(self, part: Windows, plant: SteeringPlant, share: Array) -> None:
-        self.part = part
-        self.paced = part.predicted(plant.valve, plant.lag, plant.play)
-        self.rate = replace(part, pace=np.ones(part.pace.size)).predicted(plant.valve, plant.lag, plant.play)
+        self.part, self.plant = part, plant
+        self.constants = packed(plant.valve, plant.lag, plant.play)
+        self.rate = predicted_by(replace(part, pace=np.ones(part.pace.size)), self.constants)
         middle = window_means(share, part.length)
         between = (middle[1:] + middle[:-1]) / 2
         self.hats = np.column_stack([np.interp(between, _KNOTS, row) for row in np.eye(_KNOTS.size)])
-
-    def loss(self, scale: float) -> tuple[float, int]:
-        """Mean robust loss, and of how many windows it is."""
-        use = moving(self.part, self.paced, scale)
-        r2 = ((self.part.rate - self.paced)[use] / tolerance_of(self.part, scale, _SHARES[-1])[use]) ** 2
-        return float((r2 / (1.0 + r2)).mean()) if use.any() else 0.0, int(np.count_nonzero(use))
 
 
 def _middles(blocks: SteeringBlocks) -> NDArray[np.intp]:

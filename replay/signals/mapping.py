@@ -196,8 +196,7 @@ def _take_given(draft: _Draft, name: str, source: SignalSource, logs: Sequence[R
         draft.given.setdefault((log.source, channel.name), name)
         return
     used = {s.label for s in draft.machine.signals.values()}  # of what the file says of another signal, it is none
-    known = [k for log in chosen for k in log.channels if k not in used]
-    near = difflib.get_close_matches(source.label, known, 3, 0.6)
+    near = difflib.get_close_matches(source.label, [k for c in chosen for k in c.channels if k not in used], 3, 0.6)
     hint = f"; similar: {', '.join(near)}" if near else ""
     draft.missing[name] = f"{FILE_NAMES} {source.label!r}, which no source holds{hint}"
 
