@@ -13,9 +13,10 @@ from diagnosis.direct.identification import IdentifiedPair
 from diagnosis.direct.isolation import Isolated, estimate_run, isolate
 from diagnosis.direct.onset import refine
 from diagnosis.direct.same_share import as_beside, as_excess_beside
-from diagnosis.direct.sentences import alike_sentence, sentences
+from diagnosis.direct.sentences import END_SENTENCE, alike_sentence, sentences
 from diagnosis.direct.stated_mode import least_constant, mode_of
 from diagnosis.direct.timing import timing_explains
+from diagnosis.estimation.by_itself import told_by_itself
 from diagnosis.estimation.changing_gain import as_changing_gain
 from diagnosis.estimation.fault_models import HEALTHY, INEFFICIENT, STUCK, TOTAL_ROWS, VARYING_ROWS
 from diagnosis.estimation.one_cause import with_one_cause
@@ -36,6 +37,11 @@ _HOLD_S = 0.1
 _LEAD_S, _TAIL_S, _CHAIN_S = 0.3, 0.1, 0.05
 _SETTLED_LAGS = 5.0  # after a fault a channel returns with its lag
 _CLEAR = 3.0  # times the noise
+_END, _SAME_WAY, _AT_END = (
+    0.97,
+    0.3,
+    0.45,
+)  # of the span, there and commanded; of a valve that is stuck there: that it opens too far
 _HYSTERESIS, _RESTS_S = 0.025, 10.0  # of the span, off a healthy valve's command, for no longer than this
 _MIDDLE, _MOSTLY = 0.04, 0.98  # of the span: about its middle a valve opens nothing; of the time
 _OPEN_S, _DOUBT, _FAR_OFF = 0.5, 0.05, 0.2  # s; probability that counts for nothing; of the span
@@ -105,8 +111,8 @@ def find_faults(path: ModePath, found: IdentifiedPair, limits: Limits) -> Faults
     beside = [as_excess_beside(as_beside(f, findings, found), findings, found) for f in findings]
     measured = _measured(found, limits)
     joined = with_one_cause(with_spikes(beside, measured), measured)
-    parts = [part for f in joined for part in in_spells(as_changing_gain(f, measured), measured)]
-    return FaultsFound(parts, timing, below)
+    spells = [part for f in joined for part in in_spells(as_changing_gain(f, measured), measured)]
+    return FaultsFound([part for f in spells for part in told_by_itself(f, measured)], timing, below)
 
 
 def _left_open(run: Run, found: IdentifiedPair, limits: Limits) -> bool:
@@ -123,7 +129,15 @@ def _measured(found: IdentifiedPair, limits: Limits) -> Measured:
     pair, (y, x, status, *_) = found.pair, found.samples
     use = np.isin(status, (PAIR, BLIND))
     return Measured(
-        y, x, use, pair.dt, (pair.y_name, pair.x_name), pair.unit, found.model.noise, least_constant(found, limits)
+        y,
+        x,
+        use,
+        pair.dt,
+        (pair.y_name, pair.x_name),
+        pair.unit,
+        found.model.noise,
+        least_constant(found, limits),
+        limits.min_epsilon,
     )
 
 
@@ -161,13 +175,21 @@ def finding_of(run: Run, found: IdentifiedPair, limits: Limits) -> Finding | Non
             epsilon = Epsilon(1.0, 1.0 - share, 1.0)  # all, if it is stuck; else what is not left
         if p[STUCK] > _DOUBT:
             lines += (alike_sentence(found),)
+    too_far = 0.0
+    if run.row == STUCK and _at_its_end(isolated, found):
+        too_far = _AT_END * float(p[STUCK])
+        p[STUCK] -= too_far
+        lines += (END_SENTENCE,)
     shift = max(0, round(found.lag)) if pair.side is Side.ACTUATOR else 0
     named = {run.row: mode.value}  # a gain beyond the table has the probability of the row that it was found by
     noisy = [Hypothesis(pair.side.value, ROWS[run.row].value, within * float(p[run.row]))] if outside else []
     p[run.row] *= 1.0 - within
-    hypotheses = [
-        Hypothesis(pair.side.value, named.get(row, ROWS[row].value), float(p[row])) for row in codes_of(pair.side)
-    ] + noisy
+    open_too_far = [Hypothesis(pair.side.value, FaultMode.OUTSIDE_TABLE.value, too_far)] if too_far else []
+    hypotheses = (
+        [Hypothesis(pair.side.value, named.get(row, ROWS[row].value), float(p[row])) for row in codes_of(pair.side)]
+        + noisy
+        + open_too_far
+    )
     return Finding(
         start=max(0, run.start - shift),
         stop=max(1, run.stop - shift),
@@ -197,6 +219,15 @@ def _hysteresis(isolated: Isolated, found: IdentifiedPair) -> bool:
     both = np.maximum(np.abs(seen.y[seen.use]), np.abs(seen.x[seen.use]))
     rests = float(np.nanquantile(both, _MOSTLY)) < _MIDDLE * pair.span
     return rests or (brief and seen.deviation < _HYSTERESIS * pair.span)
+
+
+def _at_its_end(isolated: Isolated, found: IdentifiedPair) -> bool:
+    """Whether a valve stands at its end while its command, the same way, asks for less."""
+    seen, span = isolated.seen, found.pair.span
+    if found.pair.side is not Side.ACTUATOR or not seen.use.any():
+        return False
+    y, x = float(np.mean(seen.y[seen.use])), seen.x[seen.use] / span
+    return abs(y) >= _END * span and bool(np.min(np.sign(y) * x) >= _SAME_WAY)
 
 
 def _left_share(isolated: Isolated) -> float | None:

@@ -16,6 +16,10 @@ from replay.faults import FaultMode
 #: Bounds in a sentence, and what tells that one is of the saturation term: a finding that is joined to another states both anew.
 BOUNDS, OF_SAT = r"\(95 %: \S+ to \S+\)", "which is ε̂ × sat"
 
+END_SENTENCE = (
+    "It stands at its end while its command asks for less, the same way: a {valve} that opens too far does so as well."
+)
+
 
 def sentences(isolated: Isolated, found: IdentifiedPair, mode: FaultMode, epsilon: Epsilon | None) -> tuple[str, ...]:
     """Evidence of one finding.

@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 _GAP_S = 3.0  # between pieces of one fault
-_LEAST_S, _LEAST, _MOST = 1.0, 40, 200_000  # of a cluster: seconds, samples; samples that are looked at of a long one
+_LEAST_S, _LEAST, _MOST = 1.0, 20, 200_000  # of a cluster: seconds, samples; samples that are looked at of a long one
 _LEFT = 0.06  # of the power of a deviation: what a cause leaves of it, at most
 # what any cause of another row leaves, at least: times what the cause leaves, and of the power
 _RIVAL, _RIVAL_LEFT = 3.0, 0.15
@@ -59,19 +59,19 @@ def with_one_cause(findings: Sequence[Finding], measured: Measured) -> list[Find
     """
     out: list[Finding] = []
     clusters = list(_clusters(findings, round(_GAP_S / measured.dt)))
-    common = _cause_of([f for near in clusters for f in near], measured) if len(clusters) > 1 else None
+    common = cause_of([f for near in clusters for f in near], measured) if len(clusters) > 1 else None
     if common is not None and (not common.alone or (common.changes and not common.late)):
         common = None  # what changed between two pieces may have changed anyhow
     for pieces in clusters:
         near = pieces
-        cause = replace(common, start=None, stop=None) if common is not None else _cause_of(near, measured)
+        cause = replace(common, start=None, stop=None) if common is not None else cause_of(near, measured)
         lost = all(f.mode is FaultMode.INEFFICIENT for f in near)
         wide = _as_far_as_it_shows(near, out[-1].stop if out else 0, measured) if lost else near
-        offset = _cause_of(wide, measured) if wide != near else None
+        offset = cause_of(wide, measured) if wide != near else None
         if offset is not None and offset.alone and offset.epsilon is None and not offset.changes:
             near, cause = wide, offset  # what a loss, say, explains of a part is an offset's by the rest
         told = cause is None or (cause.alone and all(f.mode == cause.mode for f in near))
-        out += near if told or cause is None else [_joined(near, cause)]
+        out += near if told or cause is None else [joined(near, cause)]
     return out
 
 
@@ -103,7 +103,7 @@ def _as_far_as_it_shows(near: list[Finding], least: int, measured: Measured) -> 
     return [*ends[:-1], replace(ends[-1], stop=max(ends[-1].stop, stop))]
 
 
-def _cause_of(near: Sequence[Finding], measured: Measured) -> Cause | None:
+def cause_of(near: Sequence[Finding], measured: Measured) -> Cause | None:
     """What explains all pieces at once; None where nothing does, or more than one thing."""
     first, last = near[0].start, min(max(f.stop for f in near), measured.y.size)
     inside = np.zeros(last - first, np.bool_)
@@ -127,7 +127,8 @@ def _cause_of(near: Sequence[Finding], measured: Measured) -> Cause | None:
     big = np.flatnonzero(off > max(_BEYOND * measured.noise, _MARKED * float(np.sqrt(np.mean(off**2)))))
     part = _lasting_part(big, at, measured)
     cause = _explanation(y, x, at, measured)
-    if cause is not None and (cause.alone or all(f.mode.varying for f in near)):
+    apart = cause is not None and cause.left <= _NOTHING and len({f.mode for f in near}) > 1  # no row explains them all
+    if cause is not None and (cause.alone or apart or all(f.mode.varying for f in near)):
         k = _lasting(big, at, measured)
         early = (at[k] - at[0]) * measured.dt >= _EARLY_S
         if early and cause.epsilon is not None and _nothing_asked(cause, x[:k], measured):
@@ -252,7 +253,7 @@ def _said(cause: Cause) -> tuple[float, float, tuple[str, ...]]:
     return (_P_FADES, _P_DRIFTS, (_EITHER_DRIFTS,)) if cause.clear else (_P_UNCLEAR, _P_UNCLEAR_DRIFTS, (_UNCLEAR,))
 
 
-def _joined(near: Sequence[Finding], cause: Cause) -> Finding:
+def joined(near: Sequence[Finding], cause: Cause) -> Finding:
     """One finding over all pieces."""
     longest = max(near, key=lambda f: f.stop - f.start)
     p, offset, rival = _said(cause)

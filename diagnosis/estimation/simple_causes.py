@@ -42,6 +42,8 @@ class Measured:
         Root mean square of a healthy deviation [unit].
     least : float
         Smallest offset that counts [unit].
+    least_loss : float
+        Smallest ε that counts [1].
     """
 
     y: Array
@@ -52,6 +54,7 @@ class Measured:
     unit: str
     noise: float
     least: float
+    least_loss: float = 0.0
 
 
 @dataclass(frozen=True)

@@ -9,12 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.channels.relation import Relation, relation_of
+from diagnosis.estimation.by_itself import told_by_itself
 from diagnosis.estimation.one_cause import with_one_cause
 from diagnosis.estimation.simple_causes import Measured
 from diagnosis.results.assessment import Finding
 from diagnosis.results.result import Epsilon, Hypothesis
 from diagnosis.steering.findings import SideFindings
 from diagnosis.steering.inputs import AxleInputs
+from diagnosis.steering.openings import off_command, opens_as_told
 from diagnosis.steering.redundancy import MOST_APART, most_lag
 from replay.faults import FaultMode, Side, State
 from replay.machine.quantities import OPENING
@@ -57,7 +59,7 @@ def of_one_cause(side: Side, found: SideFindings, inputs: AxleInputs, min_sat: f
         Smallest offset that counts [rad or fraction].
     """
     sensor = side is Side.SENSOR
-    if not found.findings or not (inputs.angle_redundant if sensor else inputs.valve_redundant):
+    if not (inputs.angle_redundant if sensor else inputs.valve_redundant) or (sensor and not found.findings):
         return found if sensor else found._replace(findings=_or_all_off(found.findings, inputs.command))
     leaves = ("phi", "phi_true") if sensor else ("u_applied", "u")
     y, x = (inputs.values(leaf) for leaf in leaves)
@@ -70,13 +72,16 @@ def of_one_cause(side: Side, found: SideFindings, inputs: AxleInputs, min_sat: f
     if not sensor:
         x = _followed(y, x, sound if sound.any() else use, inputs.timeline.dt)
         use &= np.isfinite(x)
-        found = _as_it_opens(found, (y, x, use), inputs, min_sat)
+        found = _as_it_opens(_not_as_told(found, (y, command, use), inputs, min_sat), (y, x, use), inputs, min_sat)
     names = (inputs.channel(leaves[0]), inputs.channel(leaves[1]))
     unit = "rad" if sensor else OPENING
     noise = min(_NORMAL * usual, MOST_APART)
-    measured = Measured(y, x, use, inputs.timeline.dt, names, unit, noise, min_sat)
-    joined = with_one_cause(found.findings, measured)
-    return found._replace(findings=tuple(joined) if sensor else _or_all_off(joined, command, losses=True))
+    measured = Measured(y, x, use, inputs.timeline.dt, names, unit, noise, min_sat, _LOSES)
+    joined = [part for f in with_one_cause(found.findings, measured) for part in told_by_itself(f, measured)]
+    if sensor:
+        return found._replace(findings=tuple(joined))
+    joined = sorted([*joined, *off_command(joined, measured)], key=lambda f: f.start)
+    return found._replace(findings=_or_all_off(joined, command, losses=True))
 
 
 def _followed(y: Array, x: Array, use: Flags, dt: float) -> Array:
@@ -85,18 +90,36 @@ def _followed(y: Array, x: Array, use: Flags, dt: float) -> Array:
     return relation_of(y, x, use, Relation(), dt, (0, most_lag(dt)), span)._replace(gain=1.0).expected(x, dt)
 
 
+def _not_as_told(
+    found: SideFindings, pairs: tuple[Array, Array, Flags], inputs: AxleInputs, min_sat: float
+) -> SideFindings:
+    """A valve's findings without what its measured opening denies; `pairs` of opening and command, shape (n,), and where."""
+    kept, open_, dt = [], list(found.unexplained), inputs.timeline.dt
+    for f in found.findings:
+        part = slice(f.start, f.stop)
+        if not f.mode.total and opens_as_told(*(z[part] for z in pairs), dt, loss=_LOSES, least=min_sat):
+            open_.append(_blocks_of(f, inputs))
+        else:
+            kept.append(f)
+    return SideFindings(tuple(kept), tuple(open_))
+
+
+def _blocks_of(finding: Finding, inputs: AxleInputs) -> tuple[int, int]:
+    length = 1 if inputs.blocks is None else inputs.blocks.length
+    return finding.start // length, -(-finding.stop // length)
+
+
 def _as_it_opens(
     found: SideFindings, pairs: tuple[Array, Array, Flags], inputs: AxleInputs, min_sat: float
 ) -> SideFindings:
     """A valve's findings, none of them stuck or dead while its measured opening moves with the command: `pairs` of both, shape (n,), and where."""
     kept, open_ = [], list(found.unexplained)
-    length = 1 if inputs.blocks is None else inputs.blocks.length
     for f in found.findings:
         edge = round(_EDGE * (f.stop - f.start))  # a valve that begins to stick has moved until then
         inner = slice(f.start + edge, f.stop - edge)
         y, x = (z[inner][pairs[2][inner]] for z in pairs[:2])
         if f.mode.total and x.size >= _FEW and _rms(y - x) < max(min_sat, _AS_TOLD * _rms(x)):
-            open_.append((f.start // length, -(-f.stop // length)))  # it stands where it is told to
+            open_.append(_blocks_of(f, inputs))  # it stands where it is told to
             continue
         moves = f.mode.total and x.size >= _FEW and min(np.std(x), np.std(y)) >= _MOTION
         if not moves or float(np.corrcoef(x, y)[0, 1]) < _FOLLOWS:
@@ -107,7 +130,7 @@ def _as_it_opens(
         zero = float(np.mean(y) - gain * np.mean(x))
         lost = 1.0 - gain
         if abs(lost) < _LOSES and abs(zero) < min_sat:
-            open_.append((f.start // length, -(-f.stop // length)))
+            open_.append(_blocks_of(f, inputs))
             continue
         shifted = abs(zero) >= max(min_sat, _SHIFTED * lost * float(np.sqrt(np.mean(x**2))))
         mode = FaultMode.INEFFICIENT if lost >= _LOSES and not shifted else FaultMode.OUTSIDE_TABLE
