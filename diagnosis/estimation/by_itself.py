@@ -22,6 +22,7 @@ _EDGE_S, _EDGE = (
     0.2,
     0.1,
 )  # at either end, where a channel goes and returns with its lag: at most so long, and of a stretch
+_NOTHING_LEFT = 0.9  # ε of a channel that is stuck or dead, whatever else would explain it
 _ALL = 0.9  # of the deviation's power, that lies in stretches which a cause explains
 
 
@@ -57,7 +58,7 @@ def causes_where_off(finding: Finding, measured: Measured, least: float = 0.0) -
     off = np.abs(measured.y - measured.x)[part]
     off = np.where(measured.use[part] & np.isfinite(off), off, 0.0)
     whole = float(np.sum(off**2))
-    usual = np.sqrt(whole / max(np.count_nonzero(off), 1))
+    usual = float(np.sqrt(whole / max(int(np.count_nonzero(off)), 1)))
     found, power = [], 0.0
     for start, stop in _stretches(off > max(_DEVIATES * measured.noise, _OF_ALL * usual), measured.dt):
         piece = replace(finding, start=finding.start + start, stop=finding.start + stop)
@@ -66,7 +67,7 @@ def causes_where_off(finding: Finding, measured: Measured, least: float = 0.0) -
             continue
         inside = off[start:stop]
         power += float(np.sum(inside**2))
-        large = np.sqrt(np.sum(inside**2) / max(np.count_nonzero(inside), 1)) >= least
+        large = float(np.sqrt(np.sum(inside**2) / max(int(np.count_nonzero(inside)), 1))) >= least
         if large and not _small(cause, measured):
             found.append(joined([piece], cause))
     return found, power / max(whole, 1e-30)
@@ -87,7 +88,8 @@ def _cause(piece: Finding, measured: Measured) -> Cause | None:
     edge = min(round(_EDGE_S / measured.dt), int(_EDGE * (piece.stop - piece.start)))
     inner = replace(piece, start=piece.start + edge, stop=piece.stop - edge)
     cause = cause_of([piece], measured) or cause_of([inner], measured)
-    return None if cause is None else replace(cause, start=None, stop=None)
+    stays = cause is not None and cause.epsilon is not None and cause.epsilon.value > _NOTHING_LEFT
+    return None if cause is None or stays else replace(cause, start=None, stop=None)
 
 
 def _small(cause: Cause, measured: Measured) -> bool:

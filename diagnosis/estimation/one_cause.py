@@ -127,7 +127,8 @@ def cause_of(near: Sequence[Finding], measured: Measured) -> Cause | None:
     big = np.flatnonzero(off > max(_BEYOND * measured.noise, _MARKED * float(np.sqrt(np.mean(off**2)))))
     part = _lasting_part(big, at, measured)
     cause = _explanation(y, x, at, measured)
-    apart = cause is not None and cause.left <= _NOTHING and len({f.mode for f in near}) > 1  # no row explains them all
+    # no row explains all pieces of what changes
+    apart = cause is not None and cause.changes and cause.left <= _NOTHING and len({f.mode for f in near}) > 1
     if cause is not None and (cause.alone or apart or all(f.mode.varying for f in near)):
         k = _lasting(big, at, measured)
         early = (at[k] - at[0]) * measured.dt >= _EARLY_S

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +17,7 @@ from diagnosis.results.assessment import Finding
 from diagnosis.results.result import Epsilon, Hypothesis
 from diagnosis.steering.findings import SideFindings
 from diagnosis.steering.inputs import AxleInputs
-from diagnosis.steering.openings import off_command, opens_as_told
+from diagnosis.steering.openings import latest, off_command, opens_as_told
 from diagnosis.steering.redundancy import MOST_APART, most_lag
 from replay.faults import FaultMode, Side, State
 from replay.machine.quantities import OPENING
@@ -58,46 +59,91 @@ def of_one_cause(side: Side, found: SideFindings, inputs: AxleInputs, min_sat: f
     min_sat : float
         Smallest offset that counts [rad or fraction].
     """
-    sensor = side is Side.SENSOR
-    if not (inputs.angle_redundant if sensor else inputs.valve_redundant) or (sensor and not found.findings):
-        return found if sensor else found._replace(findings=_or_all_off(found.findings, inputs.command))
-    leaves = ("phi", "phi_true") if sensor else ("u_applied", "u")
-    y, x = (inputs.values(leaf) for leaf in leaves)
-    use = inputs.timeline.fresh[inputs.channel(leaves[0])] & np.isfinite(y) & np.isfinite(x)
+    if side is Side.SENSOR:
+        return _of_sensor(found, inputs, min_sat) if found.findings and inputs.angle_redundant else found
+    if inputs.valve_redundant:
+        return _of_valve(found, inputs, min_sat)
+    return found._replace(findings=_or_all_off(found.findings, inputs.command))
+
+
+def _of_sensor(found: SideFindings, inputs: AxleInputs, min_sat: float) -> SideFindings:
+    y, x, use = _pair(inputs, "phi", "phi_true")
+    measured = _measured(found, (y, x, use), inputs, ("phi", "phi_true"), "rad", min_sat)
+    return found._replace(findings=tuple(_explained(found, measured)))
+
+
+def _of_valve(found: SideFindings, inputs: AxleInputs, min_sat: float) -> SideFindings:
+    y, command, use = _pair(inputs, "u_applied", "u")
+    sound = _sound(found, use)
+    relation = _relation(y, command, sound if sound.any() else use, inputs.timeline.dt)
+    measured = _measured(found, (y, command, use), inputs, ("u_applied", "u"), OPENING, min_sat)
+    x = relation.expected(command, inputs.timeline.dt)  # what it is late by is no fault
+    use = use & np.isfinite(x)
+    measured = replace(measured, x=x, use=use)
+    told = partial(_not_as_told, pair=(y, command), use=use, relation=relation, inputs=inputs, min_sat=min_sat)
+    found = _as_it_opens(told(found), (y, x, use), inputs, min_sat)
+    explained = _explained(found, measured)
+    off = told(SideFindings(tuple(off_command(explained, measured)), ())).findings
+    in_time = sorted([*explained, *off], key=lambda f: f.start)
+    return found._replace(findings=_or_all_off(in_time, command, losses=True))
+
+
+def _explained(found: SideFindings, measured: Measured) -> list[Finding]:
+    return [part for f in with_one_cause(found.findings, measured) for part in told_by_itself(f, measured)]
+
+
+def _pair(inputs: AxleInputs, leaf: str, beside: str) -> tuple[Array, Array, Flags]:
+    """A channel and its reference, and where both are new; of shape (n,)."""
+    y, x = inputs.values(leaf), inputs.values(beside)
+    return y, x, inputs.timeline.fresh[inputs.channel(leaf)] & np.isfinite(y) & np.isfinite(x)
+
+
+def _sound(found: SideFindings, use: Flags) -> Flags:
+    """Steps of `use`, shape (n,), without a finding."""
     sound = use.copy()
     for f in found.findings:
         sound[f.start : f.stop] = False
+    return sound
+
+
+def _measured(
+    found: SideFindings,
+    pair: tuple[Array, Array, Flags],
+    inputs: AxleInputs,
+    leaves: tuple[str, str],
+    unit: str,
+    min_sat: float,
+) -> Measured:
+    y, x, use = pair
+    sound = _sound(found, use)
     usual = float(np.quantile(np.abs(y - x)[sound], _LOWER)) if sound.any() else 0.0
-    command = x
-    if not sensor:
-        x = _followed(y, x, sound if sound.any() else use, inputs.timeline.dt)
-        use &= np.isfinite(x)
-        found = _as_it_opens(_not_as_told(found, (y, command, use), inputs, min_sat), (y, x, use), inputs, min_sat)
     names = (inputs.channel(leaves[0]), inputs.channel(leaves[1]))
-    unit = "rad" if sensor else OPENING
     noise = min(_NORMAL * usual, MOST_APART)
-    measured = Measured(y, x, use, inputs.timeline.dt, names, unit, noise, min_sat, _LOSES)
-    joined = [part for f in with_one_cause(found.findings, measured) for part in told_by_itself(f, measured)]
-    if sensor:
-        return found._replace(findings=tuple(joined))
-    joined = sorted([*joined, *off_command(joined, measured)], key=lambda f: f.start)
-    return found._replace(findings=_or_all_off(joined, command, losses=True))
+    return Measured(y, x, use, inputs.timeline.dt, names, unit, noise, min_sat, _LOSES)
 
 
-def _followed(y: Array, x: Array, use: Flags, dt: float) -> Array:
-    """A valve's command as its opening follows it, with its lag and play: what it is late by is no fault. All of shape (n,)."""
+def _relation(y: Array, x: Array, use: Flags, dt: float) -> Relation:
+    """How a valve's opening follows its command, with its lag and play; all of shape (n,)."""
     span = float(np.max(np.abs(x[use]), initial=0.0))
-    return relation_of(y, x, use, Relation(), dt, (0, most_lag(dt)), span)._replace(gain=1.0).expected(x, dt)
+    return relation_of(y, x, use, Relation(), dt, (0, most_lag(dt)), span)._replace(gain=1.0)
 
 
 def _not_as_told(
-    found: SideFindings, pairs: tuple[Array, Array, Flags], inputs: AxleInputs, min_sat: float
+    found: SideFindings,
+    pair: tuple[Array, Array],
+    use: Flags,
+    relation: Relation,
+    inputs: AxleInputs,
+    min_sat: float,
 ) -> SideFindings:
-    """A valve's findings without what its measured opening denies; `pairs` of opening and command, shape (n,), and where."""
+    """A valve's findings without what its measured opening denies; `pair` of opening and command, and `use`, of shape (n,)."""
     kept, open_, dt = [], list(found.unexplained), inputs.timeline.dt
+    reach = latest(relation.delay * dt + relation.lag, dt)
     for f in found.findings:
-        part = slice(f.start, f.stop)
-        if not f.mode.total and opens_as_told(*(z[part] for z in pairs), dt, loss=_LOSES, least=min_sat):
+        part = slice(max(0, f.start - reach), f.stop)
+        y, x = (z[part] for z in pair)
+        own = use[part] & (np.arange(part.start, part.stop) >= f.start)
+        if not f.mode.total and opens_as_told(y, x, own, reach, loss=_LOSES, least=min_sat):
             open_.append(_blocks_of(f, inputs))
         else:
             kept.append(f)

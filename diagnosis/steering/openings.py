@@ -19,13 +19,22 @@ from replay.faults import FaultMode, Side
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
-_LATEST_S = 0.3  # after its command: pilot stages and ramps of healthy valves
+_LATEST_S, _LATE, _AT_MOST_S = (
+    0.3,
+    3.0,
+    0.6,
+)  # after its command: of any healthy valve; times what it usually is late by; of that at most
 _MOSTLY, _REACH = 0.98, 0.8  # of the readings; of how far the command goes, its rarest twentieths left out
-_FEW = 12
+_FEW, _ASKED = 12, 0.1  # readings; of full opening, that the command goes at least: beside less a loss does not show
 _OFF = 0.05  # of full opening, root mean square: a healthy valve with a zero of its own is off by less
 
 
-def opens_as_told(y: Array, x: Array, use: Flags, dt: float, *, loss: float, least: float) -> bool:
+def latest(usual: float, dt: float) -> int:
+    """By how much a healthy opening may be later than its command [steps]: ramps and pilot stages are no faults; `usual`, `dt` in s."""
+    return max(1, round(min(max(_LATEST_S, _LATE * usual), _AT_MOST_S) / dt))
+
+
+def opens_as_told(y: Array, x: Array, use: Flags, reach: int, *, loss: float, least: float) -> bool:
     """Whether an opening lies where its command was within the last moment, and goes nearly as far as it.
 
     Parameters
@@ -34,19 +43,18 @@ def opens_as_told(y: Array, x: Array, use: Flags, dt: float, *, loss: float, lea
         Measured opening and command [fraction of full opening].
     use : Flags, shape (n,)
         Steps with both that bring something new.
-    dt : float
-        Step [s].
+    reach : int
+        How long ago its command may have been there [steps].
     loss, least : float
         By which share, and by how much [fraction of full opening], an opening may be off that counts as no fault.
     """
     if np.count_nonzero(use) < _FEW:
         return False
     known = bridged(x)
-    reach = max(1, round(_LATEST_S / dt))
     low, high = (limit(known, reach, 0)[use] for limit in (smallest_within, largest_within))
     inside = (y[use] >= low - least - loss * np.abs(low)) & (y[use] <= high + least + loss * np.abs(high))
     way, told = (float(np.quantile(z[use], 0.95) - np.quantile(z[use], 0.05)) for z in (y, x))
-    return float(np.mean(inside)) >= _MOSTLY and way + 2.0 * least >= _REACH * told
+    return float(np.mean(inside)) >= _MOSTLY and told >= _ASKED and way + 2.0 * least >= _REACH * told
 
 
 def off_command(findings: Sequence[Finding], measured: Measured) -> list[Finding]:
