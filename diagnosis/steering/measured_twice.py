@@ -81,11 +81,11 @@ def _of_valve(found: SideFindings, inputs: AxleInputs, min_sat: float) -> SideFi
     use = use & np.isfinite(x)
     measured = replace(measured, x=x, use=use)
     told = partial(_not_as_told, pair=(y, command), use=use, relation=relation, inputs=inputs, min_sat=min_sat)
-    found = _as_it_opens(told(found), (y, x, use), inputs, min_sat)
-    explained = _explained(found, measured)
-    off = told(SideFindings(tuple(off_command(explained, measured)), ())).findings
-    in_time = sorted([*explained, *off], key=lambda f: f.start)
-    return found._replace(findings=_or_all_off(in_time, command, losses=True))
+    found = told(found)
+    off = told(SideFindings(tuple(off_command(found.findings, measured)), ())).findings
+    pieces = tuple(sorted([*found.findings, *off], key=lambda f: f.start))
+    found = _as_it_opens(found._replace(findings=pieces), (y, x, use), inputs, min_sat)
+    return found._replace(findings=_or_all_off(_explained(found, measured), command, losses=True))
 
 
 def _explained(found: SideFindings, measured: Measured) -> list[Finding]:

@@ -25,7 +25,7 @@ _LATEST_S, _LATE, _AT_MOST_S = (
     0.6,
 )  # after its command: of any healthy valve; times what it usually is late by; of that at most
 _MOSTLY, _REACH = 0.98, 0.8  # of the readings; of how far the command goes, its rarest twentieths left out
-_FEW, _ASKED = 12, 0.1  # readings; of full opening, that the command goes at least: beside less a loss does not show
+_FEW, _ASKED = 12, 0.3  # readings; of full opening, that the command goes at least: beside less a loss does not show
 _OFF = 0.05  # of full opening, root mean square: a healthy valve with a zero of its own is off by less
 
 
