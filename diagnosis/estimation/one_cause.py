@@ -215,8 +215,9 @@ def _explanation(y: Array, x: Array, at: NDArray[np.intp], measured: Measured) -
 
 def _biased(y: Array, x: Array, measured: Measured) -> float:
     """Share of a deviation's power that a loss with a bias leaves, which is the row of noise."""
-    both = np.column_stack([x, np.ones(x.size)])
-    return power(y - both @ np.linalg.lstsq(both, y, rcond=None)[0], measured) / max(power(y - x, measured), 1e-30)
+    gain, _ = np.linalg.lstsq(np.column_stack([x, np.ones(x.size)]), y, rcond=None)[0]
+    rest = y - float(np.clip(gain, 0.0, 1.0)) * x
+    return power(rest - np.mean(rest), measured) / max(power(y - x, measured), 1e-30)
 
 
 def _fading(y: Array, x: Array, found: Sequence[Cause], stuck: float, measured: Measured) -> Cause | None:

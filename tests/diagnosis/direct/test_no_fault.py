@@ -177,3 +177,17 @@ def test_what_a_valve_is_off_by_beside_a_command_that_rests_counts_as_a_constant
     x[(T > 20.0) & (T < 24.0)] = 0.12
     y = np.where((T > 21.0) & (T < 23.0), x - off, x)
     assert bool(found(Side.ACTUATOR, y + noise(1e-3), x)) is counts
+
+
+@pytest.mark.parametrize(
+    ("place", "sure"), [(0.99, False), (0.8, True), (-0.99, True)], ids=["at its end", "before it", "at the other end"]
+)
+def test_a_valve_that_stands_at_its_end_while_less_is_asked_for_may_open_too_far(place: float, sure: bool) -> None:
+    asked = np.where((T > 20.0) & (T < 40.0), 0.7 + 0.1 * np.sin(T), command())
+    y = np.where((T > 20.0) & (T < 40.0), place, asked) + noise(0.002)
+    (finding,) = [f for f in found(Side.ACTUATOR, y, asked) if f.stop * DT > 25.0]
+    p = {h.mode: h.p for h in finding.hypotheses}
+    assert finding.mode is FaultMode.STUCK
+    assert (p["stuck"] > 0.9) is sure
+    assert p.get("outside_table", 0.0) == pytest.approx(0.0 if sure else 0.45, abs=0.02)
+    assert any("at its end" in line for line in finding.evidence) is not sure
