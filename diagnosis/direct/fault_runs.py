@@ -30,6 +30,7 @@ _ONE_GAIN = 0.1  # by which gains of one fault may differ
 _NEAR_MEAN = 0.25  # of its mean: standard deviation of a reference that hardly changes
 _ABOUT = 0.05  # of what a gain leaves: as near to it a channel may rest
 _ZERO = 3.0  # times the noise: no reading
+_ELSEWHERE = 8.0  # times the noise of a constant: a reading beside it
 _PLAYS = 3.0  # by which a command must move for a valve with a loss of gain to follow
 
 
@@ -77,9 +78,15 @@ def fault_runs(path: ModePath, samples: Samples, model: ModeModel, dt: float, sh
 
 
 def _moving(run: Run, samples: Samples, model: ModeModel) -> Run | None:
-    """A constant run without the ends in which nothing moves and nothing is read, for that is no fault; None where nothing is left."""
+    """A constant run without the ends in which nothing moves and nothing is read, or another value; None where nothing is left."""
     part = slice(run.start, run.stop)
-    rests = samples.quiet[part] & (np.abs(np.nan_to_num(samples.y[part], nan=np.inf)) <= _ZERO * model.noise)
+    y = samples.y[part]
+    rests = samples.quiet[part] & (np.abs(np.nan_to_num(y, nan=np.inf)) <= _ZERO * model.noise)
+    known = y[np.isfinite(y)]
+    level = float(np.median(known)) if known.size else 0.0
+    rests |= (
+        np.abs(y - level) > _ELSEWHERE * model.constant_noise
+    )  # the path may go from one value to the next in one row
     kept = trim(Run(0, run.size, run.row), rests)
     return None if kept is None else Run(run.start + kept.start, run.start + kept.stop, run.row)
 
