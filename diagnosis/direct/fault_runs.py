@@ -84,9 +84,8 @@ def _moving(run: Run, samples: Samples, model: ModeModel) -> Run | None:
     rests = samples.quiet[part] & (np.abs(np.nan_to_num(y, nan=np.inf)) <= _ZERO * model.noise)
     known = y[np.isfinite(y)]
     level = float(np.median(known)) if known.size else 0.0
-    rests |= (
-        np.abs(y - level) > _ELSEWHERE * model.constant_noise
-    )  # the path may go from one value to the next in one row
+    # the path may go from one value to the next in one row
+    rests |= np.abs(y - level) > _ELSEWHERE * model.constant_noise
     kept = trim(Run(0, run.size, run.row), rests)
     return None if kept is None else Run(run.start + kept.start, run.start + kept.stop, run.row)
 

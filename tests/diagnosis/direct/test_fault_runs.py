@@ -14,7 +14,7 @@ from diagnosis.estimation.samples import Samples
 from diagnosis.estimation.segments import Run
 
 N = 1000
-MODEL: Any = SimpleNamespace(noise=0.01)
+MODEL: Any = SimpleNamespace(noise=0.01, constant_noise=0.01)
 
 
 def samples(reading: float) -> Samples:
