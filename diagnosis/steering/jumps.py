@@ -1,4 +1,4 @@
-"""A valve's loss that begins or ends with a jump of the angle is its sensor's: no axle turns so quickly."""
+"""A valve's fault that begins or ends with a jump of the angle is its sensor's: no axle turns so quickly."""
 
 from __future__ import annotations
 
@@ -17,11 +17,14 @@ Array = NDArray[np.float64]
 
 _EDGE_S = 0.25  # of a fault's beginning or end
 _OF_LOSS = 0.5  # of what a loss makes of the angle there: a jump by as much is its own
+_TOTAL = 0.03  # rad: by as much jumps an angle that nobody saw for a while, at least
 _LEAST_P, _MOST_P = 0.8, 0.9  # that what jumps so is the sensor's; set by hand, not calibrated
 
 
 def of_sensor(valve: Sequence[Finding], y: Array, fresh: NDArray[np.bool_], dt: float) -> list[Finding]:
-    """The losses among a valve's findings that begin or end with a jump of the angle as large as they are: they are the sensor's.
+    """The losses, and valves that stick or are dead, among findings that begin or end with a jump of the angle: they are the sensor's.
+
+    One of a loss is as large as it is.
 
     Parameters
     ----------
@@ -30,7 +33,7 @@ def of_sensor(valve: Sequence[Finding], y: Array, fresh: NDArray[np.bool_], dt: 
     y, fresh, dt : of shape (n,), (n,) and s
         Its angle [rad], as of `diagnosis.estimation.angle_jumps.readings`.
     """
-    losses = [f for f in valve if f.mode is FaultMode.INEFFICIENT and f.epsilon is not None]
+    losses = [f for f in valve if (f.mode is FaultMode.INEFFICIENT or f.mode.total) and f.epsilon is not None]
     quickest = quickest_of(readings(y, fresh, dt)) if losses else None
     if quickest is None:
         return []
@@ -41,7 +44,7 @@ def of_sensor(valve: Sequence[Finding], y: Array, fresh: NDArray[np.bool_], dt: 
         for edge in (f.start, f.stop):
             near = np.abs(found.at_s - edge * dt) <= _EDGE_S
             about = np.abs(y[max(0, edge - round(_EDGE_S / dt)) : edge + round(_EDGE_S / dt)])
-            least = _OF_LOSS * f.epsilon.value * float(np.nanmax(about, initial=0.0))
+            least = _TOTAL if f.mode.total else _OF_LOSS * f.epsilon.value * float(np.nanmax(about, initial=0.0))
             if near.any() and float(found.size[near].max()) > least:
                 out.append(f)
                 break
@@ -49,7 +52,7 @@ def of_sensor(valve: Sequence[Finding], y: Array, fresh: NDArray[np.bool_], dt: 
 
 
 def as_sensors(finding: Finding) -> Finding:
-    """A valve's loss told as its sensor's."""
+    """A valve's fault told as its sensor's."""
     p = min(_MOST_P, max(finding.probability, _LEAST_P))
     return replace(
         finding,

@@ -1,4 +1,4 @@
-"""A valve's loss that begins or ends with a jump of the angle is its sensor's."""
+"""A valve's fault that begins or ends with a jump of the angle is its sensor's."""
 
 from __future__ import annotations
 
@@ -35,6 +35,22 @@ def test_one_without_stays_the_valves() -> None:
 
 
 @pytest.mark.parametrize("mode", [FaultMode.STUCK, FaultMode.NO_SIGNAL])
+def test_an_angle_that_comes_back_with_a_jump_was_not_read(mode: FaultMode) -> None:
+    angle = turned()
+    angle[:3900] = 0.0
+    dead = loss(0, 3900, mode)
+    assert of_sensor([dead], angle, FRESH, DT) == [dead]
+    told = as_sensors(dead)
+    assert (told.side, told.mode, told.probability) == (Side.SENSOR, mode, 0.9)
+
+
+@pytest.mark.parametrize("mode", [FaultMode.STUCK, FaultMode.NO_SIGNAL])
+def test_an_axle_that_turns_on_from_where_it_stood_was_read(mode: FaultMode) -> None:
+    angle = np.concatenate([turned()[:3000], np.full(900, turned()[3000]), turned()[3000:5100]])
+    assert of_sensor([loss(3000, 3900, mode)], angle, FRESH[: angle.size], DT) == []
+
+
+@pytest.mark.parametrize("mode", [FaultMode.NOISY, FaultMode.OUTSIDE_TABLE])
 def test_other_rows_keep_their_side(mode: FaultMode) -> None:
     angle = turned()
     angle[3500:3900] *= 0.6
