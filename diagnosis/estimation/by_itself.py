@@ -61,15 +61,15 @@ def causes_where_off(finding: Finding, measured: Measured, least: float = 0.0) -
     usual = float(np.sqrt(whole / max(int(np.count_nonzero(off)), 1)))
     found, power = [], 0.0
     for start, stop in _stretches(off > max(_DEVIATES * measured.noise, _OF_ALL * usual), measured.dt):
+        inside = off[start:stop]
+        if float(np.sqrt(np.sum(inside**2) / max(int(np.count_nonzero(inside)), 1))) < least:
+            continue
         piece = replace(finding, start=finding.start + start, stop=finding.start + stop)
         cause = _cause(piece, measured)
-        if cause is None:
-            continue
-        inside = off[start:stop]
-        power += float(np.sum(inside**2))
-        large = float(np.sqrt(np.sum(inside**2) / max(int(np.count_nonzero(inside)), 1))) >= least
-        if large and not _small(cause, measured):
-            found.append(joined([piece], cause))
+        if cause is not None:
+            power += float(np.sum(inside**2))
+            if not _small(cause, measured):
+                found.append(joined([piece], cause))
     return found, power / max(whole, 1e-30)
 
 
