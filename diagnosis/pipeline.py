@@ -188,12 +188,14 @@ def _outside_gaps(found: ComponentResult, timeline: Timeline) -> ComponentResult
 
 
 def _without_backwards(judged: Judged) -> Judged:
-    """The same without what models claim of parts whose channel counts backwards."""
+    """The same without what models claim of parts whose channel counts backwards, or is another one's."""
     found = judged.found
     named = {component for (component, _), a in found.assessments.items() if a.findings}
-    if not (wrong := named & {h.component for h in judged.hints if h.backwards}):
+    wrong = named & {h.component for h in judged.hints if h.backwards}
+    exchanged = named & {component for h in judged.hints for component in h.exchanged}
+    if not wrong | exchanged:
         return judged
-    told = without_claims(found.assessments, wrong, judged.mission.timeline.dt)
+    told = without_claims(found.assessments, wrong, exchanged, judged.mission.timeline.dt)
     return Judged(judged.mission, judged.recorded, judged.machine, judged.replay, replace(found, assessments=told))
 
 

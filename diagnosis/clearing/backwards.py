@@ -1,4 +1,4 @@
-"""Parts whose channel counts backwards: no model says anything of them before the machine file is right."""
+"""Parts whose channel counts backwards, or is another one's: no model says anything of them before the machine file is right."""
 
 from __future__ import annotations
 
@@ -13,8 +13,10 @@ from replay.faults import State
 Part = tuple[str, str]
 
 
-def without_claims(assessments: Mapping[Part, Assessment], components: Set[str], dt: float) -> dict[Part, Assessment]:
-    """Assessments of which those of some components state what second measurements show, and nothing that a model claims.
+def without_claims(
+    assessments: Mapping[Part, Assessment], components: Set[str], exchanged: Set[str], dt: float
+) -> dict[Part, Assessment]:
+    """Assessments of which those of some components state what second measurements show, and nothing that a model claims; of others nothing.
 
     Parameters
     ----------
@@ -22,12 +24,14 @@ def without_claims(assessments: Mapping[Part, Assessment], components: Set[str],
         By component and side.
     components : Set[str]
         Wheels and axles of which a channel runs against what it should follow.
+    exchanged : Set[str]
+        Those whose measured openings follow each other's commands.
     dt : float
         Sample [s].
     """
     return {
-        part: without_findings(a, [f for f in a.findings if f.tier is not Tier.DIRECT], dt)
-        if part[0] in components
+        part: without_findings(a, [f for f in a.findings if part[0] in exchanged or f.tier is not Tier.DIRECT], dt)
+        if part[0] in components | exchanged
         else a
         for part, a in assessments.items()
     }

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from itertools import combinations
 from math import pi
 from typing import NamedTuple
@@ -58,11 +58,14 @@ class Hint(NamedTuple):
         Whether it runs against what it should follow.
     text : str
         A sentence.
+    exchanged : tuple[str, ...]
+        Parts whose measured openings follow each other's commands: nothing that is found of them is theirs.
     """
 
     component: str
     backwards: bool
     text: str
+    exchanged: tuple[str, ...] = ()
 
 
 def mapping_hints(cells: Cells) -> tuple[Hint, ...]:
@@ -89,7 +92,15 @@ def mapping_hints(cells: Cells) -> tuple[Hint, ...]:
                 [f"steer.{a}.u" for a in machine.axles],
                 "the rate of its angle",
             ),
+            *_measured(cells, "wheel", machine.wheels, cells.wheels),
+            *_measured(cells, "steer", machine.axles, cells.axles),
         )
+
+
+def _measured(cells: Cells, kind: str, parts: Sequence[str], of: Callable[[str], Array]) -> Iterator[Hint]:
+    """Hints for measured openings, beside their commands: of their size a fault says as much."""
+    names = [f"{kind}.{part}.u_applied" for part in parts]
+    yield from _hints(cells, of("u_applied"), of("u"), names, "its command", sizes=False, measured=True)
 
 
 def _openings(cells: Cells, opening: Array, wanted: Array, names: Sequence[str], what: str) -> Iterator[Hint]:
@@ -99,21 +110,28 @@ def _openings(cells: Cells, opening: Array, wanted: Array, names: Sequence[str],
 
 
 def _hints(
-    cells: Cells, measured: Array, wanted: Array, names: Sequence[str], what: str, *, sizes: bool = True
+    cells: Cells,
+    signals: Array,
+    wanted: Array,
+    names: Sequence[str],
+    what: str,
+    *,
+    sizes: bool = True,
+    measured: bool = False,
 ) -> Iterator[Hint]:
-    """Hints for signals `measured`, each of which follows its own of `wanted`, both (cells, n)."""
-    if not measured.size or not np.isfinite(wanted).any():
+    """Hints for signals, each of which follows its own of `wanted`, both (cells, n); `measured`: whatever else is wrong."""
+    if not signals.size or not np.isfinite(wanted).any():
         return
     follows = np.where(np.isfinite(wanted), lowest_passed(wanted, cells.dt, _LAG_S if sizes else cells.dt), np.nan)
     told: set[int] = set()
     for i, j in combinations(range(len(names)), 2):
-        if _swapped(measured[:, [i, j]], follows[:, [i, j]]):
+        if _swapped(signals[:, [i, j]], follows[:, [i, j]]):
             told |= {i, j}
             one, other = _part(names[i]), _part(names[j])
             text = f"{names[i]} follows {what.replace('its', 'the')} of {other}, and {names[j]} that of {one}: {_LOOK}"
-            yield Hint(one, backwards=False, text=text)
+            yield Hint(one, backwards=False, text=text, exchanged=(one, other) if measured else ())
     rest = [i for i in range(len(names)) if i not in told]
-    pairs = {i: pair for i in rest if len((pair := _moving(measured[:, i], follows[:, i]))[0]) * cells.dt >= _LEAST_S}
+    pairs = {i: pair for i in rest if len((pair := _moving(signals[:, i], follows[:, i]))[0]) * cells.dt >= _LEAST_S}
     ratios = {i: _ratio(*pair) for i, pair in pairs.items()}
     usual = float(np.median([r for r in ratios.values() if np.isfinite(r)] or [0.0]))
     for i, (y, x) in pairs.items():

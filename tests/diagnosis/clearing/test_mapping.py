@@ -85,6 +85,23 @@ def test_parts_that_count_backwards_are_named_and_nothing_that_a_model_claims_of
     assert "wheel.RR.v runs against its commanded speed" in report["verdict"]["text"]
 
 
+@pytest.mark.parametrize(
+    ("one", "other", "words"),
+    [
+        ("wheel.FR.u", "wheel.FL.u", "wheel.FR.u_applied follows the command of FL, and wheel.FL.u_applied that of FR"),
+        ("steer.front.u", "steer.rear.u", "steer.front.u_applied follows the command of rear"),
+    ],
+)
+def test_openings_that_follow_each_others_commands_blame_no_valve(one: str, other: str, words: str) -> None:
+    mission = _swapped(one, other)(simulated())
+    (hint,) = [h for h in mapping_hints(in_cells(mission, base=False)) if h.exchanged]
+    assert hint.text.startswith(words)
+    report = diagnose_signals(signals_of(mission, base=False), haulotte()).report
+    assert not [f for f in report["intervals"] if f["component"] in hint.exchanged and f["severity"] != "info"]
+    assert report["verdict"]["status"] == "not_assessed"
+    assert "correct [signals] in a machine file" in report["verdict"]["text"]
+
+
 @pytest.mark.parametrize("value", [-0.02, -0.3])
 def test_a_reading_that_stays_where_it_is_runs_against_nothing(value: float) -> None:
     """Held beyond its middle while its command is mostly on the other side."""
