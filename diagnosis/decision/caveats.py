@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from diagnosis.decision.explained import explaining, is_of_another
 from diagnosis.decision.severity import halved_words, unanswered
 from diagnosis.decision.short import main_reason, main_state, short_parts, unjudged_axles
 from diagnosis.decision.wording import count_words, join_words
@@ -146,8 +147,12 @@ def doubt_of(watch: Sequence[FaultInterval], against: Reservations) -> str:
         out.append("the machine's settings do not fit the log")
     out += [cut.text for cut in against.scope]
     out += dict.fromkeys(event.doubt for event in against.events)
-    if against.open:
-        out.append(open_words(against.open))
+    own = [c for c in against.open if not is_of_another(c, explaining(c, watch))]
+    if own:
+        out.append(open_words(own))
+    elif against.open:
+        others = join_words(list(dict.fromkeys(c.component for c in against.open)))
+        out.append(f"beside a fault nothing shows whether {others} {'are' if ' and ' in others else 'is'} healthy")
     return join_words(out[:_REASONS]) + ("; more below" if len(out) > _REASONS else "")
 
 

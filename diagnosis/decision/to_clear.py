@@ -5,15 +5,16 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 
 from diagnosis.decision.caveats import Reservations, doubts_of, furthest_first
+from diagnosis.decision.explained import explaining, is_of_another, when_of
 from diagnosis.decision.short import Part, ToClear, short_parts, sides_of, unjudged_axles
 from diagnosis.decision.wording import count_words, join_words, remedy_words
 from diagnosis.results.assessed import CutKind, is_judged
 from diagnosis.results.assessment import Assessment
-from diagnosis.results.clearing import MAY_EXPLAIN, Check, Checked, lasts_in, share_covered
+from diagnosis.results.clearing import Check, Checked
 from diagnosis.results.left_out import is_left_out
 from diagnosis.results.machine_words import MachineWords
 from diagnosis.results.result import FaultInterval
-from diagnosis.results.vocabulary import Kind, Severity, Tier
+from diagnosis.results.vocabulary import Kind, Tier
 from replay.faults import Side, State
 from replay.machine.config import Limits
 
@@ -120,7 +121,7 @@ def to_clear(
     at_rest = {k for k, state in against.open_state.items() if state is State.NOT_EXCITED}  # exempt: its checks count
     brief = [k for k in steered if k not in {*unjudged, *at_rest} and _brief(k, decided_s, driven, limits)]
     twice = {c for (c, side), a in assessments.items() if a.tier is Tier.DIRECT and side == Side.SENSOR}
-    blamed = {k: f for k, c in enumerate(against.open) if (f := _meanwhile(c, faults)) is not None}
+    blamed = {k: f for k, c in enumerate(against.open) if (f := explaining(c, faults)) is not None}
     deviating = _of_faults([(against.open[k], f) for k, f in blamed.items()], faults, words)
     told = {component for component, _ in (*unjudged, *brief)}  # what has them judged lets their checks pass
     left = [c for k, c in enumerate(against.open) if k not in blamed]
@@ -139,23 +140,6 @@ def _asks_for_steering(check: Checked, twice: Collection[str]) -> bool:
 def _brief(part: Part, decided_s: Mapping[Part, float], driven: Mapping[Part, float], limits: Limits) -> bool:
     """Whether a part of an axle was judged for less than a part of a wheel must be."""
     return part in driven and not is_judged(decided_s.get(part, 0.0), driven[part], limits.min_assessed)
-
-
-def _meanwhile(check: Checked, faults: Sequence[FaultInterval]) -> FaultInterval | None:
-    """The fault that may explain why a check deviates, one of the same part before others; None where there is none.
-
-    It lasts for a good part of the check's window, or ended just before; what an axle's angle jumps by has no such aftermath.
-    """
-    start, stop = check.start_s, check.stop_s
-    if start is None or stop is None:
-        steered = [f for f in faults if f.kind is Kind.STEER and f.severity is not Severity.INFO]
-        against = check.check is Check.LASTING_RATE  # one axle against the other: a fault of either
-        return max(steered, key=lambda f: f.stop_s - f.start_s, default=None) if against else None
-    share = {f.id: share_covered(start, stop, (f.start_s, f.stop_s)) for f in faults if f.severity is not Severity.INFO}
-    counted = [f for f in faults if share.get(f.id, 0.0) >= MAY_EXPLAIN]
-    if check.check is Check.JUMP:
-        counted = [f for f in counted if lasts_in(start, stop, (f.start_s, f.stop_s))]
-    return max(counted, key=lambda f: (f.component == check.component, share[f.id]), default=None)
 
 
 def _of_doubts(faults: Sequence[FaultInterval], words: MachineWords) -> list[ToClear]:
@@ -178,31 +162,32 @@ def _of_faults(
 
     Each with the furthest of its checks.
     """
-    by: dict[tuple[str, str], list[tuple[Checked, FaultInterval]]] = {}
+    by: dict[tuple[str, str, bool], list[tuple[Checked, FaultInterval]]] = {}
     of = dict(blamed)
     for check in furthest_first(list(of)):
         fault = of[check]
-        mine = by.setdefault((fault.id, _when(check, fault)), [])
+        mine = by.setdefault((fault.id, when_of(check, fault), is_of_another(check, fault)), [])
         if all(check.component != c.component for c, _ in mine):
             mine.append((check, fault))
     out = []
-    for (name, when), mine in by.items():
-        fault = mine[0][1]
+    for (_, when, others), mine in by.items():
+        fault, checks = mine[0][1], [check for check, _ in mine]
+        said = _some([check.text for check in checks])
         point = ToClear(
-            f"{when} {name}, which may explain it: {_some([check.text for check, _ in mine])}.",
+            f"Explained by the {words.part_words(fault.kind, fault.component, fault.side)}, {when} {fault.id}: {said}. "
+            f"This speaks against no part of {_components_in_words(checks)}, and clears none."
+            if others
+            else f"{_sentence(when)} {fault.id}, which may explain it: {said}.",
             f"{remedy_words(fault, faults, words)}, then diagnose the next mission",
-            sides_of((check.component, check.side) for check, _ in mine),
+            sides_of((check.component, check.side) for check in checks),
         )
         out.append((mine[0][0], point))
     return out
 
 
-def _when(check: Checked, fault: FaultInterval) -> str:
-    """How a check's window lies to a fault that may explain it."""
-    if check.start_s is None or check.stop_s is None:
-        return "In a mission with"
-    during = lasts_in(check.start_s, check.stop_s, (fault.start_s, fault.stop_s))
-    return "At the time of" if during else "Just after"
+def _components_in_words(checks: Sequence[Checked]) -> str:
+    """Components of checks: ``RR and the rear axle``."""
+    return join_words([f"the {c.component} axle" if c.kind is Kind.STEER else c.component for c in checks])
 
 
 def _of_checks(checks: Sequence[Checked], twice: Collection[str]) -> list[tuple[Checked, ToClear]]:

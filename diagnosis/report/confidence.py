@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from diagnosis.comparison.coverage import SideCoverage, sides_of
+from diagnosis.report.second_measurements import second_of
 from diagnosis.report.standing import Standing, standings_of
 from diagnosis.results.document import IntervalRow, ReportDocument, VerdictRow
 from diagnosis.results.fault_rows import state_label
@@ -41,7 +42,8 @@ def sure_of(fault: IntervalRow, report: ReportDocument) -> str:
         row = f"{'most likely' if first else 'perhaps'} {state_label(fault['mode'], side).lower()}"
         words = [f"{_likely(faulty)} faulty ({percent(faulty)}), {row} ({percent(p)})"]
     machine_words = words_of(report["machine"])
-    how = machine_words.decided(Tier(fault["tier"]), Kind(fault["kind"]), side)
+    twice = second_of(fault, {s["name"] for s in report["signals"]}) is not None
+    how = machine_words.decided(Tier(fault["tier"]), Kind(fault["kind"]), side, twice=twice)
     words += [how] if how else []
     shares: dict[str, float] = {
         row["side"]: row["decided_driving_s"] / row["driving_s"]

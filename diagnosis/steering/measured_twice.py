@@ -13,6 +13,7 @@ from diagnosis.estimation.one_cause import with_one_cause
 from diagnosis.estimation.simple_causes import Measured
 from diagnosis.results.assessment import Finding
 from diagnosis.results.result import Epsilon, Hypothesis
+from diagnosis.results.sizes import amount
 from diagnosis.steering.findings import SideFindings
 from diagnosis.steering.inputs import AxleInputs
 from diagnosis.steering.redundancy import MOST_APART, most_lag
@@ -39,6 +40,7 @@ _IN_MIDDLE, _BESIDE = (
     0.04,
 )  # of full opening: as far off its zero a valve without signal rests, and further off a stuck one
 _BY_MODEL = "times as probable with"  # says what the model of the axle took it for
+_MEANWHILE = "Meanwhile {second}, a second measurement of the angle, moved over {other}, and {name} over {own}."
 _CONSTANT = "The command hardly moved meanwhile: a {valve} that is off by a constant would look the same."
 
 
@@ -76,7 +78,19 @@ def of_one_cause(side: Side, found: SideFindings, inputs: AxleInputs, min_sat: f
     noise = min(_NORMAL * usual, MOST_APART)
     measured = Measured(y, x, use, inputs.timeline.dt, names, unit, noise, min_sat)
     joined = with_one_cause(found.findings, measured)
+    if sensor:
+        joined = [_beside_the_second(f, (y, x, use), names) for f in joined]
     return found._replace(findings=tuple(joined) if sensor else _or_all_off(joined, command, losses=True))
+
+
+def _beside_the_second(finding: Finding, pair: tuple[Array, Array, Flags], names: tuple[str, str]) -> Finding:
+    """A sensor that stands still or is silent, with what the second one shows meanwhile; `pair` of both, shape (n,) [rad], and where."""
+    y, x = (z[finding.start : finding.stop][pair[2][finding.start : finding.stop]] for z in pair[:2])
+    if not finding.mode.total or x.size < _FEW:
+        return finding
+    own, other = (float(np.ptp(z)) for z in (y, x))
+    text = _MEANWHILE.format(second=names[1], other=amount(other, "rad", 2), name=names[0], own=amount(own, "rad", 2))
+    return replace(finding, evidence=(*finding.evidence, text))
 
 
 def _followed(y: Array, x: Array, use: Flags, dt: float) -> Array:
