@@ -3,10 +3,29 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from enum import Enum
 
 from diagnosis.results.clearing import MAY_EXPLAIN, Check, Checked, lasts_in, share_covered
 from diagnosis.results.result import FaultInterval
 from diagnosis.results.vocabulary import Kind, Severity
+
+
+class When(Enum):
+    """How the window of a check lies to a fault: words before its name, and words after its part."""
+
+    MISSION = ("In a mission with", "")
+    DURING = ("At the time of", ", at its time")
+    AFTER = ("Just after", ", just after it")
+
+    @property
+    def before(self) -> str:
+        """Words to be followed by the fault's name."""
+        return self.value[0]
+
+    @property
+    def after(self) -> str:
+        """Words to follow the name of the fault's part."""
+        return self.value[1]
 
 
 def explaining(check: Checked, faults: Sequence[FaultInterval]) -> FaultInterval | None:
@@ -31,8 +50,8 @@ def is_of_another(check: Checked, fault: FaultInterval | None) -> bool:
     return fault is not None and fault.component != check.component and fault.severity is not Severity.LOW
 
 
-def when_of(check: Checked, fault: FaultInterval) -> str:
-    """How a check's window lies to a fault that explains it, which is to be named next."""
+def when_of(check: Checked, fault: FaultInterval) -> When:
+    """How a check's window lies to a fault that explains it."""
     if check.start_s is None or check.stop_s is None:
-        return "in a mission with"
-    return "at the time of" if lasts_in(check.start_s, check.stop_s, (fault.start_s, fault.stop_s)) else "just after"
+        return When.MISSION
+    return When.DURING if lasts_in(check.start_s, check.stop_s, (fault.start_s, fault.stop_s)) else When.AFTER

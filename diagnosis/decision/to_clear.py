@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 
 from diagnosis.decision.caveats import Reservations, doubts_of, furthest_first
-from diagnosis.decision.explained import explaining, is_of_another, when_of
+from diagnosis.decision.explained import When, explaining, is_of_another, when_of
 from diagnosis.decision.short import Part, ToClear, short_parts, sides_of, unjudged_axles
 from diagnosis.decision.wording import count_words, join_words, remedy_words
 from diagnosis.results.assessed import CutKind, is_judged
@@ -162,7 +162,7 @@ def _of_faults(
 
     Each with the furthest of its checks.
     """
-    by: dict[tuple[str, str, bool], list[tuple[Checked, FaultInterval]]] = {}
+    by: dict[tuple[str, When, bool], list[tuple[Checked, FaultInterval]]] = {}
     of = dict(blamed)
     for check in furthest_first(list(of)):
         fault = of[check]
@@ -174,10 +174,10 @@ def _of_faults(
         fault, checks = mine[0][1], [check for check, _ in mine]
         said = _some([check.text for check in checks])
         point = ToClear(
-            f"Explained by the {words.part_words(fault.kind, fault.component, fault.side)}, {when} {fault.id}: {said}. "
+            f"Explained by {fault.id}, the {words.part_words(fault.kind, fault.component, fault.side)}{when.after}: {said}. "
             f"This speaks against no part of {_components_in_words(checks)}, and clears none."
             if others
-            else f"{_sentence(when)} {fault.id}, which may explain it: {said}.",
+            else f"{when.before} {fault.id}, which may explain it: {said}.",
             f"{remedy_words(fault, faults, words)}, then diagnose the next mission",
             sides_of((check.component, check.side) for check in checks),
         )

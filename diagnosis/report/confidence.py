@@ -7,12 +7,14 @@ from diagnosis.report.second_measurements import second_of
 from diagnosis.report.standing import Standing, standings_of
 from diagnosis.results.document import IntervalRow, ReportDocument, VerdictRow
 from diagnosis.results.fault_rows import state_label
+from diagnosis.results.limited import MOST_CLAIMED
 from diagnosis.results.machine_words import words_of
 from diagnosis.results.vocabulary import Kind, Leave, Tier, Verdict
 from replay.faults import Side, State
 
 _WORDS = ((0.99, "Practically certain"), (0.9, "Very likely"), (0.7, "Likely"))
 _OPEN, _TIE = 0.9, 1e-3
+_AT_MOST = f"{100 * MOST_CLAIMED:.0f} %, the most that any finding is given"
 _NOTHING, _MOSTLY = 0.005, 0.5  # of the driving: judged for so little that it is none, and for most of it
 _UNLIKE = 0.1  # of the driving: sides that were judged for shares so far apart are told one by one
 _ANSWERS = {Verdict.STOP: f"{Leave.MUST_NOT} before repair", Verdict.READY: "", Verdict.NOT_ASSESSED: Leave.CHECK.value}
@@ -36,7 +38,7 @@ def sure_of(fault: IntervalRow, report: ReportDocument) -> str:
     p, side, hypotheses = fault["probability"], Side(fault["side"]), fault["hypotheses"]
     faulty = 1.0 - sum(h["p"] for h in hypotheses if h["mode"] == State.HEALTHY)
     if p >= _OPEN or faulty <= p + 0.05 or not hypotheses:
-        words = [f"{_likely(p)} ({percent(p)})"]
+        words = [f"{_likely(p)} ({_AT_MOST if abs(p - MOST_CLAIMED) <= _TIE else percent(p)})"]
     else:
         first = max(h["p"] for h in hypotheses if h["mode"] != State.HEALTHY) <= p + _TIE
         row = f"{'most likely' if first else 'perhaps'} {state_label(fault['mode'], side).lower()}"

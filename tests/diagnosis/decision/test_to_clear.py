@@ -78,9 +78,7 @@ def test_what_deviates_while_a_fault_lasts_is_told_as_its_possible_doing() -> No
     part = (Kind.WHEEL, "FR", Side.SENSOR_OR_ACTUATOR, Check.RESPONSE, 0.4, 0.1)
     during, after, lasting = (Checked(*part, a, b) for a, b in ((2.0, 5.0), (4.2, 7.2), (None, None)))
     rows = to_clear(Reservations(open=(during,)), PARTS, {}, {}, [], Limits(), faults)
-    assert rows[0].reason.startswith(
-        "Explained by the RR drive valve, at the time of F1: the speed of FR per opening is"
-    )
+    assert rows[0].reason.startswith("Explained by F1, the RR drive valve, at its time: the speed of FR per opening is")
     assert rows[0].reason.endswith(" This speaks against no part of FR, and clears none.")
     own = replace(during, component="RR")
     first, second = to_clear(Reservations(open=(during, own)), PARTS, {}, {}, [], Limits(), faults)
@@ -98,9 +96,7 @@ def test_one_axle_against_the_other_over_the_mission_may_be_the_doing_of_a_fault
     front = Checked(Kind.STEER, "front", Side.SENSOR_OR_ACTUATOR, Check.LASTING_RATE, 0.3, 0.17)
     rows = to_clear(Reservations(open=(front,)), PARTS, {}, {}, [], Limits(), faults)
     (row,) = (r for r in rows if "steering rate" in r.reason)
-    assert row.reason.startswith(
-        "Explained by the rear steering valve, in a mission with F1: the steering rate of the front axle"
-    )
+    assert row.reason.startswith("Explained by F1, the rear steering valve: the steering rate of the front axle")
     assert row.reason.endswith("against no part of the front axle, and clears none.")
     assert "rear steering valve (F1)" in row.act
 
@@ -112,7 +108,7 @@ def test_what_deviates_after_a_fault_is_told_so_and_an_angle_that_jumps_then_is_
     less, more = (Checked(*wheel, c, x, 0.1, *times) for c, x in ((Check.RESPONSE, 0.4), (Check.EXCESS, 0.9)))
     (row,) = to_clear(Reservations(open=(less, more)), PARTS, {}, {}, [], Limits(), faults)
     assert row.reason == (
-        "Explained by the RR drive valve, just after F1: the speed of FR per opening is 2.5 times the other wheels' at 3.2–4.2 s. "
+        "Explained by F1, the RR drive valve, just after it: the speed of FR per opening is 2.5 times the other wheels' at 3.2–4.2 s. "
         "This speaks against no part of FR, and clears none."
     )  # of one wheel the check that is furthest beyond its limit, not two measures of one thing
     jump = Checked(Kind.STEER, "front", Side.SENSOR, Check.JUMP, 0.02, 0.01, 3.2, 3.4)
