@@ -201,7 +201,15 @@ def _decision(
         open_state=open_state,
         shown=judged.detectable.rows,
         end_s=judged.mission.timeline.size * judged.mission.timeline.dt,
+        commanded=_commanded(judged),
     )
+
+
+def _commanded(judged: Judged) -> bool:
+    """Whether the log says what any of the wheels was asked to do."""
+    leaves = ("v_ref", "u", "u_applied")
+    own = [f"wheel.{w}.{leaf}" for w in judged.machine.wheels for leaf in leaves]
+    return any(name in judged.mission.signals.items for name in ("cmd.v", *own))
 
 
 def _scope(judged: Judged) -> tuple[Cut, ...]:

@@ -62,6 +62,8 @@ class Reservations:
         How to speak of the machine.
     open_state : Mapping[Part, State]
         The commonest state of each part that is no judgement, while driving.
+    uncommanded : bool
+        Whether no command of any wheel is in the log.
     """
 
     short: tuple[Part, ...] = ()
@@ -75,6 +77,7 @@ class Reservations:
     misplaced: tuple[str, ...] = ()
     words: MachineWords = HYDRAULIC
     open_state: Mapping[Part, State] = field(default_factory=dict)
+    uncommanded: bool = False
 
 
 def smallest_loads(assessments: Mapping[Part, Assessment], words: MachineWords) -> tuple[str, ...]:
@@ -275,6 +278,10 @@ def more_caveats(mission: Mission, first_ns: int, machine: Machine) -> list[str]
                 if commands
                 else ""
             )
+        )
+    if machine.questions:
+        out.append(
+            f"The machine file still asks: {' '.join(machine.questions)} Answer there, and delete the lines marked QUESTION."
         )
     cut = (mission.timeline.start_ns - first_ns) * 1e-9
     if cut > mission.timeline.dt:

@@ -51,7 +51,16 @@ def to_clear(
         What is stated: checks that deviate while a fault lasts may be its doing.
     """
     words = against.words
-    out = [ToClear(event.text, event.act) for event in against.events]
+    out = []
+    if against.uncommanded:
+        out.append(
+            ToClear(
+                f"No command is in the log, so that nothing tells what the {words.parts} were asked to do.",
+                "record the commands as well (/cmd_vel of a ROS robot, or the topic by which it is driven), or name them under [signals] "
+                "in the machine file if they were recorded under another name",
+            )
+        )
+    out += [ToClear(event.text, event.act) for event in against.events]
     out += [ToClear(text, "correct [signals] in a machine file, and diagnose again") for text in against.hints]
     out += short_parts(against.short, assessments, decided_s, driven, limits, words, open_state=against.open_state)
     if against.unexplained:

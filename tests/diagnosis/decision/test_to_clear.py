@@ -116,6 +116,12 @@ def test_what_deviates_after_a_fault_is_told_so_and_an_angle_that_jumps_then_is_
     assert "F1" not in row.reason + row.act
 
 
+def test_a_log_without_commands_asks_for_them_first() -> None:
+    first, *_ = told(Reservations(short=tuple(PARTS), uncommanded=True))
+    assert first.startswith("No command is in the log")
+    assert "record the commands as well (/cmd_vel of a ROS robot" in first
+
+
 def test_what_the_yaw_rate_shows_of_either_axle_is_said_once() -> None:
     checks = [
         Checked(Kind.STEER, axle, Side.SENSOR_OR_ACTUATOR, Check.YAW, 0.54, 0.06, 53.0, 56.0)

@@ -187,6 +187,7 @@ def test_parts_that_were_judged_and_those_that_were_cleared_are_counted_apart() 
     ],
 )
 def test_a_second_angle_that_the_steering_model_weighed_is_named(tier: str, logged: tuple[str, ...], how: str) -> None:
-    report = samples.report_with(signals=[{"name": f"steer.front.{leaf}"} for leaf in logged])
+    (one, *_) = samples.five_faults()[0]["signals"]
+    report = samples.report_with(signals=[one | {"name": f"steer.front.{leaf}"} for leaf in logged])
     stuck = fault(0.93) | {"component": "front", "kind": "steer", "side": "sensor", "tier": tier}
     assert how in sure_of(stuck, report)  # type: ignore[arg-type]
