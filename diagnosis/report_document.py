@@ -19,6 +19,7 @@ from diagnosis.decision.assumed import assumed_words
 from diagnosis.decision.caveats import more_caveats
 from diagnosis.decision.decide import Decision, decide
 from diagnosis.decision.intervals import intervals_of, spans_of
+from diagnosis.decision.missing import is_commanded
 from diagnosis.decision.scale import Scale, scale_of
 from diagnosis.decision.wording import join_words
 from diagnosis.results.assessed import Cut, CutKind
@@ -201,15 +202,8 @@ def _decision(
         open_state=open_state,
         shown=judged.detectable.rows,
         end_s=judged.mission.timeline.size * judged.mission.timeline.dt,
-        commanded=_commanded(judged),
+        commanded=is_commanded(judged.mission.signals.items, judged.machine.wheels),
     )
-
-
-def _commanded(judged: Judged) -> bool:
-    """Whether the log says what any of the wheels was asked to do."""
-    leaves = ("v_ref", "u", "u_applied")
-    own = [f"wheel.{w}.{leaf}" for w in judged.machine.wheels for leaf in leaves]
-    return any(name in judged.mission.signals.items for name in ("cmd.v", *own))
 
 
 def _scope(judged: Judged) -> tuple[Cut, ...]:

@@ -13,5 +13,5 @@ def open_bounds(low: float, high: float) -> tuple[bool, bool]:
 
 
 def is_open(low: float, high: float) -> bool:
-    """Whether either of them says nothing."""
+    """Whether either of these bounds of ε̂ [1] says nothing."""
     return any(open_bounds(low, high))

@@ -191,3 +191,11 @@ def test_a_second_angle_that_the_steering_model_weighed_is_named(tier: str, logg
     report = samples.report_with(signals=[one | {"name": f"steer.front.{leaf}"} for leaf in logged])
     stuck = fault(0.93) | {"component": "front", "kind": "steer", "side": "sensor", "tier": tier}
     assert how in sure_of(stuck, report)  # type: ignore[arg-type]
+
+
+def test_drives_without_a_command_in_the_log_answer_none() -> None:
+    coverage = [row(side, 100.0) | {"tier": "response"} for side in ("sensor", "actuator")]
+    assert "answer their commands" not in sure_of_verdict(samples.report_with(coverage=coverage))
+    (one, *_) = samples.five_faults()[0]["signals"]
+    told = samples.report_with(coverage=coverage, signals=[one | {"name": "cmd.v"}])
+    assert "answer their commands" in sure_of_verdict(told)
