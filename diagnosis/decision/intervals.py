@@ -52,7 +52,7 @@ def intervals_of(
                 advice=advice,
                 size_note=size_note(f, f.epsilon, kind),
                 check=check_of_all(kind, component, f.side, f.mode, f.hypotheses, words, machine.advice),
-                evidence=f.evidence,
+                evidence=(*f.evidence, *f.course),
                 tier=f.tier,
                 detected_s=None if f.detected is None else f.detected * step_ns * 1e-9,
             )

@@ -29,7 +29,7 @@ class Finding:
     """One fault of one component on samples [start, stop); see `FaultInterval` for the other fields.
 
     `epsilon` keeps within [0, 1] unless the fault lies outside the table; a size that is not finite is not known. `detected` is the sample at which a causal reading of the same evidence, without anything later, would have raised
-    it; None where that is not known.
+    it; None where that is not known. `course` has the sentences on what comes after the onset, to follow those of `evidence`.
     """
 
     start: int
@@ -43,6 +43,7 @@ class Finding:
     evidence: tuple[str, ...]
     tier: Tier
     detected: int | None = None
+    course: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         if self.epsilon is not None and self.mode is not FaultMode.OUTSIDE_TABLE:
