@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
+from dataclasses import replace
 
 from diagnosis.decision.caveats import Reservations, doubts_of, furthest_first
 from diagnosis.decision.explained import When, explaining, is_of_another, when_of
@@ -207,30 +208,31 @@ def _of_checks(checks: Sequence[Checked], twice: Collection[str]) -> list[tuple[
     worst: dict[str, Checked] = {}
     for c in furthest_first(checks):
         worst.setdefault(c.component, c)
-    alike: dict[str, list[str]] = {}
+    alike: dict[str, list[Checked]] = {}
     same: dict[str, list[Checked]] = {}
     for first in worst.values():
         act = _act(first, twice)
         same.setdefault(act, []).append(first)
-        texts = alike.setdefault(act, [])
-        if first.check is Check.LASTING_RATE and texts:
+        told = alike.setdefault(act, [])
+        if first.check is Check.LASTING_RATE and told:
             continue  # one axle against the other: said of the one is said of both
-        twin = next((k for k, t in enumerate(texts) if first.check in _TURNED and _same_but_name(t, first)), None)
+        turned = told if first.check in _TURNED else []
+        twin = next((k for k, c in enumerate(turned) if replace(c, component=first.component).text == first.text), None)
         if twin is None:
-            texts.append(first.text)
+            told.append(first)
         else:  # the yaw rate does not say which axle it is
-            other = next(c.component for c in checks if c.text == texts[twin])
-            texts[twin] = texts[twin].replace(f" {other} ", f" {other} or {first.component} ", 1)
+            told[twin] = replace(told[twin], component=f"{told[twin].component} or {first.component}")
     return [
-        (same[act][0], ToClear(f"{_sentence(_some(texts))}.", act, sides_of((c.component, c.side) for c in same[act])))
-        for act, texts in alike.items()
+        (
+            same[act][0],
+            ToClear(
+                f"{_sentence(_some([c.text for c in told]))}.",
+                act,
+                sides_of((c.component, c.side) for c in same[act]),
+            ),
+        )
+        for act, told in alike.items()
     ]
-
-
-def _same_but_name(text: str, check: Checked) -> bool:
-    """Whether a sentence says of another part what a check's says of its own."""
-    words, own = text.split(" "), check.text.split(" ")
-    return len(words) == len(own) and [b for a, b in zip(words, own, strict=True) if a != b] == [check.component]
 
 
 def _some(texts: Sequence[str]) -> str:
