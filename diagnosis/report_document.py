@@ -19,6 +19,7 @@ from diagnosis.decision.assumed import assumed_words
 from diagnosis.decision.caveats import more_caveats
 from diagnosis.decision.decide import Decision, decide
 from diagnosis.decision.intervals import intervals_of, spans_of
+from diagnosis.decision.missing import is_commanded
 from diagnosis.decision.scale import Scale, scale_of
 from diagnosis.decision.wording import join_words
 from diagnosis.results.assessed import Cut, CutKind
@@ -201,6 +202,7 @@ def _decision(
         open_state=open_state,
         shown=judged.detectable.rows,
         end_s=judged.mission.timeline.size * judged.mission.timeline.dt,
+        commanded=is_commanded(judged.mission.signals.items, judged.machine.wheels),
     )
 
 

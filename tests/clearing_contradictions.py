@@ -42,10 +42,12 @@ def of_checks(report: Mapping[str, Any]) -> Iterator[str]:
     """A check that is put down to a fault which lasts for a moment of its window alone, or is over for long."""
     faults = {f["id"]: f for f in report["intervals"]}
     for row in report["verdict"]["to_clear"]:
-        found = re.match(r"(At the time of|Just after) (F\d+), ", row["reason"])
+        found = re.match(
+            r"(?:(At the time of|Just after) |Explained by )(F\d+), (?:the [^,:]+(, just after it)?)?", row["reason"]
+        )
         if not found:
             continue
-        fault, during = faults[found.group(2)], found.group(1) != "Just after"
+        fault, during = faults[found.group(2)], found.group(1) != "Just after" and not found.group(3)
         for start, stop in re.findall(r" at ([\d.]+)–([\d.]+) s", row["reason"]):
             a, b = float(start), float(stop)
             shows = 0.0 if during else min(max(fault["stop_s"] - fault["start_s"], _STILL_SHOWS_S), _STILL_SHOWS_MOST_S)

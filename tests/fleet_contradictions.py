@@ -82,7 +82,7 @@ def _words(document: FleetDocument) -> Iterator[str]:
 def _endings(document: FleetDocument) -> Iterator[str]:
     """A fault that lasts to the end of its log, and is told to have been seen last before."""
     page = build_fleet_page(document)
-    told = len(re.findall("last seen before the end of the log", page))
+    told = len(re.findall("last seen before its log ended", page))
     places = [
         any(f["id"] == x["last_id"] and f.get("lasting") for f in document["missions"][x["last"]]["faults"])
         for x in document["faults"]

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from diagnosis.decision.explained import explaining, is_of_another
 from diagnosis.decision.severity import halved_words, unanswered
 from diagnosis.decision.short import main_reason, main_state, short_parts, unjudged_axles
 from diagnosis.decision.wording import count_words, join_words
@@ -61,6 +62,8 @@ class Reservations:
         How to speak of the machine.
     open_state : Mapping[Part, State]
         The commonest state of each part that is no judgement, while driving.
+    uncommanded : bool
+        Whether no command of any wheel is in the log.
     """
 
     short: tuple[Part, ...] = ()
@@ -74,6 +77,7 @@ class Reservations:
     misplaced: tuple[str, ...] = ()
     words: MachineWords = HYDRAULIC
     open_state: Mapping[Part, State] = field(default_factory=dict)
+    uncommanded: bool = False
 
 
 def smallest_loads(assessments: Mapping[Part, Assessment], words: MachineWords) -> tuple[str, ...]:
@@ -146,8 +150,12 @@ def doubt_of(watch: Sequence[FaultInterval], against: Reservations) -> str:
         out.append("the machine's settings do not fit the log")
     out += [cut.text for cut in against.scope]
     out += dict.fromkeys(event.doubt for event in against.events)
-    if against.open:
-        out.append(open_words(against.open))
+    own = [c for c in against.open if not is_of_another(c, explaining(c, watch))]
+    if own:
+        out.append(open_words(own))
+    elif against.open:
+        others = join_words(list(dict.fromkeys(c.component for c in against.open)))
+        out.append(f"beside a fault nothing shows whether {others} {'are' if ' and ' in others else 'is'} healthy")
     return join_words(out[:_REASONS]) + ("; more below" if len(out) > _REASONS else "")
 
 
@@ -270,6 +278,10 @@ def more_caveats(mission: Mission, first_ns: int, machine: Machine) -> list[str]
                 if commands
                 else ""
             )
+        )
+    if machine.questions:
+        out.append(
+            f"The machine file still asks: {' '.join(machine.questions)} Answer there, and delete the lines marked QUESTION."
         )
     cut = (mission.timeline.start_ns - first_ns) * 1e-9
     if cut > mission.timeline.dt:

@@ -117,6 +117,7 @@ def decide(
     open_state: Mapping[Part, State] | None = None,
     shown: Sequence[Detectable] = (),
     end_s: float | None = None,
+    commanded: bool = True,
 ) -> Decision:
     """Give the verdict.
 
@@ -162,6 +163,8 @@ def decide(
         What the mission would have shown.
     end_s : float or None
         End of the log [s]; None: not known.
+    commanded : bool
+        Whether any command of the wheels is in the log.
     """
     driven = driving_s or {}
     against = _reservations(assessments, decided_s, driven, axles, limits, damage, model)
@@ -176,6 +179,7 @@ def decide(
         hints=(*(misplaced_words(m) for m in misplaced), *hints),
         misplaced=tuple(misplaced),
         open_state=open_state or {},
+        uncommanded=not commanded,
     )
     open_points = to_clear(against, assessments, decided_s, driven, axles, limits, intervals)
     found = _with_faults(intervals, against, endings_of(intervals, assessments, end_s)) or _without_faults(

@@ -30,7 +30,6 @@ _SPARE = 0.1  # of ε̂: by which two bounds may miss each other
 _NAMED = 6
 _TOUCHES_S = 0.1
 _CASES = "it was this in ", " of 100 cases"
-_PIECE, _COURSE = "From ", "It shows in "  # sentences of what comes after the onset begin so
 _IN_CASES = re.compile(rf"{_CASES[0]}\d+{_CASES[1]}")
 Part = tuple[str, str]
 
@@ -52,13 +51,6 @@ def with_episodes(assessments: Mapping[Part, Assessment], dt: float) -> dict[Par
         told = tuple(_with_its_chance(f) for f in findings)
         out[part] = a if told == a.findings else replace(a, findings=told)
     return out
-
-
-def with_onset(finding: Finding, text: str) -> Finding:
-    """The same with a sentence on its onset, before those on what comes later."""
-    later = [k for k, said in enumerate(finding.evidence) if said.startswith((_PIECE, _COURSE))]
-    at = later[0] if later else len(finding.evidence)
-    return replace(finding, evidence=(*finding.evidence[:at], text, *finding.evidence[at:]))
 
 
 def _with_its_chance(finding: Finding) -> Finding:
@@ -100,12 +92,12 @@ def _with_edges(findings: Sequence[Finding], dt: float) -> list[Finding]:
             continue
         most = max(beside, key=lambda j: _chance(out[k], out[j].mode))
         piece, fault = out[k], out[most]
-        words = f"{_PIECE}{piece.start * dt:.2f} to {piece.stop * dt:.2f} s its kind is unclear: it may as well be of another row."
+        words = f"From {piece.start * dt:.2f} to {piece.stop * dt:.2f} s its kind is unclear: it may as well be of another row."
         out[most] = replace(
             fault,
             start=min(piece.start, fault.start),
             stop=max(piece.stop, fault.stop),
-            evidence=(*fault.evidence, words),
+            course=(*fault.course, words),
         )
         del out[k]
         k = max(0, k - 1)
@@ -176,7 +168,7 @@ def _episode(group: Sequence[Finding], dt: float) -> Finding:
     one_size = all(_alike(a.epsilon, b.epsilon) for a, b in pairwise(group))
     spans = [f"{f.start * dt:.1f}–{f.stop * dt:.1f} s{'' if one_size else _lost(f)}" for f in group[:_NAMED]]
     more = f" and {len(group) - _NAMED} more" if len(group) > _NAMED else ""
-    course = f"{_COURSE}{len(group)} stretches ({', '.join(spans)}{more}); between them nothing healthy was seen of this part: one fault."
+    course = f"It shows in {len(group)} stretches ({', '.join(spans)}{more}); between them nothing healthy was seen of this part: one fault."
     known = [f.detected for f in group if f.detected is not None]
     return replace(
         longest,
@@ -185,7 +177,7 @@ def _episode(group: Sequence[Finding], dt: float) -> Finding:
         probability=best.probability,
         hypotheses=best.hypotheses,
         epsilon=_pooled([f.epsilon for f in group], length),
-        evidence=(*longest.evidence, course),
+        course=(*longest.course, course),
         detected=min(known) if known else None,
     )
 

@@ -10,9 +10,9 @@ import numpy as np
 from diagnosis.decision.advice import check_of_all
 from diagnosis.decision.severity import severity_of
 from diagnosis.decision.size_notes import size_note
-from diagnosis.results.assessment import STATES, Assessment, Finding
+from diagnosis.results.assessment import LEAST_SHARE, STATES, Assessment, Finding
 from diagnosis.results.machine_words import MachineWords
-from diagnosis.results.result import Epsilon, FaultInterval, StateSpan
+from diagnosis.results.result import Epsilon, FaultInterval, Sat, StateSpan
 from diagnosis.results.vocabulary import Kind, Tier
 from replay.faults import FaultMode, Side
 from replay.machine.config import Machine
@@ -45,14 +45,14 @@ def intervals_of(
                 start_ns=start_ns + f.start * step_ns,
                 stop_ns=start_ns + f.stop * step_ns,
                 epsilon=f.epsilon,
-                sat=f.sat,
+                sat=_of_any_share(f),
                 probability=f.probability,
                 hypotheses=f.hypotheses,
                 severity=severity,
                 advice=advice,
                 size_note=size_note(f, f.epsilon, kind),
                 check=check_of_all(kind, component, f.side, f.mode, f.hypotheses, words, machine.advice),
-                evidence=f.evidence,
+                evidence=(*f.evidence, *f.course),
                 tier=f.tier,
                 detected_s=None if f.detected is None else f.detected * step_ns * 1e-9,
             )
@@ -67,6 +67,16 @@ def _bounded(f: Finding, kind: Kind) -> Epsilon | None:
         return e
     most = _MODEL_LOSS[f.side]
     return Epsilon(e.value, max(0.0, min(e.low, e.value - most)), min(1.0, max(e.high, e.value + most)))
+
+
+def _of_any_share(f: Finding) -> Sat | None:
+    """The saturation term with bounds that hold for every ε̂ within its own: of noise ε·sat is known, and sat is that by ε."""
+    e, sat = f.epsilon, f.sat
+    if e is None or sat is None or not f.mode.varying or e.value <= 0.0:
+        return sat
+    shares = (max(e.low, LEAST_SHARE), max(e.high, LEAST_SHARE))
+    ends = [e.value * bound / share for bound in (sat.low, sat.high) for share in shares]
+    return replace(sat, low=min(sat.low, *ends), high=max(sat.high, *ends)).as_possible()
 
 
 def spans_of(assessments: Mapping[Part, Assessment], step_ns: int) -> tuple[StateSpan, ...]:

@@ -40,6 +40,12 @@ _COSTS = {
 _OF_WHEELS = "little: the commanded speed of every {wheel} is recorded"
 
 
+def is_commanded(names: Container[str], wheels: Sequence[str]) -> bool:
+    """Whether signals of these names say what any of the wheels was asked to do."""
+    own = [f"wheel.{w}.{leaf}" for w in wheels for leaf in ("v_ref", "u", "u_applied")]
+    return any(name in names for name in ("cmd.v", *own))
+
+
 def applies(name: str, words: MachineWords) -> bool:
     """Whether a machine of this kind can have a canonical signal at all: no motor has pressures or a spool, no valve an effort, no arm an odometry."""
     leaf, group = name.rpartition(".")[2], name.partition(".")[0]

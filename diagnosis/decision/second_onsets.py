@@ -9,7 +9,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnosis.decision.episodes import with_onset
 from diagnosis.estimation.second_onset import SAMPLES, Readings, Second, channel_model, second_onsets
 from diagnosis.results.assessment import Assessment, Finding
 from diagnosis.results.vocabulary import Tier
@@ -51,7 +50,7 @@ def with_second_onsets(assessments: Mapping[Part, Assessment], dt: float) -> dic
 
 
 def _with(finding: Finding, text: str | None) -> Finding:
-    return finding if text is None else with_onset(finding, text)
+    return finding if text is None else replace(finding, evidence=(*finding.evidence, text))
 
 
 class _Around(NamedTuple):

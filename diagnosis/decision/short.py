@@ -9,7 +9,7 @@ import numpy as np
 
 from diagnosis.decision.wording import join_words
 from diagnosis.results.assessed import is_judged, needed_s
-from diagnosis.results.assessment import STATES, Assessment
+from diagnosis.results.assessment import STATES, Assessment, Lack
 from diagnosis.results.document import ToClearRow
 from diagnosis.results.machine_words import MachineWords
 from diagnosis.results.vocabulary import Kind, Tier
@@ -19,10 +19,7 @@ from replay.machine.config import Limits
 #: A component and its side.
 Part = tuple[str, str]
 
-_NOT_LOGGED = "in the log"  # ends the reason of an axle without a signal, or of which nothing is there
 _SAID_S = 0.05  # of judged driving: less is nothing
-_NOT_SAID = "no {valve} command"  # begins the reason of a model without it
-_NO_DRIVE = "no {valve} is seen there"  # ends the reason of a wheel whose effort is nothing from end to end
 
 
 @dataclass(frozen=True)
@@ -137,10 +134,11 @@ def unjudged_axles(axles: Sequence[Part], assessments: Mapping[Part, Assessment]
     """Parts of the steering that nothing judged."""
     who = join_words([words.part_words(Kind.STEER, *part) for part in axles])
     first = assessments[axles[0]]
-    reason = main_reason(first, main_state(first))
+    state = main_state(first)
+    reason = main_reason(first, state)
     act = (
         "log steer.<part>.phi and steer.<part>.u, and steer from stop to stop twice while driving"
-        if reason.endswith(_NOT_LOGGED)
+        if _lack(first, state) in (Lack.SIGNALS, Lack.COMMAND)
         else "steer from stop to stop twice at standstill and several times while driving, with the log running"
     )
     return ToClear(f"Not judged: {who} ({reason}).", act, tuple(axles), why=reason)
@@ -207,6 +205,11 @@ def main_reason(assessment: Assessment, state: State | None) -> str:
     return "" if state is None else assessment.reasons.get(state, "")
 
 
+def _lack(assessment: Assessment, state: State | None) -> Lack | None:
+    """What is missing where a state is no judgement."""
+    return None if state is None else assessment.lacks.get(state)
+
+
 def main_state(assessment: Assessment) -> State | None:
     """The commonest state that is no judgement; a machine at rest is one only where nothing else is."""
     best, most = None, 0.0
@@ -225,12 +228,12 @@ def _act(
     part: Part, assessment: Assessment, driven: float | None, limits: Limits, words: MachineWords, state: State | None
 ) -> str:
     """What somebody does to have a part judged; ``{who}`` and ``{c}`` are filled in by the parts that it holds for."""
-    sensor, tier, reason = part[1] == Side.SENSOR, assessment.tier, main_reason(assessment, state)
+    sensor, tier, lack = part[1] == Side.SENSOR, assessment.tier, _lack(assessment, state)
     faster = f"faster than {limits.driving_speed:.3g} {words.speed_unit}"
     if driven is not None and driven < limits.min_assessed and tier is not Tier.NONE:
         return f"move {words.parts_moved} {faster} for at least {limits.min_assessed:g} s, and diagnose that log"
     if tier is Tier.NONE:
-        return _of_silent(sensor, state, reason)
+        return _of_silent(sensor, state, lack)
     by_state = {
         State.NO_DATA: "record again, with wheel.{c}.v and its command in the log all the time",
         State.NOT_EXCITED: f"move {words.parts_moved} {faster} for at least {limits.min_assessed:g} s",
@@ -253,15 +256,15 @@ def _act(
         ),
         Tier.TRACKING: words.fill("log wheel.{c}.u (the {valve} command) or ") + second,
     }
-    if tier is Tier.RESPONSE and reason.endswith(words.fill(_NO_DRIVE)):
+    if lack is Lack.DRIVE:
         return words.fill(
             "look whether the {wheel} has a {valve} at all: one that has is without power, or its effort is not logged"
         )
-    if tier in by_tier and "wrong unit" not in reason:
-        return by_tier[tier]
-    if tier in by_tier:
+    if lack is Lack.UNIT:
         return "correct the unit or the channel of wheel.{c}.v and of its command under [signals] in a machine file"
-    if reason.startswith(words.fill(_NOT_SAID)):
+    if tier in by_tier:
+        return by_tier[tier]
+    if lack is Lack.COMMAND:
         return words.fill("log wheel.{c}.u (the {valve} command)")
     other = second if sensor else f"wheel.{{c}}.u_applied (the {words.position})"
     return f"log {other}; without it, drive straight at three steady speeds for 10 s each"
@@ -279,8 +282,8 @@ def _act_of_axle(side: str, state: State | None) -> str:
     return "steer from stop to stop several times while driving"
 
 
-def _of_silent(sensor: bool, state: State | None, reason: str) -> str:
+def _of_silent(sensor: bool, state: State | None, lack: Lack | None) -> str:
     """What to log for a part of which nothing is judged."""
-    if state is State.NO_DATA or reason.endswith("not its command"):
+    if state is State.NO_DATA or lack is Lack.COMMAND:
         return "log wheel.{c}.v" if sensor else "log wheel.{c}.u"
     return "log wheel.{c}.u or wheel.{c}.v_ref" if sensor else "log wheel.{c}.v"

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 from diagnosis.results.assessment import Finding
+from diagnosis.results.open_sizes import WHOLE, open_bounds
 from diagnosis.results.result import Epsilon
 from diagnosis.results.vocabulary import Kind, Tier
 from replay.faults import FaultMode
-
-_WHOLE = 0.995  # of ε: what a page rounds to all
-_NONE = 0.005
 
 
 def size_note(finding: Finding, epsilon: Epsilon | None, kind: Kind) -> str:
@@ -28,10 +26,10 @@ def size_note(finding: Finding, epsilon: Epsilon | None, kind: Kind) -> str:
     if finding.mode is FaultMode.OUTSIDE_TABLE:
         return ""
     if finding.mode.total:
-        if epsilon.low >= _WHOLE:
+        if epsilon.low >= WHOLE:
             return ""
         return "By its row all is lost (ε̂ = 1); the lower bound is less, for other rows come into question, too."
-    low, high = epsilon.low <= _NONE, epsilon.high >= _WHOLE
+    low, high = open_bounds(epsilon.low, epsilon.high)
     if not (low or high):
         return ""
     open_ = (

@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
+from dataclasses import replace
 
 from diagnosis.decision.caveats import Reservations, doubts_of, furthest_first
+from diagnosis.decision.explained import When, explaining, is_of_another, when_of
 from diagnosis.decision.short import Part, ToClear, short_parts, sides_of, unjudged_axles
 from diagnosis.decision.wording import count_words, join_words, remedy_words
 from diagnosis.results.assessed import CutKind, is_judged
 from diagnosis.results.assessment import Assessment
-from diagnosis.results.clearing import MAY_EXPLAIN, Check, Checked, lasts_in, share_covered
+from diagnosis.results.clearing import Check, Checked
 from diagnosis.results.left_out import is_left_out
 from diagnosis.results.machine_words import MachineWords
 from diagnosis.results.result import FaultInterval
-from diagnosis.results.vocabulary import Kind, Severity, Tier
+from diagnosis.results.vocabulary import Kind, Tier
 from replay.faults import Side, State
 from replay.machine.config import Limits
 
@@ -50,7 +52,16 @@ def to_clear(
         What is stated: checks that deviate while a fault lasts may be its doing.
     """
     words = against.words
-    out = [ToClear(event.text, event.act) for event in against.events]
+    out = []
+    if against.uncommanded:
+        out.append(
+            ToClear(
+                f"No command is in the log, so that nothing tells what the {words.parts} were asked to do.",
+                "record the commands as well (/cmd_vel of a ROS robot, or the topic by which it is driven), or name them under [signals] "
+                "in the machine file if they were recorded under another name",
+            )
+        )
+    out += [ToClear(event.text, event.act) for event in against.events]
     out += [ToClear(text, "correct [signals] in a machine file, and diagnose again") for text in against.hints]
     out += short_parts(against.short, assessments, decided_s, driven, limits, words, open_state=against.open_state)
     if against.unexplained:
@@ -120,7 +131,7 @@ def to_clear(
     at_rest = {k for k, state in against.open_state.items() if state is State.NOT_EXCITED}  # exempt: its checks count
     brief = [k for k in steered if k not in {*unjudged, *at_rest} and _brief(k, decided_s, driven, limits)]
     twice = {c for (c, side), a in assessments.items() if a.tier is Tier.DIRECT and side == Side.SENSOR}
-    blamed = {k: f for k, c in enumerate(against.open) if (f := _meanwhile(c, faults)) is not None}
+    blamed = {k: f for k, c in enumerate(against.open) if (f := explaining(c, faults)) is not None}
     deviating = _of_faults([(against.open[k], f) for k, f in blamed.items()], faults, words)
     told = {component for component, _ in (*unjudged, *brief)}  # what has them judged lets their checks pass
     left = [c for k, c in enumerate(against.open) if k not in blamed]
@@ -139,23 +150,6 @@ def _asks_for_steering(check: Checked, twice: Collection[str]) -> bool:
 def _brief(part: Part, decided_s: Mapping[Part, float], driven: Mapping[Part, float], limits: Limits) -> bool:
     """Whether a part of an axle was judged for less than a part of a wheel must be."""
     return part in driven and not is_judged(decided_s.get(part, 0.0), driven[part], limits.min_assessed)
-
-
-def _meanwhile(check: Checked, faults: Sequence[FaultInterval]) -> FaultInterval | None:
-    """The fault that may explain why a check deviates, one of the same part before others; None where there is none.
-
-    It lasts for a good part of the check's window, or ended just before; what an axle's angle jumps by has no such aftermath.
-    """
-    start, stop = check.start_s, check.stop_s
-    if start is None or stop is None:
-        steered = [f for f in faults if f.kind is Kind.STEER and f.severity is not Severity.INFO]
-        against = check.check is Check.LASTING_RATE  # one axle against the other: a fault of either
-        return max(steered, key=lambda f: f.stop_s - f.start_s, default=None) if against else None
-    share = {f.id: share_covered(start, stop, (f.start_s, f.stop_s)) for f in faults if f.severity is not Severity.INFO}
-    counted = [f for f in faults if share.get(f.id, 0.0) >= MAY_EXPLAIN]
-    if check.check is Check.JUMP:
-        counted = [f for f in counted if lasts_in(start, stop, (f.start_s, f.stop_s))]
-    return max(counted, key=lambda f: (f.component == check.component, share[f.id]), default=None)
 
 
 def _of_doubts(faults: Sequence[FaultInterval], words: MachineWords) -> list[ToClear]:
@@ -178,31 +172,32 @@ def _of_faults(
 
     Each with the furthest of its checks.
     """
-    by: dict[tuple[str, str], list[tuple[Checked, FaultInterval]]] = {}
+    by: dict[tuple[str, When, bool], list[tuple[Checked, FaultInterval]]] = {}
     of = dict(blamed)
     for check in furthest_first(list(of)):
         fault = of[check]
-        mine = by.setdefault((fault.id, _when(check, fault)), [])
+        mine = by.setdefault((fault.id, when_of(check, fault), is_of_another(check, fault)), [])
         if all(check.component != c.component for c, _ in mine):
             mine.append((check, fault))
     out = []
-    for (name, when), mine in by.items():
-        fault = mine[0][1]
+    for (_, when, others), mine in by.items():
+        fault, checks = mine[0][1], [check for check, _ in mine]
+        said = _some([check.text for check in checks])
         point = ToClear(
-            f"{when} {name}, which may explain it: {_some([check.text for check, _ in mine])}.",
+            f"Explained by {fault.id}, the {words.part_words(fault.kind, fault.component, fault.side)}{when.after}: {said}. "
+            f"This speaks against no part of {_components_in_words(checks)}, and clears none."
+            if others
+            else f"{when.before} {fault.id}, which may explain it: {said}.",
             f"{remedy_words(fault, faults, words)}, then diagnose the next mission",
-            sides_of((check.component, check.side) for check, _ in mine),
+            sides_of((check.component, check.side) for check in checks),
         )
         out.append((mine[0][0], point))
     return out
 
 
-def _when(check: Checked, fault: FaultInterval) -> str:
-    """How a check's window lies to a fault that may explain it."""
-    if check.start_s is None or check.stop_s is None:
-        return "In a mission with"
-    during = lasts_in(check.start_s, check.stop_s, (fault.start_s, fault.stop_s))
-    return "At the time of" if during else "Just after"
+def _components_in_words(checks: Sequence[Checked]) -> str:
+    """Components of checks: ``RR and the rear axle``."""
+    return join_words([f"the {c.component} axle" if c.kind is Kind.STEER else c.component for c in checks])
 
 
 def _of_checks(checks: Sequence[Checked], twice: Collection[str]) -> list[tuple[Checked, ToClear]]:
@@ -213,30 +208,31 @@ def _of_checks(checks: Sequence[Checked], twice: Collection[str]) -> list[tuple[
     worst: dict[str, Checked] = {}
     for c in furthest_first(checks):
         worst.setdefault(c.component, c)
-    alike: dict[str, list[str]] = {}
+    alike: dict[str, list[Checked]] = {}
     same: dict[str, list[Checked]] = {}
     for first in worst.values():
         act = _act(first, twice)
         same.setdefault(act, []).append(first)
-        texts = alike.setdefault(act, [])
-        if first.check is Check.LASTING_RATE and texts:
+        told = alike.setdefault(act, [])
+        if first.check is Check.LASTING_RATE and told:
             continue  # one axle against the other: said of the one is said of both
-        twin = next((k for k, t in enumerate(texts) if first.check in _TURNED and _same_but_name(t, first)), None)
+        turned = told if first.check in _TURNED else []
+        twin = next((k for k, c in enumerate(turned) if replace(c, component=first.component).text == first.text), None)
         if twin is None:
-            texts.append(first.text)
+            told.append(first)
         else:  # the yaw rate does not say which axle it is
-            other = next(c.component for c in checks if c.text == texts[twin])
-            texts[twin] = texts[twin].replace(f" {other} ", f" {other} or {first.component} ", 1)
+            told[twin] = replace(told[twin], component=f"{told[twin].component} or {first.component}")
     return [
-        (same[act][0], ToClear(f"{_sentence(_some(texts))}.", act, sides_of((c.component, c.side) for c in same[act])))
-        for act, texts in alike.items()
+        (
+            same[act][0],
+            ToClear(
+                f"{_sentence(_some([c.text for c in told]))}.",
+                act,
+                sides_of((c.component, c.side) for c in same[act]),
+            ),
+        )
+        for act, told in alike.items()
     ]
-
-
-def _same_but_name(text: str, check: Checked) -> bool:
-    """Whether a sentence says of another part what a check's says of its own."""
-    words, own = text.split(" "), check.text.split(" ")
-    return len(words) == len(own) and [b for a, b in zip(words, own, strict=True) if a != b] == [check.component]
 
 
 def _some(texts: Sequence[str]) -> str:

@@ -18,7 +18,7 @@ from diagnosis.direct.small_deviations import without_small_deviations
 from diagnosis.direct.uncertainty import most_noise_of_kind, usual_of_kind
 from diagnosis.estimation.lag import low_passed
 from diagnosis.evidence import ACTUATOR, SENSOR, Array, Contribution, Flags, MissionView, Part
-from diagnosis.results.assessment import Assessment, unassessed
+from diagnosis.results.assessment import Assessment, Lack, unassessed
 from diagnosis.results.vocabulary import Tier
 from replay.arrays.numeric import without_nan
 from replay.arrays.processors import each
@@ -52,7 +52,7 @@ class DirectEvidence:
                     pairs[wheel, ACTUATOR] = one.openings()
                 else:
                     why = "the {position} is logged but not its command"
-                    parts[wheel, ACTUATOR] = unassessed(mission.timeline.size, State.NOT_ASSESSED, why)
+                    parts[wheel, ACTUATOR] = unassessed(mission.timeline.size, State.NOT_ASSESSED, why, Lack.COMMAND)
         limits = mission.machine.limits
         identified = _identified(pairs, limits, mission)
         judged = each(lambda found: assess_identified(found, limits), identified.values(), mission.timeline.size)

@@ -23,7 +23,7 @@ from diagnosis.drives.load import LoadTrack, track_load
 from diagnosis.drives.load_findings import load_findings
 from diagnosis.drives.power import load_powers, sensor_powers
 from diagnosis.drives.speed_pair import SpeedPair, speed_pair
-from diagnosis.results.assessment import CODE, Assessment, Finding, unassessed
+from diagnosis.results.assessment import CODE, Assessment, Finding, Reason, unassessed
 from diagnosis.results.evidence_columns import Pictured, steps_of
 from diagnosis.results.sizes import not_reported
 from diagnosis.results.vocabulary import Tier
@@ -136,7 +136,7 @@ def _as_far_as_seen(drive: Assessment, limits: Limits) -> Assessment:
         "more effort, as faster driving takes, shows smaller ones"
     )
     states = np.where(healthy, CODE[State.NOT_ASSESSED], drive.states).astype(np.int8)
-    return replace(drive, states=states, reasons={**drive.reasons, State.NOT_ASSESSED: why})
+    return replace(drive, states=states).reasoned(State.NOT_ASSESSED, Reason(why))
 
 
 def _controller(data: DriveData) -> InverseController | None:

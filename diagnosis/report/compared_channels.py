@@ -6,6 +6,7 @@ from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 
 from diagnosis.pages.labels import number
+from diagnosis.report.second_measurements import second_of
 from diagnosis.report.units import EFFORT_UNIT, MOTION, motion_unit, on_page
 from diagnosis.results.document import IntervalRow
 from diagnosis.results.machine_words import MachineWords
@@ -139,13 +140,13 @@ def pair_of(fault: IntervalRow, columns: Collection[str], machine_words: Machine
 
 def rests_on(fault: IntervalRow, columns: Iterable[str], words: MachineWords) -> str:
     """Kind of evidence of a fault, and the channels that its sentences name in their order."""
-    text = " ".join(fault["evidence"])
+    text, columns = " ".join(fault["evidence"]), set(columns)
     places = {}
     for name in columns:
         if "." in name and not name.startswith(("evidence.", "replay.")) and (at := _place(name, text)) >= 0:
             places[name] = at
     channels = sorted(places, key=lambda n: places[n])
-    tier = words.evidence(Tier(fault["tier"]), Kind(fault["kind"]))
+    tier = words.evidence(Tier(fault["tier"]), Kind(fault["kind"]), second_of(fault, columns))
     return f"{tier}: {', '.join(channels)}" if tier and channels else tier or ", ".join(channels)
 
 

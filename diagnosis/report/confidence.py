@@ -3,16 +3,21 @@
 from __future__ import annotations
 
 from diagnosis.comparison.coverage import SideCoverage, sides_of
+from diagnosis.decision.missing import is_commanded
+from diagnosis.report.second_measurements import second_of
 from diagnosis.report.standing import Standing, standings_of
 from diagnosis.results.document import IntervalRow, ReportDocument, VerdictRow
 from diagnosis.results.fault_rows import state_label
+from diagnosis.results.limited import MOST_CLAIMED
 from diagnosis.results.machine_words import words_of
 from diagnosis.results.vocabulary import Kind, Leave, Tier, Verdict
 from replay.faults import Side, State
 
 _WORDS = ((0.99, "Practically certain"), (0.9, "Very likely"), (0.7, "Likely"))
 _OPEN, _TIE = 0.9, 1e-3
+_AT_MOST = f"{100 * MOST_CLAIMED:.0f} %, the most that any finding is given"
 _NOTHING, _MOSTLY = 0.005, 0.5  # of the driving: judged for so little that it is none, and for most of it
+_BESIDE = "what the {wheels} and the channels of one show beside each other"  # without any command
 _UNLIKE = 0.1  # of the driving: sides that were judged for shares so far apart are told one by one
 _ANSWERS = {Verdict.STOP: f"{Leave.MUST_NOT} before repair", Verdict.READY: "", Verdict.NOT_ASSESSED: Leave.CHECK.value}
 
@@ -35,13 +40,14 @@ def sure_of(fault: IntervalRow, report: ReportDocument) -> str:
     p, side, hypotheses = fault["probability"], Side(fault["side"]), fault["hypotheses"]
     faulty = 1.0 - sum(h["p"] for h in hypotheses if h["mode"] == State.HEALTHY)
     if p >= _OPEN or faulty <= p + 0.05 or not hypotheses:
-        words = [f"{_likely(p)} ({percent(p)})"]
+        words = [f"{_likely(p)} ({_AT_MOST if abs(p - MOST_CLAIMED) <= _TIE else percent(p)})"]
     else:
         first = max(h["p"] for h in hypotheses if h["mode"] != State.HEALTHY) <= p + _TIE
         row = f"{'most likely' if first else 'perhaps'} {state_label(fault['mode'], side).lower()}"
         words = [f"{_likely(faulty)} faulty ({percent(faulty)}), {row} ({percent(p)})"]
     machine_words = words_of(report["machine"])
-    how = machine_words.decided(Tier(fault["tier"]), Kind(fault["kind"]), side)
+    twice = second_of(fault, {s["name"] for s in report["signals"]}) is not None
+    how = machine_words.decided(Tier(fault["tier"]), Kind(fault["kind"]), side, twice=twice)
     words += [how] if how else []
     shares: dict[str, float] = {
         row["side"]: row["decided_driving_s"] / row["driving_s"]
@@ -134,7 +140,9 @@ def sure_of_verdict(report: ReportDocument) -> str:
         return ""
     done = [s for s in wheels if s.long_enough]
     words = words_of(report["machine"])
-    tiers = list(dict.fromkeys(words.fill(Tier(s.tier).words) for s in wheels if s.tier != Tier.NONE))
+    told = is_commanded({s["name"] for s in report["signals"]}, report["machine"]["wheels"])
+    by = {tier: _BESIDE if tier is Tier.RESPONSE and not told else tier.words for tier in Tier}
+    tiers = list(dict.fromkeys(words.fill(by[Tier(s.tier)]) for s in wheels if s.tier != Tier.NONE))
     how = f", by {' and '.join(tiers)}" if tiers else ""
     if len(done) < len(wheels):
         return f"{len(done)} of {len(wheels)} {words.part} parts were judged long enough{how}."

@@ -111,7 +111,7 @@ def delay_words(fault: IntervalRow) -> str:
     """When a causal reading of the same evidence would have raised a fault."""
     detected = fault["detected_s"]
     if detected is None:
-        return "detection time not known"
+        return "when it would have been detected is not known"
     delay = detected - fault["start_s"]
     return f"detected {time_words(delay)} after onset" if delay > 0 else "detected at its first sample"
 

@@ -118,10 +118,10 @@ def _short(words: str, length: int) -> str:
     return words if len(words) <= length else words[: length - 1] + "…"
 
 
-def open_axles(report: ReportDocument) -> list[str]:
-    """What keeps axles from being called healthy, in words: in the picture they have a symbol alone."""
+def axles_in_words(report: ReportDocument) -> list[tuple[str, str]]:
+    """What is wrong with axles, or keeps them from being called healthy, in words after its symbol: in the picture they have the symbol alone."""
     found = _conditions(report)
-    return [found[a].title for a in report["machine"]["axles"] if found[a].state == State.NOT_ASSESSED]
+    return [(found[a].state, found[a].title) for a in report["machine"]["axles"] if found[a].state != State.HEALTHY]
 
 
 def _conditions(report: ReportDocument) -> dict[str, Condition]:

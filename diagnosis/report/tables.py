@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 from typing import Any
 
 from markupsafe import Markup
@@ -31,6 +31,7 @@ from diagnosis.report.data_tables import (
 from diagnosis.report.edges import time_words
 from diagnosis.report.fault_times import times_words
 from diagnosis.report.judged_parts import judged_sides
+from diagnosis.report.second_measurements import second_of
 from diagnosis.results.candidates import label_of
 from diagnosis.results.document import (
     PAPER_DEFAULTS,
@@ -44,6 +45,8 @@ from diagnosis.results.document import (
 )
 from diagnosis.results.fault_rows import state_label
 from diagnosis.results.machine_words import MachineWords, words_of
+from diagnosis.results.open_sizes import is_open
+from diagnosis.results.size_rows import SatRow
 from diagnosis.results.vocabulary import Kind, Severity, Tier, Verdict
 from replay.faults import UNDECIDED, FaultMode, Side, State
 
@@ -71,7 +74,7 @@ def context(report: ReportDocument, duration: float) -> Context:
         Length of the mission [s].
     """
     log, limits, tool = report["log"], report["limits"], report["tool"]
-    words = words_of(report["machine"])
+    words, logged = words_of(report["machine"]), {s["name"] for s in report["signals"]}
     checks, folded = _folded(sorted(report["quality"], key=lambda q: q["ok"]))
     return {
         "machine": machine_name(report["machine"]),
@@ -81,7 +84,7 @@ def context(report: ReportDocument, duration: float) -> Context:
         "facts": _facts(report, duration),
         "means": judged_means(report),
         "moved": clock(log["driving_s"]),
-        "faults": [_fault(f, words) for f in report["intervals"]],
+        "faults": [_fault(f, words, logged) for f in report["intervals"]],
         "coverage": coverage_rows(report),
         "metrics": loop_tables(report["metrics"], words),
         "words": words,
@@ -127,7 +130,7 @@ def _verdict(report: ReportDocument) -> Context:
     }
 
 
-def _fault(fault: IntervalRow, words: MachineWords) -> Context:
+def _fault(fault: IntervalRow, words: MachineWords, logged: Container[str]) -> Context:
     epsilon, sat = fault["epsilon"], fault["sat"]
     figures = []
     if epsilon:
@@ -137,13 +140,13 @@ def _fault(fault: IntervalRow, words: MachineWords) -> Context:
         bounds = f"{sat_text(sat['low'], unit, words).partition(' ')[0]} to {sat_text(sat['high'], unit, words)}"
         figures.append(("sat", sat_text(sat["mean"], unit, words), bounds))
         if FaultMode(fault["mode"]).varying:
-            figures.append(("sat r.m.s.", sat_text(sat["rms"], unit, words), "the rest’s, divided by ε̂"))
+            figures.append(_noise(fault, sat, words))
     hypotheses = sorted(fault["hypotheses"], key=lambda h: -h["p"])
     likely = max(1, sum(h["p"] >= _SHOWN for h in hypotheses))
     return {
         **fault,
         "label": label_of(fault),
-        "tier": words.evidence(Tier(fault["tier"]), Kind(fault["kind"])),
+        "tier": words.evidence(Tier(fault["tier"]), Kind(fault["kind"]), second_of(fault, logged)),
         "delay": _delay(fault),
         "likely": hypotheses[:likely],
         "both": len({h["side"] for h in hypotheses} & {*Side.SENSOR_OR_ACTUATOR.sides, Side.SENSOR_OR_ACTUATOR}) > 1,
@@ -157,6 +160,15 @@ def _fault(fault: IntervalRow, words: MachineWords) -> Context:
         "size_note": fault.get("size_note", ""),
         "percent": percent(fault["probability"]),
     }
+
+
+def _noise(fault: IntervalRow, sat: SatRow, words: MachineWords) -> tuple[str, str, str]:
+    """How large the noise of a fault is: that of the saturation term, or of what it adds where ε̂ is open."""
+    epsilon = fault["epsilon"]
+    if epsilon and is_open(epsilon["low"], epsilon["high"]):
+        added = sat_text(epsilon["value"] * sat["rms"], sat["unit"], words)
+        return "ε·sat r.m.s.", added, "what the noise adds; ε, which is open, divides it into ε and sat"
+    return "sat r.m.s.", sat_text(sat["rms"], sat["unit"], words), "the rest’s, divided by ε̂"
 
 
 def _delay(fault: IntervalRow) -> str:

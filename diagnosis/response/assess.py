@@ -45,7 +45,7 @@ from diagnosis.response.sideways import crossed, goes_sideways
 from diagnosis.response.spells import until_back, where_asked
 from diagnosis.response.states import judge
 from diagnosis.response.turning import turning_of, turns_other_way, turns_with, unasked_turn, wrong_yaw_rate
-from diagnosis.results.assessment import CODE, Assessment, Finding
+from diagnosis.results.assessment import CODE, Assessment, Finding, Reason
 from replay.faults import State
 from replay.machine.config import Limits
 from replay.machine.geometry import Geometry
@@ -184,13 +184,13 @@ def assess_response(
     }
     astray, lasts = otherwise(judged, width * dt)
     remarks = (*astray, *left_notes, *((_TURNED,) if any(turned.values()) else ()))
-    doubts = {w: j.odd for w, j in judged.items() if j.odd and not any(side.findings for side in parts[w])}
+    doubts = {w: Reason(j.odd) for w, j in judged.items() if j.odd and not any(side.findings for side in parts[w])}
     doubts |= {w: j.joint.unlike for w, j in judged.items() if j.joint is not None and j.joint.unlike}
     doubts |= unlike(judged)
     if exchanged or turns_other_way(judged, geometry, turning):
-        doubts = dict.fromkeys(judged, _EXCHANGED) | doubts
-    for w, text in doubts.items():
-        parts[w] = _doubted(parts[w][0], [slice(None)], text), parts[w][1]
+        doubts = dict.fromkeys(judged, Reason(_EXCHANGED)) | doubts
+    for w, why in doubts.items():
+        parts[w] = _doubted(parts[w][0], [slice(None)], why), parts[w][1]
     lasting = lasting_losses(judged)
     for w, (sensor, drive) in parts.items():
         j, about = judged[w], asked[w]
@@ -211,13 +211,13 @@ def _turned_by(wheel: str, found: Mapping[str, Judged]) -> bool:
     return any(turns_by_wheels(means[wheel], means[o]) for o in means if o != wheel)
 
 
-def _doubted(sensor: Assessment, where: Sequence[slice | Flags], why: str = "") -> Assessment:
+def _doubted(sensor: Assessment, where: Sequence[slice | Flags], why: Reason | None = None) -> Assessment:
     """A sensor of which nothing healthy can be said in some steps, and why, where that is another reason than before."""
     states = sensor.states.copy()
     for part in where:
         states[part] = np.where(states[part] == CODE[State.HEALTHY], CODE[State.NOT_ASSESSED], states[part])
-    reasons = {**sensor.reasons, State.NOT_ASSESSED: why} if why else sensor.reasons
-    return replace(sensor, states=states, reasons=reasons)
+    doubted = replace(sensor, states=states)
+    return doubted if why is None else doubted.reasoned(State.NOT_ASSESSED, why)
 
 
 def _unproved(sensor: Assessment, where: Flags) -> Assessment:
@@ -225,7 +225,9 @@ def _unproved(sensor: Assessment, where: Flags) -> Assessment:
     if not (where & (sensor.states == CODE[State.HEALTHY])).any():
         return sensor
     doubted = bool((sensor.states == CODE[State.NOT_ASSESSED]).any())
-    return _doubted(sensor, [where], f"{sensor.reasons[State.NOT_ASSESSED]}; or {_HIDES}" if doubted else _HIDES)
+    more = f"{sensor.reasons[State.NOT_ASSESSED]}; or {_HIDES}"
+    why = Reason(more, sensor.lacks.get(State.NOT_ASSESSED)) if doubted else Reason(_HIDES)
+    return _doubted(sensor, [where], why)
 
 
 def _drives(

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from diagnosis.response.models import Beside, Blocks
 from diagnosis.response.spells import Spell
+from diagnosis.results.assessment import Lack, Reason
 from replay.faults import FaultMode
 
 Array = NDArray[np.float64]
@@ -42,13 +43,14 @@ class Joint(NamedTuple):
     gain: float
 
     @property
-    def unlike(self) -> str:
-        """A sentence where the speed is another than the position's slope over the whole mission; empty where it is not."""
+    def unlike(self) -> Reason | None:
+        """Why nothing is judged where the speed is another than the position's slope over the whole mission; None where it is not."""
         if _SAME[0] < self.gain < _SAME[1]:
-            return ""
-        return (
+            return None
+        return Reason(
             f"over the whole mission it reads {self.gain:.2f} × the slope of its own joint's position: a wrong unit, a scaled or a "
-            "wrongly mapped channel"
+            "wrongly mapped channel",
+            Lack.UNIT,
         )
 
 

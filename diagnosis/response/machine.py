@@ -13,6 +13,7 @@ from diagnosis.response.inputs import FollowerData
 from diagnosis.response.joint import Joint
 from diagnosis.response.spells import Spell
 from diagnosis.response.wheel import Wheel
+from diagnosis.results.assessment import Lack, Reason
 from replay.machine.config import Limits
 
 Array = NDArray[np.float64]
@@ -141,18 +142,21 @@ def otherwise(judged: Mapping[str, Judged], block_s: float) -> tuple[tuple[str, 
     return (text,), bool(longest[1] - longest[0] >= _STATE_S)
 
 
-def unlike(judged: Mapping[str, Judged]) -> dict[str, str]:
+def unlike(judged: Mapping[str, Judged]) -> dict[str, Reason]:
     """Wheels that make something else of their command than other wheels do, or any drive would, with a sentence."""
     out = {
-        w: f"over the whole mission it reads {share:.2f} × what the other {{wheels}} make of the same command: a scaled or wrongly "
-        "mapped sensor, {or_size}a weak {valve}"
+        w: Reason(
+            f"over the whole mission it reads {share:.2f} × what the other {{wheels}} make of the same command: a scaled or wrongly "
+            "mapped sensor, {or_size}a weak {valve}"
+        )
         for w, share in unlike_others(judged).items()
     }
     for w, own in _made(judged).items():
         if w not in out and not _NEAR[0] <= own <= _NEAR[1]:
-            out[w] = (
+            out[w] = Reason(
                 f"over the whole mission it reads {own:.2g} × its command: a wrong unit of one of them, another wheel diameter, or a "
-                "wrongly mapped channel"
+                "wrongly mapped channel",
+                Lack.UNIT,
             )
     return out
 

@@ -16,7 +16,7 @@ from diagnosis.response.models import HEALTHY, LEAST_P, NOISY, OTHER, SILENT
 from diagnosis.response.shaking import shaken
 from diagnosis.response.spells import Spell
 from diagnosis.response.wheel import Wheel
-from diagnosis.results.assessment import CODE, Assessment, Finding
+from diagnosis.results.assessment import CODE, Assessment, Finding, Lack, Reason
 from diagnosis.results.evidence_columns import Pictured, steps_of
 from diagnosis.results.result import Hypothesis
 from diagnosis.results.vocabulary import Tier
@@ -34,7 +34,7 @@ _ROLLS_P = 0.92  # that a wheel without a drive which reads nothing is read wron
 _DOUBT_S = 0.5  # around a spell that is judged no fault
 _AT_ONCE_S = 5e-3
 _HIDDEN = "a controller that holds the speed hides a weak drive, and the effort of a healthy one is not known"
-_ROLLS = "its effort is nothing from end to end while others pull: no {valve} is seen there"
+_ROLLS = Reason("its effort is nothing from end to end while others pull: no {valve} is seen there", Lack.DRIVE)
 _ALONE = "a controller that holds the speed hides a weak drive; name its current, duty or torque as its command (`wheel.{name}.u`) to have it judged"
 _UNSEEN = "without its command or another {wheel} of its side only a speed that is frozen, wild or noisy shows"
 
@@ -215,9 +215,9 @@ def _at_rest(one: Judged) -> str:
 def _drive(one: Judged, states: NDArray[np.int8], findings: tuple[Finding, ...]) -> Assessment:
     hidden = _ALONE.replace("{name}", one.data.name.split(".")[1]) if one.alone else _HIDDEN
     reasons = {
-        State.NOT_ASSESSED: _ROLLS if one.rolls else hidden,
         State.NOT_EXCITED: _at_rest(one),
         State.NO_DATA: "no samples",
         State.MASKED: "its {wheel.sensor} is faulty",
     }
-    return Assessment(states, reasons, findings, {}, Tier.RESPONSE)
+    why = _ROLLS if one.rolls else Reason(hidden)
+    return Assessment(states, reasons, findings, {}, Tier.RESPONSE).reasoned(State.NOT_ASSESSED, why)

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.channels.noise import moving_sum, rounding_step, shifted
-from diagnosis.results.assessment import CODE, Assessment, Finding
+from diagnosis.results.assessment import CODE, Assessment, Finding, Lack, Reason
 from diagnosis.results.evidence_columns import Pictured, steps_of
 from diagnosis.results.result import Epsilon, Hypothesis, Sat
 from diagnosis.results.vocabulary import Tier
@@ -126,18 +126,28 @@ def assess_tracking(
     series = (("residual", np.where(np.isfinite(v), v - reference, np.nan)), ("expected", reference))
     pictured = Pictured.of(steps_of(findings, v.size, dt), series)
     reasons = {
-        State.NOT_ASSESSED: f"it follows its command at {small:.2g} of its size: a wrong unit, a scaled or wrongly mapped channel"
-        if small
-        else "without a {valve} command or a second measurement, only a standstill under command, and a speed that is frozen, wild or noisy, can be detected",
         State.NOT_EXCITED: "nothing is commanded",
         State.NO_DATA: "no samples",
         State.MASKED: "its {wheel.sensor} is faulty",
     }
+    why = (
+        Reason(
+            f"it follows its command at {small:.2g} of its size: a wrong unit, a scaled or wrongly mapped channel",
+            Lack.UNIT,
+        )
+        if small
+        else Reason(
+            "without a {valve} command or a second measurement, only a standstill under command, and a speed that is frozen, wild or "
+            "noisy, can be detected"
+        )
+    )
     note = f"{names[0]} against {names[1]}: lag {lag * dt:.3g} s."
     sensor = Assessment(
         states, reasons, tuple(findings), pictured.columns, Tier.TRACKING, (note,), closeups=pictured.closeups
     )
-    return sensor, Assessment(drive, reasons, both, {}, Tier.TRACKING, (note,))
+    both_sides = (sensor, Assessment(drive, reasons, both, {}, Tier.TRACKING, (note,)))
+    first, second = (a.reasoned(State.NOT_ASSESSED, why) for a in both_sides)
+    return first, second
 
 
 def _small_copy(v: Array, reference: Array, dt: float) -> float:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import astuple, dataclass, field, replace
+from enum import StrEnum
 from math import isfinite
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +17,8 @@ from diagnosis.results.result import Closeups, Epsilon, Hypothesis, Sat
 from diagnosis.results.vocabulary import Tier
 from replay.faults import TOTAL, FaultMode, Side, State
 
-_LEAST = 0.1  # ε̂ of the smallest fault; below it a varying saturation term is not told from it
+#: ε̂ of the smallest fault [1]; below it a varying saturation term is not told from it.
+LEAST_SHARE = 0.1
 _BOUND = 0.95  # of which the bounds of ε̂ speak
 STATES: tuple[State, ...] = tuple(State)
 CODE = {state: np.int8(i) for i, state in enumerate(STATES)}
@@ -27,7 +29,7 @@ class Finding:
     """One fault of one component on samples [start, stop); see `FaultInterval` for the other fields.
 
     `epsilon` keeps within [0, 1] unless the fault lies outside the table; a size that is not finite is not known. `detected` is the sample at which a causal reading of the same evidence, without anything later, would have raised
-    it; None where that is not known.
+    it; None where that is not known. `course` has the sentences on what comes after the onset, to follow those of `evidence`.
     """
 
     start: int
@@ -41,13 +43,14 @@ class Finding:
     evidence: tuple[str, ...]
     tier: Tier
     detected: int | None = None
+    course: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         if self.epsilon is not None and self.mode is not FaultMode.OUTSIDE_TABLE:
             known = self.epsilon.high > 0.0  # a fault of the tables that takes nothing away has no such size
             object.__setattr__(self, "epsilon", self.epsilon.as_share() if known else None)
             self._bound_by_row()
-        if self.sat is not None and self.mode.varying and (self.epsilon is None or self.epsilon.value < _LEAST):
+        if self.sat is not None and self.mode.varying and (self.epsilon is None or self.epsilon.value < LEAST_SHARE):
             object.__setattr__(self, "sat", None)  # ε·sat is known, but not what share of sat that is
         if self.sat is not None:
             object.__setattr__(self, "sat", self.sat.as_possible())
@@ -62,8 +65,28 @@ class Finding:
             total, healthy = (
                 sum(h.p for h in self.hypotheses if h.mode in modes) for modes in (TOTAL, {State.HEALTHY.value})
             )
-            low = 1.0 if total >= _BOUND else _LEAST if healthy <= 1.0 - _BOUND else 0.0
+            low = 1.0 if total >= _BOUND else LEAST_SHARE if healthy <= 1.0 - _BOUND else 0.0
             object.__setattr__(self, "epsilon", replace(self.epsilon, low=low))
+
+
+class Lack(StrEnum):
+    """What is missing, or wrong, where a part is not judged: it decides what somebody does to have it judged."""
+
+    #: Nothing of an axle, or of one side of it, is in the log.
+    SIGNALS = "signals"
+    #: What the part is told is not in the log.
+    COMMAND = "command"
+    #: A signal has a wrong unit or is a wrong channel.
+    UNIT = "unit"
+    #: The wheel seems to have no drive.
+    DRIVE = "drive"
+
+
+class Reason(NamedTuple):
+    """Why a part is not judged, in words, and what is missing for it; None where it is nothing that one log has and another lacks."""
+
+    text: str
+    lack: Lack | None = None
 
 
 @dataclass(frozen=True)
@@ -92,6 +115,8 @@ class Assessment:
         Loss of effectiveness over the mission, where a second measurement shows it.
     powers : Powers or None
         What the mission would have shown to this evidence; None: as to the checks of the all-clear.
+    lacks : Mapping[State, Lack]
+        What is missing where a reason is that something is.
     """
 
     states: NDArray[np.int8]
@@ -104,8 +129,19 @@ class Assessment:
     closeups: Closeups | None = None
     loss: Loss | None = None
     powers: Powers | None = None
+    lacks: Mapping[State, Lack] = field(default_factory=dict)
+
+    def reasoned(self, state: State, reason: Reason) -> Assessment:
+        """The same with another reason of a state."""
+        lacks = {s: lack for s, lack in self.lacks.items() if s is not state}
+        return replace(
+            self,
+            reasons={**self.reasons, state: reason.text},
+            lacks=lacks if reason.lack is None else {**lacks, state: reason.lack},
+        )
 
 
-def unassessed(size: int, state: State, reason: str) -> Assessment:
-    """An assessment that says why nothing is judged."""
-    return Assessment(states=np.full(size, CODE[state], dtype=np.int8), reasons={state: reason})
+def unassessed(size: int, state: State, reason: str, lack: Lack | None = None) -> Assessment:
+    """An assessment that says why nothing is judged, and what is missing for it."""
+    states = np.full(size, CODE[state], dtype=np.int8)
+    return Assessment(states=states).reasoned(state, Reason(reason, lack))

@@ -8,9 +8,9 @@ from diagnosis.results.assessment import Assessment, Finding
 from diagnosis.results.result import Hypothesis
 from replay.faults import FaultMode, State
 
-# What a side and row may be claimed with: of 602 surest findings on the structures for tuning 93 of 100 were right, of 1151 on
-# those for reporting 96, whatever the models said; what was wrong was nearly always another row of the same part.
-_MOST = 0.96
+#: What a side and row may be claimed with: of 602 surest findings on the structures for tuning 93 of 100 were right, of 1151 on
+#: those for reporting 96, whatever the models said; what was wrong was nearly always another row of the same part.
+MOST_CLAIMED = 0.96
 
 
 def limited(finding: Finding, most: float, why: str) -> Finding:
@@ -31,16 +31,16 @@ def believed(found: Assessment) -> Assessment:
 
 
 def _believed(finding: Finding) -> Finding:
-    if finding.probability <= _MOST:
+    if finding.probability <= MOST_CLAIMED:
         return finding
     sides = [side.value for side in finding.side.sides]
     claimed = {(side, finding.mode.value) for side in (*sides, finding.side.value)}
     kept = {(h.side, h.mode): h.p for h in finding.hypotheses}
     others = [(side, mode.value) for side in sides for mode in FaultMode if (side, mode.value) not in claimed]
-    missing = finding.probability - _MOST
+    missing = finding.probability - MOST_CLAIMED
     for row in claimed & set(kept):
-        kept[row] *= _MOST / finding.probability
+        kept[row] *= MOST_CLAIMED / finding.probability
     for row in others:
         kept[row] = kept.get(row, 0.0) + missing / len(others)
     hypotheses = [Hypothesis(side, mode, p) for (side, mode), p in kept.items()]
-    return replace(finding, probability=_MOST, hypotheses=tuple(sorted(hypotheses, key=lambda h: -h.p)))
+    return replace(finding, probability=MOST_CLAIMED, hypotheses=tuple(sorted(hypotheses, key=lambda h: -h.p)))

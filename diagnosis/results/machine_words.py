@@ -161,13 +161,16 @@ class MachineWords:
                 text = text.replace(part_token(kind, side), self.part_name(kind, side))
         return text
 
-    def evidence(self, tier: Tier, kind: Kind) -> str:
-        """Name of a tier's evidence: ``wheel model``; empty where there is none."""
-        return self.fill(tier.name_of(kind))
+    def evidence(self, tier: Tier, kind: Kind, second_of: Side | None = None) -> str:
+        """Name of a tier's evidence: ``wheel model``; empty where there is none.
 
-    def decided(self, tier: Tier, kind: Kind, side: Side) -> str:
-        """How a fault was decided; empty where nothing says so."""
-        return self.fill(tier.decided(kind, side))
+        `second_of`: the side of which its model took in a second measurement.
+        """
+        return self.fill(tier.name_of(kind) if second_of is None else tier.with_second(kind, second_of))
+
+    def decided(self, tier: Tier, kind: Kind, side: Side, *, twice: bool = False) -> str:
+        """How a fault was decided; empty where nothing says so; `twice`: by a model that took in a second measurement."""
+        return self.fill(tier.decided(kind, side, twice=twice))
 
     def row(self) -> WordsRow:
         """The same for ``report.json``."""

@@ -106,8 +106,17 @@ class Tier(StrEnum):
         """Name of the evidence: ``second measurement``, ``{wheel} model``; empty where there is none; for `MachineWords.fill`."""
         return _TIERS[self].evidence.format(kind=_KIND_WORDS[kind])
 
-    def decided(self, kind: Kind, side: Side) -> str:
-        """How a fault of a component and side was decided; empty where nothing says so; for `MachineWords.fill`."""
+    def with_second(self, kind: Kind, side: Side) -> str:
+        """Name of the evidence where a model, or a channel in it, took in a second measurement; for `MachineWords.fill`."""
+        return f"{_KIND_WORDS[kind]} model with {_SECOND[kind, side]}"
+
+    def decided(self, kind: Kind, side: Side, *, twice: bool = False) -> str:
+        """How a fault of a component and side was decided; empty where nothing says so; for `MachineWords.fill`.
+
+        `twice`: the model took in a second measurement of it.
+        """
+        if twice:
+            return f"by the {self.with_second(kind, side)}"
         second = _SECOND.get((kind, side), "")
         how = _TIERS[self].decided
         return how.format(kind=_KIND_WORDS[kind], second=second) if second or "{second}" not in how else ""

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.evidence import Part
-from diagnosis.results.assessment import CODE, Assessment, unassessed
+from diagnosis.results.assessment import CODE, Assessment, Lack, unassessed
 from diagnosis.results.sizes import amount
 from diagnosis.results.vocabulary import Tier
 from diagnosis.steering.acquittal import acquitted, moves_otherwise, scatter_of
@@ -248,18 +248,18 @@ def _assessment(side: Side, inputs: AxleInputs, judged: _Judged | None) -> Asses
     """One side by the model, or why it is not judged."""
     size = inputs.timeline.size
     if side is Side.SENSOR and "phi" not in inputs.logged:
-        return unassessed(size, State.NO_DATA, "the steering angle is not in the log")
+        return unassessed(size, State.NO_DATA, "the steering angle is not in the log", Lack.SIGNALS)
     if side is Side.ACTUATOR:
         if not {"u", "u_applied", "phi"} & inputs.logged:
-            return unassessed(size, State.NO_DATA, "the {steer.actuator}'s command is not in the log")
+            return unassessed(size, State.NO_DATA, "the {steer.actuator}'s command is not in the log", Lack.SIGNALS)
         if inputs.command_missing:
-            return unassessed(size, State.NOT_ASSESSED, "the {position} is logged but not its command")
+            return unassessed(size, State.NOT_ASSESSED, "the {position} is logged but not its command", Lack.COMMAND)
     if judged is not None:
         return judged.sides[side]
     if inputs.blocks is None or not {"u", "u_applied"} & inputs.logged:
         why = "neither the command of its {valve} nor the {position} is in the log"
-    else:
-        why = "the axle was steered too little to identify what its {valve} does"
+        return unassessed(size, State.NOT_ASSESSED, why, Lack.SIGNALS)
+    why = "the axle was steered too little to identify what its {valve} does"
     return unassessed(size, State.NOT_ASSESSED, why)
 
 

@@ -15,6 +15,7 @@ from diagnosis.estimation.one_cause import with_one_cause
 from diagnosis.estimation.simple_causes import Measured
 from diagnosis.results.assessment import Finding
 from diagnosis.results.result import Epsilon, Hypothesis
+from diagnosis.results.sizes import amount
 from diagnosis.steering.findings import SideFindings
 from diagnosis.steering.inputs import AxleInputs
 from diagnosis.steering.openings import latest, off_command, opens_as_told
@@ -42,6 +43,7 @@ _IN_MIDDLE, _BESIDE = (
     0.04,
 )  # of full opening: as far off its zero a valve without signal rests, and further off a stuck one
 _BY_MODEL = "times as probable with"  # says what the model of the axle took it for
+_MEANWHILE = "Meanwhile {second}, a second measurement of the angle, moved over {other}, and {name} over {own}."
 _CONSTANT = "The command hardly moved meanwhile: a {valve} that is off by a constant would look the same."
 
 
@@ -69,7 +71,7 @@ def of_one_cause(side: Side, found: SideFindings, inputs: AxleInputs, min_sat: f
 def _of_sensor(found: SideFindings, inputs: AxleInputs, min_sat: float) -> SideFindings:
     y, x, use = _pair(inputs, "phi", "phi_true")
     measured = _measured(found, (y, x, use), inputs, ("phi", "phi_true"), "rad", min_sat)
-    return found._replace(findings=tuple(_explained(found, measured)))
+    return found._replace(findings=tuple(_beside_the_second(f, measured) for f in _explained(found, measured)))
 
 
 def _of_valve(found: SideFindings, inputs: AxleInputs, min_sat: float) -> SideFindings:
@@ -120,6 +122,17 @@ def _measured(
     names = (inputs.channel(leaves[0]), inputs.channel(leaves[1]))
     noise = min(_NORMAL * usual, MOST_APART)
     return Measured(y, x, use, inputs.timeline.dt, names, unit, noise, min_sat, _LOSES)
+
+
+def _beside_the_second(finding: Finding, measured: Measured) -> Finding:
+    """A sensor that stands still or is silent, with what the second one shows meanwhile."""
+    part = slice(finding.start, finding.stop)
+    y, x = (z[part][measured.use[part]] for z in (measured.y, measured.x))
+    if not finding.mode.total or x.size < _FEW:
+        return finding
+    own, other = (amount(float(np.ptp(z)), "rad", 2) for z in (y, x))
+    text = _MEANWHILE.format(second=measured.names[1], other=other, name=measured.names[0], own=own)
+    return replace(finding, evidence=(*finding.evidence, text))
 
 
 def _relation(y: Array, x: Array, use: Flags, dt: float) -> Relation:

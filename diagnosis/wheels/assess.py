@@ -32,7 +32,7 @@ from diagnosis.wheels.quick_noise import with_shaken
 from diagnosis.wheels.readings import with_readings
 from diagnosis.wheels.run_kernel import evidence_of_runs
 from diagnosis.wheels.shared_swings import without_shared
-from diagnosis.wheels.states import reasons_of, states_of, unexplained_s
+from diagnosis.wheels.states import states_of, unexplained_s, with_reasons
 from diagnosis.wheels.tracks import Segment, Track, runs_between, segments_of, track_of
 from replay.faults import Side
 from replay.machine.config import Limits
@@ -168,18 +168,16 @@ def _assessments(
         faults, codes = found.of(side), states.codes[side]
         doubted: Array = np.asarray(per_sample(1.0 - path.healthy[side], path.width, path.y.size), np.float64)
         pictured = shared | Pictured.of(step, [("probability", doubted)])
-        out.append(
-            Assessment(
-                states=codes,
-                reasons=reasons_of(codes, no_opening, gains=gains),
-                findings=tuple(faults),
-                columns=pictured.columns,
-                tier=Tier.MODEL,
-                notes=(_note(path),),
-                unexplained_s=unexplained_s(states, side, found, data.dt),
-                closeups=pictured.closeups,
-            )
+        judged = Assessment(
+            states=codes,
+            findings=tuple(faults),
+            columns=pictured.columns,
+            tier=Tier.MODEL,
+            notes=(_note(path),),
+            unexplained_s=unexplained_s(states, side, found, data.dt),
+            closeups=pictured.closeups,
         )
+        out.append(with_reasons(judged, no_opening, gains=gains))
     return out[0], out[1]
 
 

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.channels.debounce import FLICKER_S, debounced
 from diagnosis.channels.sample_status import SILENT
-from diagnosis.results.assessment import CODE
+from diagnosis.results.assessment import CODE, Assessment, Lack, Reason
 from diagnosis.wheels.findings import WheelFindings, WheelPath
 from diagnosis.wheels.inputs import WheelsData
 from replay.faults import Side, State
@@ -20,7 +20,7 @@ _REASONS = {
     State.NO_DATA: "no samples",
     State.SLIP: "the {wheel}'s speed contradicts the other {wheels} while it follows its {valve}: it slips, or its sensor is faulty",
 }
-_NO_COMMAND = "no {valve} command to compare with"
+_NO_COMMAND = Reason("no {valve} command to compare with", Lack.COMMAND)
 _UNCERTAIN = "the {wheel} model is too uncertain in this mission"
 _UNEXPLAINED = "its signals fit a healthy part and a faulty one alike"
 
@@ -56,22 +56,22 @@ def states_of(data: WheelsData, i: int, path: WheelPath, found: WheelFindings) -
     return WheelStates({Side.SENSOR: sensor, Side.ACTUATOR: actuator}, quiet)
 
 
-def reasons_of(codes: NDArray[np.int8], no_opening: NDArray[np.bool_], *, gains: bool) -> dict[State, str]:
-    """Why states that are no judgement were given.
+def with_reasons(one: Assessment, no_opening: NDArray[np.bool_], *, gains: bool) -> Assessment:
+    """The same with why states that are no judgement were given.
 
     Parameters
     ----------
-    codes : NDArray[np.int8], shape (n,)
-        States of one side.
+    one : Assessment
+        One side, its states of shape (n,).
     no_opening : NDArray[np.bool_], shape (n,)
         Where nobody knows the valve's opening.
     gains : bool
         Whether the wheel model is good enough to judge gains and the valve by.
     """
-    open_ = codes == CODE[State.NOT_ASSESSED]
-    commanded = _UNEXPLAINED if gains else _UNCERTAIN
+    open_ = one.states == CODE[State.NOT_ASSESSED]
+    commanded = Reason(_UNEXPLAINED if gains else _UNCERTAIN)
     reason = _NO_COMMAND if 2 * np.count_nonzero(open_ & no_opening) > np.count_nonzero(open_) else commanded
-    return _REASONS | {State.NOT_ASSESSED: reason}
+    return replace(one, reasons=_REASONS).reasoned(State.NOT_ASSESSED, reason)
 
 
 def unexplained_s(states: WheelStates, side: Side, found: WheelFindings, dt: float) -> float:

@@ -188,6 +188,8 @@ class Machine:
         Valve, cylinder and sensor by steering axle; from healthy missions.
     assumed : tuple[str, ...]
         Keys that no machine file gave and that are the paper's machine's, of `ASSUMABLE`.
+    questions : tuple[str, ...]
+        What the draft of its file asked, and still does.
     """
 
     name: str
@@ -210,6 +212,7 @@ class Machine:
     speed_unit: SpeedUnit = "m/s"
     advice: Mapping[str, str] = field(default_factory=dict)
     assumed: tuple[str, ...] = field(default=(), compare=False)
+    questions: tuple[str, ...] = field(default=(), compare=False)
 
     def __post_init__(self) -> None:
         """Check values and that signals name this machine's wheels and axles."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -17,6 +18,7 @@ from replay.machine.config import ASSUMABLE, Control, Limits, Machine, Noise, Pl
 from replay.machine.drive_model import drive_from_table
 from replay.machine.geometry import Geometry, WheelGeometry, four_wheel_geometry, own_axle
 from replay.machine.quantities import UNITS
+from replay.machine.questions import questions_of
 from replay.machine.units import known_unit, si_factor
 from replay.toml_text import MAX_BYTES, TomlError, parse_toml
 
@@ -46,7 +48,8 @@ def load_machine(path: Path) -> Machine:
     try:
         with path.open("rb") as file:
             raw = file.read(MAX_BYTES + 1)
-        data = parse_toml(raw.decode())
+        text = raw.decode()
+        data = parse_toml(text)
     except OSError as error:
         raise ConfigError(f"{path}: cannot read the machine file: {error.strerror or error}") from error
     except UnicodeDecodeError as error:
@@ -55,12 +58,12 @@ def load_machine(path: Path) -> Machine:
         raise ConfigError(f"{path}: {error}") from error
     try:
         with bordered(path, "machine file", UnforeseenValue, "look at the values of that kind in it"):
-            return _machine(data)
+            return replace(_machine(data), questions=questions_of(text))
     except UnforeseenValue:
         raise
     except ConfigError as error:
-        text = str(error)
-        raise ConfigError(f"{path}: {text if len(text) <= _LONGEST else text[:_LONGEST] + ' …'}") from error
+        said = str(error)
+        raise ConfigError(f"{path}: {said if len(said) <= _LONGEST else said[:_LONGEST] + ' …'}") from error
 
 
 def _machine(data: Mapping[str, Any]) -> Machine:

@@ -109,7 +109,7 @@ def foreign(count: int, first: int) -> Iterator[Named]:
     make = foreign_machine.maker()
     for k in range(count):
         drive = foreign_machine.scenario(make, 5200 + first + k, ("forced", "printed")[k % 2], 60.0)
-        rng = np.random.default_rng(first - 2000 + k)
+        rng = np.random.default_rng(abs(first - 2000) + k)
         modes = ("stuck", "no_signal", "inefficient", "noisy")
         faults = [
             make.Fault(

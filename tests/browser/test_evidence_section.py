@@ -36,7 +36,7 @@ def test_first_fault_shows_what_decided(open_page: OPEN) -> None:
 def test_plots_move_to_the_chosen_fault(open_page: OPEN) -> None:
     page = open_page("decided", "#fault=F4")
     expect(page.locator("article[data-ev=F4] #figure")).to_be_visible()
-    expect(page.locator("article[data-ev=F4]")).to_contain_text("detection time not known")
+    expect(page.locator("article[data-ev=F4]")).to_contain_text("when it would have been detected is not known")
     page.keyboard.press("k")
     expect(page.locator("article[data-ev=F3] #figure")).to_be_visible()
     expect(page.locator("article[data-ev=F3] .edges")).to_contain_text("detected +4 s →")

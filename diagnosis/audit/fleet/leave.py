@@ -11,7 +11,7 @@ from diagnosis.audit.fleet.fault_types import FleetFaultRow
 from diagnosis.audit.fleet.fleet_types import FleetDocument, MachineRow, MissionRow
 from diagnosis.audit.fleet.may_leave import is_lost, leave_of
 from diagnosis.audit.fleet.page.figures import unassessed
-from diagnosis.audit.fleet.page.rows import fault_words
+from diagnosis.audit.fleet.page.rows import fault_words, not_named
 from diagnosis.audit.fleet.runs import sides_of
 from diagnosis.audit.fleet.trend_types import TrendRow
 from diagnosis.audit.fleet.words import count, open_words
@@ -135,7 +135,7 @@ def _why(
         + (", no repair recorded" + open_words(f["open"], f["clean"], f["needed"]) if f["open"] and f["since"] else "")
         for f in faults[:_FAULTS]
     )
-    named += f" and {len(faults) - _FAULTS} more" if len(faults) > _FAULTS else ""
+    named += not_named(faults, _FAULTS, m)
     if leave is Leave.MUST_NOT:
         place = faults[0]["last"] if faults else last
         was = "was" if m["unjudged"] == 1 else "were"

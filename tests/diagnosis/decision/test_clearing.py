@@ -51,6 +51,17 @@ def test_faults_to_watch_are_not_cleared_beside_an_open_check() -> None:
     assert "46 %" in got.not_cleared
 
 
+def test_what_a_fault_to_watch_explains_of_other_parts_is_no_suspicion_against_them() -> None:
+    loss = finding(Side.ACTUATOR, FaultMode.INEFFICIENT, epsilon=0.6)
+    parts = machine(FR_actuator=assessed(loss))
+    (fault,) = intervals_of(parts, MACHINE, HYDRAULIC, 0, STEP)
+    beside = replace(_BEYOND, component="RL", start_s=fault.start_s, stop_s=fault.stop_s)
+    got = verdict(parts, checks=(beside,))
+    assert (fault.severity, got.cleared) == ("medium", False)
+    assert "46 %" not in got.not_cleared
+    assert "beside a fault nothing shows whether RL is healthy" in got.not_cleared
+
+
 def test_a_part_of_a_mission_clears_nothing() -> None:
     got = verdict(machine(), scope=(Cut(CutKind.LOG, (), "only 29.5 s of 60.0 s of the log were judged"),))
     assert (got.status, got.cleared) == ("not_assessed", False)

@@ -8,12 +8,14 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from diagnosis.decision.episodes import with_episodes, with_onset
+from diagnosis.decision.episodes import with_episodes
+from diagnosis.decision.intervals import intervals_of
 from diagnosis.results.assessment import CODE, Assessment, Finding
+from diagnosis.results.machine_words import HYDRAULIC
 from diagnosis.results.result import Hypothesis
 from diagnosis.results.vocabulary import Tier
 from replay.faults import FaultMode, Side, State
-from tests.diagnosis.decision.findings import N, finding
+from tests.diagnosis.decision.findings import MACHINE, STEP, N, assessed, finding
 
 DT = 0.001
 
@@ -46,13 +48,14 @@ def test_pieces_of_one_loss_are_one_fault(side: Side) -> None:
     assert (one.start, one.stop) == (1000, 6500)
     assert one.epsilon is not None
     assert one.epsilon.value == pytest.approx(0.25)
-    assert "3 stretches (1.0–1.5 s, 3.0–3.5 s, 6.0–6.5 s)" in one.evidence[-1]
+    assert "3 stretches (1.0–1.5 s, 3.0–3.5 s, 6.0–6.5 s)" in one.course[-1]
 
 
 def test_the_onset_is_told_before_what_comes_later() -> None:
     (one,) = joined(*(loss(a, a + 500) for a in (1000, 3000)))
-    assert [e[:5] for e in with_onset(one, "Onset").evidence] == ["what ", "Onset", "It sh"]
-    assert with_onset(loss(1000, 1500), "Onset").evidence[-1] == "Onset"
+    told = replace(one, evidence=(*one.evidence, "Onset"))
+    (fault,) = intervals_of({("FR", "actuator"): assessed(told)}, MACHINE, HYDRAULIC, 0, STEP)
+    assert [e[:5] for e in fault.evidence] == ["what ", "Onset", "It sh"]
 
 
 def test_healthy_time_between_makes_two_faults() -> None:
@@ -78,7 +81,7 @@ def test_a_loss_that_grows_is_one_fault_with_its_course() -> None:
     assert (one.start, one.stop) == (1000, 4500)
     assert one.epsilon is not None
     assert 0.3 < one.epsilon.value <= 0.4
-    assert "2 stretches (1.0–1.5 s: 10 % lost, 1.5–4.5 s: 40 % lost)" in one.evidence[-1]
+    assert "2 stretches (1.0–1.5 s: 10 % lost, 1.5–4.5 s: 40 % lost)" in one.course[-1]
 
 
 def test_other_rows_are_other_faults() -> None:
@@ -110,7 +113,7 @@ def test_a_piece_of_unclear_kind_belongs_to_the_fault_that_it_touches() -> None:
     (one,) = joined(stuck, unclear(5000, 6000, inefficient=0.4, stuck=0.3, noisy=0.3))
     assert (one.start, one.stop, one.mode) == (1000, 6000, FaultMode.STUCK)
     assert one.hypotheses == stuck.hypotheses
-    assert one.evidence[-1].startswith("From 5.00 to 6.00 s its kind is unclear")
+    assert one.course[-1].startswith("From 5.00 to 6.00 s its kind is unclear")
 
 
 def test_it_goes_to_the_fault_that_it_more_probably_is_of() -> None:

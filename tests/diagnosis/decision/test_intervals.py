@@ -11,7 +11,7 @@ from diagnosis.decision.intervals import intervals_of, spans_of
 from diagnosis.decision.wording import fault_words
 from diagnosis.results.assessment import unassessed
 from diagnosis.results.machine_words import HYDRAULIC
-from diagnosis.results.result import Hypothesis
+from diagnosis.results.result import Epsilon, Hypothesis, Sat
 from diagnosis.results.vocabulary import Tier
 from replay.faults import FaultMode, Side, State
 from tests.diagnosis.decision.findings import MACHINE, STEP, N, assessed, finding, machine
@@ -85,6 +85,19 @@ def test_bounds_of_a_loss_by_a_wheels_model_allow_for_the_model() -> None:
         (got,) = intervals_of(parts, MACHINE, HYDRAULIC, 0, STEP)
         assert got.epsilon is not None
         assert (got.epsilon.low, got.epsilon.high) == pytest.approx(bounds)
+
+
+@pytest.mark.parametrize(("low", "high", "ends"), [(0.0, 1.0, (0.02, 0.6)), (0.49, 0.51, (0.0392, 0.1225))])
+def test_bounds_of_a_noise_hold_for_every_share_that_may_be_lost(
+    low: float, high: float, ends: tuple[float, float]
+) -> None:
+    noise = replace(
+        finding(Side.SENSOR, FaultMode.NOISY), epsilon=Epsilon(0.5, low, high), sat=Sat(0.08, 0.2, 0.04, 0.12, "m/s")
+    )
+    (got,) = intervals_of(machine(FR_sensor=assessed(noise)), MACHINE, HYDRAULIC, 0, STEP)
+    assert got.sat is not None
+    assert (got.sat.mean, got.sat.rms) == (0.08, 0.2)
+    assert (got.sat.low, got.sat.high) == pytest.approx(ends, rel=0.01)
 
 
 def test_advice_goes_by_the_bounds_that_are_stated() -> None:

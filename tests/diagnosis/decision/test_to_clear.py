@@ -8,7 +8,7 @@ from diagnosis.decision.caveats import Reservations
 from diagnosis.decision.intervals import intervals_of
 from diagnosis.decision.to_clear import to_clear
 from diagnosis.results.assessed import Cut, CutKind
-from diagnosis.results.assessment import CODE, Assessment, unassessed
+from diagnosis.results.assessment import CODE, Assessment, Lack, unassessed
 from diagnosis.results.clearing import Check, Checked
 from diagnosis.results.machine_words import HYDRAULIC
 from diagnosis.results.vocabulary import Kind, Tier
@@ -78,7 +78,12 @@ def test_what_deviates_while_a_fault_lasts_is_told_as_its_possible_doing() -> No
     part = (Kind.WHEEL, "FR", Side.SENSOR_OR_ACTUATOR, Check.RESPONSE, 0.4, 0.1)
     during, after, lasting = (Checked(*part, a, b) for a, b in ((2.0, 5.0), (4.2, 7.2), (None, None)))
     rows = to_clear(Reservations(open=(during,)), PARTS, {}, {}, [], Limits(), faults)
-    assert rows[0].reason.startswith("At the time of F1, which may explain it: the speed of FR per opening is")
+    assert rows[0].reason.startswith("Explained by F1, the RR drive valve, at its time: the speed of FR per opening is")
+    assert rows[0].reason.endswith(" This speaks against no part of FR, and clears none.")
+    own = replace(during, component="RR")
+    first, second = to_clear(Reservations(open=(during, own)), PARTS, {}, {}, [], Limits(), faults)
+    assert first.reason == rows[0].reason
+    assert second.reason.startswith("At the time of F1, which may explain it: the speed of RR per opening is")
     assert rows[0].act == "repair the RR drive valve (F1), then diagnose the next mission"
     for check in (after, lasting):
         (row,) = to_clear(Reservations(open=(check,)), PARTS, {}, {}, [], Limits(), faults)
@@ -91,7 +96,8 @@ def test_one_axle_against_the_other_over_the_mission_may_be_the_doing_of_a_fault
     front = Checked(Kind.STEER, "front", Side.SENSOR_OR_ACTUATOR, Check.LASTING_RATE, 0.3, 0.17)
     rows = to_clear(Reservations(open=(front,)), PARTS, {}, {}, [], Limits(), faults)
     (row,) = (r for r in rows if "steering rate" in r.reason)
-    assert row.reason.startswith("In a mission with F1, which may explain it: the steering rate of the front axle")
+    assert row.reason.startswith("Explained by F1, the rear steering valve: the steering rate of the front axle")
+    assert row.reason.endswith("against no part of the front axle, and clears none.")
     assert "rear steering valve (F1)" in row.act
 
 
@@ -102,11 +108,18 @@ def test_what_deviates_after_a_fault_is_told_so_and_an_angle_that_jumps_then_is_
     less, more = (Checked(*wheel, c, x, 0.1, *times) for c, x in ((Check.RESPONSE, 0.4), (Check.EXCESS, 0.9)))
     (row,) = to_clear(Reservations(open=(less, more)), PARTS, {}, {}, [], Limits(), faults)
     assert row.reason == (
-        "Just after F1, which may explain it: the speed of FR per opening is 2.5 times the other wheels' at 3.2–4.2 s."
+        "Explained by F1, the RR drive valve, just after it: the speed of FR per opening is 2.5 times the other wheels' at 3.2–4.2 s. "
+        "This speaks against no part of FR, and clears none."
     )  # of one wheel the check that is furthest beyond its limit, not two measures of one thing
     jump = Checked(Kind.STEER, "front", Side.SENSOR, Check.JUMP, 0.02, 0.01, 3.2, 3.4)
     (row,) = to_clear(Reservations(open=(jump,)), PARTS, {}, {}, [], Limits(), faults)
     assert "F1" not in row.reason + row.act
+
+
+def test_a_log_without_commands_asks_for_them_first() -> None:
+    first, *_ = told(Reservations(short=tuple(PARTS), uncommanded=True))
+    assert first.startswith("No command is in the log")
+    assert "record the commands as well (/cmd_vel of a ROS robot" in first
 
 
 def test_what_the_yaw_rate_shows_of_either_axle_is_said_once() -> None:
@@ -121,7 +134,8 @@ def test_what_the_yaw_rate_shows_of_either_axle_is_said_once() -> None:
 
 def test_unjudged_steering_has_one_reason() -> None:
     axle = {
-        ("front", s): unassessed(N, State.NOT_ASSESSED, "nothing of it is in the log") for s in ("sensor", "actuator")
+        ("front", s): unassessed(N, State.NOT_ASSESSED, "nothing of it is in the log", Lack.SIGNALS)
+        for s in ("sensor", "actuator")
     }
     (one,) = told(
         Reservations(scope=(Cut(CutKind.STEERING, ("front",), "the front steering was not judged"),)), {**PARTS, **axle}

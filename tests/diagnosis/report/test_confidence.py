@@ -45,6 +45,7 @@ def test_no_certainty_that_is_not_there(p: float, words: str) -> None:
 
 def test_phrase_of_a_fault() -> None:
     report = samples.report_with(coverage=[row("actuator", 91.0), row("sensor", 100.0)])
+    assert "Very likely (96 %, the most that any finding is given), measured" in sure_of(fault(0.96), report)
     nothing = samples.report_with(coverage=[])
     assert sure_of(fault(0.995), report) == (
         "Practically certain (99.5 %), measured against the valve position; 91 % of its driving was judged"
@@ -174,3 +175,27 @@ def test_parts_that_were_judged_and_those_that_were_cleared_are_counted_apart() 
     assert judged(brief).startswith("0 of 1 parts judged, none cleared, for none was judged long enough;")
     assert judged_means(found).startswith("Judged: decided, healthy or faulty, for at least ")
     assert judged_means(samples.report_with(coverage=[])) == ""
+
+
+@pytest.mark.parametrize(
+    ("tier", "logged", "how"),
+    [
+        ("signal", ("phi",), "from the channel alone"),
+        ("signal", ("phi", "phi_true"), "by the steering model with a second angle sensor"),
+        ("model", ("phi", "phi_true"), "by the steering model with a second angle sensor"),
+        ("model", ("phi", "u"), "by the steering model, not by a second measurement"),
+    ],
+)
+def test_a_second_angle_that_the_steering_model_weighed_is_named(tier: str, logged: tuple[str, ...], how: str) -> None:
+    (one, *_) = samples.five_faults()[0]["signals"]
+    report = samples.report_with(signals=[one | {"name": f"steer.front.{leaf}"} for leaf in logged])
+    stuck = fault(0.93) | {"component": "front", "kind": "steer", "side": "sensor", "tier": tier}
+    assert how in sure_of(stuck, report)  # type: ignore[arg-type]
+
+
+def test_drives_without_a_command_in_the_log_answer_none() -> None:
+    coverage = [row(side, 100.0) | {"tier": "response"} for side in ("sensor", "actuator")]
+    assert "answer their commands" not in sure_of_verdict(samples.report_with(coverage=coverage))
+    (one, *_) = samples.five_faults()[0]["signals"]
+    told = samples.report_with(coverage=coverage, signals=[one | {"name": "cmd.v"}])
+    assert "answer their commands" in sure_of_verdict(told)

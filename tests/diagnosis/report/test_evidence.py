@@ -41,7 +41,7 @@ def test_slower_channels_are_named() -> None:
 def test_delay() -> None:
     assert delay_words(samples.fault(start_s=5.0, detected_s=5.02)) == "detected 20 ms after onset"
     assert delay_words(samples.fault(start_s=5.0, detected_s=5.0)) == "detected at its first sample"
-    assert delay_words(samples.fault(detected_s=None)) == "detection time not known"
+    assert delay_words(samples.fault(detected_s=None)) == "when it would have been detected is not known"
 
 
 def test_missing_pictures_are_explained() -> None:

@@ -57,6 +57,9 @@ def test_how_a_fault_was_decided() -> None:
         HYDRAULIC.decided(Tier.MODEL, Kind.STEER, Side.ACTUATOR) == "by the steering model, not by a second measurement"
     )
     assert HYDRAULIC.decided(Tier.DIRECT, Kind.WHEEL, Side.SENSOR_OR_ACTUATOR) == ""
+    with_second = "by the steering model with a second angle sensor"
+    assert HYDRAULIC.decided(Tier.SIGNAL, Kind.STEER, Side.SENSOR, twice=True) == with_second
+    assert f"by the {HYDRAULIC.evidence(Tier.SIGNAL, Kind.STEER, Side.SENSOR)}" == with_second
 
 
 @pytest.mark.parametrize("tier", Tier)

@@ -106,3 +106,23 @@ def test_a_valve_that_stands_still_is_called_by_where_it_does(at: float, said: F
 def test_beside_a_command_that_rests_a_share_may_be_a_constant_that_is_missing() -> None:
     after = told(np.full(SIZE, 0.1), FaultMode.INEFFICIENT, np.full(SIZE, 0.2))
     assert {h.mode: h.p for h in after.findings[0].hypotheses} == {"inefficient": 0.5, "outside_table": 0.5}
+
+
+def test_a_sensor_that_stands_still_says_what_the_second_one_shows_meanwhile() -> None:
+    angle = 0.3 * np.sin(np.arange(SIZE) * DT * 3.0)
+    stuck = np.where((np.arange(SIZE) >= SPAN[0]) & (np.arange(SIZE) < SPAN[1]), 0.1, angle)
+    values = {"phi": stuck, "phi_true": angle}
+    inputs = SimpleNamespace(
+        angle_redundant=True,
+        values=values.__getitem__,
+        channel=lambda leaf: f"steer.front.{leaf}",
+        timeline=SimpleNamespace(dt=DT, fresh={"steer.front.phi": np.ones(SIZE, np.bool_)}),
+    )
+    row = (Hypothesis(Side.SENSOR.value, FaultMode.STUCK.value, 1.0),)
+    finding = Finding(
+        *SPAN, Side.SENSOR, FaultMode.STUCK, 1.0, row, Epsilon(1.0, 1.0, 1.0), None, ("first",), Tier.SIGNAL
+    )
+    (got,) = of_one_cause(Side.SENSOR, SideFindings((finding,), ()), cast(AxleInputs, inputs), 0.02).findings
+    assert got.evidence[-1] == (
+        "Meanwhile steer.front.phi_true, a second measurement of the angle, moved over 34°, and steer.front.phi over 0°."
+    )

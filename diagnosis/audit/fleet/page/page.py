@@ -42,6 +42,7 @@ _HERE = Path(__file__).parent
 _FAULTS = 400
 _COURSE = 5  # missions whose ε̂ a fault's course names
 _OPEN_ROWS = 40
+_STANDING = 2  # faults of a machine that its row names
 _BLIND = 100  # machines whose parts that were not judged are listed
 _FAILURES = 1000
 _FILTER = (Verdict.STOP, Verdict.WATCH, Verdict.READY, Verdict.NOT_ASSESSED)
@@ -234,8 +235,8 @@ def _machine(
         "words": words,
         "note": m["note"],
         "open": len(standing),
-        "faults": "; ".join(rows.fault_words(f, words_of(m)) for f in standing[:2])
-        + (f" +{len(standing) - 2}" if len(standing) > 2 else ""),
+        "faults": "; ".join(rows.fault_words(f, words_of(m)) for f in standing[:_STANDING])
+        + rows.not_named(standing, _STANDING, m),
         "strip": rows.strip(document["missions"], m, rows.strip_length(len(document["machines"]))),
         "with_faults": m["with_faults"],
         "judged": judged,
@@ -243,6 +244,7 @@ def _machine(
         "trend_words": f"{words_of(m).part_words(leading['kind'], leading['component'], leading['side'])}: {level_words(leading)}"
         if leading and line
         else "",
+        "no_trend": "" if leading else "fewer than five missions with an estimate" if trends else "no estimate of ε̂",
         "level": leading["points"][-1][2] if leading and line else -1.0,
         "driven": hours(m["driving_s"]),
         "driving_s": m["driving_s"],
@@ -274,9 +276,7 @@ def _fault(f: FleetFaultRow, document: ShownDocument, directions: Mapping[tuple[
         direction = directions.get((f["machine"], f["component"], f["side"]), "not_known")
         notes += [direction] if direction != "not_known" else []
     if found and "lasting" in found[-1]:
-        notes.append(
-            "lasts to the end of the log" if found[-1]["lasting"] else "ended, or last seen before the end of the log"
-        )
+        notes.append("lasts to the end of its log" if found[-1]["lasting"] else "last seen before its log ended")
     if f["status"] == "repaired" and f["repaired_ns"] is not None:
         notes.append(f"repaired on {labels.utc_moment(f['repaired_ns'])}")
     elif f["repaired_ns"] is not None:

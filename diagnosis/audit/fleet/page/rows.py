@@ -53,6 +53,17 @@ def fault_words(fault: FleetFaultRow | MissionFaultRow, machine_words: MachineWo
     return words + (f", {100 * e['value']:.0f} % lost in the fault" if e and sized else "")
 
 
+def not_named(faults: Sequence[FleetFaultRow], named: int, machine: MachineRow) -> str:
+    """How many faults of a machine follow the first `named`, and which is the newest where that is one of them; empty where none do."""
+    rest = faults[named:]
+    if not rest:
+        return ""
+    order = {place: k for k, place in enumerate(machine["missions"])}
+    newest = max(rest, key=lambda f: order.get(f["last"], -1))
+    newer = order.get(newest["last"], -1) > max((order.get(f["last"], -1) for f in faults[:named]), default=-1)
+    return f" and {len(rest)} more" + (f", the newest {fault_words(newest, words_of(machine))}" if newer else "")
+
+
 def _verdict_words(verdict: Verdict | None) -> str:
     return "" if verdict is None else verdict.short
 

@@ -196,3 +196,14 @@ def test_no_machine_that_must_not_go_out_is_no_all_clear(tmp_path: Path) -> None
     assert "Must not go out (0)" in page
     assert "None for certain, but 1 machine must be checked first." in page
     assert "Check before it goes out (1)" in page
+
+
+def test_of_faults_that_are_not_named_the_newest_is(tmp_path: Path) -> None:
+    parts = (("FR", "sensor"), ("FL", "sensor"), ("RR", "actuator"))
+    missions = [
+        Sample(f"a{k}", day=float(k), verdict="stop", faults=[Fault(*part, "stuck", "high")])
+        for k, part in enumerate(parts)
+    ]
+    missions.append(Sample("b", day=3.0, verdict="watch", faults=[Fault("RL", "actuator", "inefficient", "medium")]))
+    (one,) = listed(tmp_path, *missions).values()
+    assert "and 2 more, the newest RL drive valve inefficient" in one.reason

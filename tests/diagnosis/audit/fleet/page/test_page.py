@@ -173,7 +173,7 @@ def test_a_course_names_the_losses_mission_by_mission_and_whether_the_fault_last
     document = fleet_json(load_fleet(samples.write_store(tmp_path / "fleet.sqlite", missions)))
     page = build_fleet_page(document)
     assert "ε̂ 0.50 → 0.65 (0.64 to 0.66) in the fault, mission by mission" in page
-    assert "last seen before the end of the log" in page
+    assert "last seen before its log ended" in page
     for fault in document["missions"][-1]["faults"]:
         fault["lasting"] = True
-    assert "lasts to the end of the log" in build_fleet_page(document)
+    assert "lasts to the end of its log" in build_fleet_page(document)
