@@ -111,7 +111,8 @@ def _write_table(columns: Mapping[str, NDArray[Any]], path: Path, layout: Layout
         pa.Array.from_buffers(pa.from_numpy_dtype(v.dtype), len(v), [None, pa.py_buffer(np.ascontiguousarray(v))])
         for v in own.values()
     ]
-    table = pa.Table.from_arrays(arrays, names=list(own), metadata=layout.metadata())
+    fields = [pa.field(name, a.type, nullable=False) for name, a in zip(own, arrays, strict=True)]
+    table = pa.Table.from_arrays(arrays, schema=pa.schema(fields, metadata=layout.metadata()))
     with path.open("wb") as file:  # pyarrow opens no name that is not UTF-8
         pq.write_table(
             table,

@@ -170,10 +170,11 @@ def relative_lag(y: Array, x: Array, use: NDArray[np.bool_], least_lag: int, max
     places = places[:: max(1, places.size // _PLACES)]
     if places.size < _FEWEST_PLACES:
         return 0.0
-    there = y[places]
+    there, before = y[places], places - (max_lag + 1)
 
     def misfit(lag: float, some: slice = _ALL) -> Array:
-        return np.abs(there[some] - x[places[some] - int(lag)])
+        off = there[some] - x[max_lag + 1 - int(lag) :].take(before[some])
+        return np.abs(off, out=off)
 
     def lower(lag: float) -> float:
         found = misfit(lag, _SOME)

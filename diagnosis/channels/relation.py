@@ -251,17 +251,21 @@ def _misfit(places: _Places, relation: Relation, dt: float, scale: float) -> flo
     return _misfit_of(followed, places, relation, scale)
 
 
-def _misfit_of(followed: Array, places: _Places, relation: Relation, scale: float) -> float:
-    """The same of a reference with play and lag."""
+def _misfit_of(followed: Array, places: _Places, relation: Relation, scale: float, most: float = np.inf) -> float:
+    """The same of a reference with play and lag; infinite where it is more than `most`."""
     whole = int(np.floor(relation.delay))
     part = relation.delay - whole
-    return float(_loss(followed, places.at, places.y, whole, part if part >= 1e-9 else 0.0, relation.gain, scale))
+    return float(_loss(followed, places.at, places.y, whole, part if part >= 1e-9 else 0.0, relation.gain, scale, most))
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
-def _loss(x, at, y, whole, part, gain, scale):  # type: ignore[no-untyped-def]
-    """Mean ln(1 + (misfit/scale)²) over the places where x is known, by logarithms of products."""
+def _loss(x, at, y, whole, part, gain, scale, most):  # type: ignore[no-untyped-def]
+    """Mean ln(1 + (misfit/scale)²) over the places where x is known, by logarithms of products.
+
+    No place lowers the sum: it ends where the mean can be no less than `most` any more.
+    """
     total, product, known = 0.0, 1.0, 0
+    enough = most * at.size
     for k in range(at.size):
         near = x[at[k] - whole]
         if part > 0.0:
@@ -272,6 +276,8 @@ def _loss(x, at, y, whole, part, gain, scale):  # type: ignore[no-untyped-def]
             known += 1
             if product > 1e100:
                 total, product = total + np.log(product), 1.0
+                if total > enough:
+                    return np.inf
     return (total + np.log(product)) / known
 
 
@@ -283,7 +289,7 @@ def _least(places: _Places, trials: Iterable[Relation], dt: float, scale: float)
         if (trial.lag, trial.play) != key:
             key = (trial.lag, trial.play)
             followed = filled.followed(trial.play, trial.lag, dt)
-        misfit = _misfit_of(followed, places, trial, scale)
+        misfit = _misfit_of(followed, places, trial, scale, least)
         if misfit < least:
             best, least = trial, misfit
     return best, least

@@ -140,15 +140,16 @@ def causes(y: Array, x: Array, at: NDArray[np.intp], measured: Measured) -> Iter
         f"It departs from {reference} by {amount(float(drift[1]), measured.unit, 2)} a second, whatever that is: a drift.",
         changes=True,
     )
-    late = []
-    for delay in np.linspace(0.0, _LATEST_S, _DELAYS)[1:]:
-        before = measured.x[np.maximum(at - round(delay / measured.dt), 0)]
-        late.append((*left(y - np.where(np.isfinite(before), before, x)), float(delay)))
-    least, moves, delay = min(late)
+    least, delay, rest = np.inf, 0.0, off
+    for later in np.linspace(0.0, _LATEST_S, _DELAYS)[1:].tolist():
+        before = measured.x[np.maximum(at - round(later / measured.dt), 0)]
+        behind = y - np.where(np.isfinite(before), before, x)
+        share = power(behind, measured)
+        if share < least or (share == least and every_power(behind, measured) < every_power(rest, measured)):
+            least, delay, rest = share, later, behind
     yield Cause(
         FaultMode.OUTSIDE_TABLE,
-        least,
-        moves,
+        *left(rest),
         f"It comes {1e3 * delay:.0f} ms after {reference}: a delay.",
         changes=True,
         late=True,

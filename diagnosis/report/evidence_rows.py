@@ -74,28 +74,26 @@ def _deviating(base: str, columns: Columns, *, total: bool) -> tuple[tuple[float
     if not {*names, "t"} <= columns.keys():
         return ()
     chance = columns[names[0]]
-    lost = sum(
-        (np.nan_to_num(columns[base + f"p_{m}"]) for m in TOTAL if base + f"p_{m}" in columns), np.zeros(chance.size)
-    )
-    found = _stretches(
-        columns["t"], (chance > _LIKELY) & (columns[names[1]] == 0.0) & ((lost > _LIKELY * chance) == total)
-    )
+    flags = (chance > _LIKELY) & (columns[names[1]] == 0.0)
+    at = np.flatnonzero(flags)
+    modes = (columns[name] for m in TOTAL if (name := base + f"p_{m}") in columns)
+    lost = sum((np.nan_to_num(p[at]) for p in modes), np.zeros(at.size))
+    flags[at] = (lost > _LIKELY * chance[at]) == total
+    found = _stretches(columns["t"], flags)
     return tuple((start, stop) for start, stop in found if stop - start >= _TINTED_S)
 
 
 def _stretches(times: NDArray[np.floating], flags: NDArray[np.bool_]) -> tuple[tuple[float, float], ...]:
     """First and last time [s] of the stretches in which flags of shape (n,) are set; those that nearly touch are one."""
     t = np.asarray(times, np.float64)
-    cut = np.flatnonzero(np.diff(np.concatenate(([False], flags, [False])).astype(np.int8)))
+    cut = np.flatnonzero(np.diff(flags, prepend=False, append=False))
+    if not cut.size:
+        return ()
     step = float(t[-1] - t[0]) / max(1, t.size - 1)
-    apart, out = max(step, float(t[-1] - t[0]) / _FINEST), list[tuple[float, float]]()
-    for a, b in zip(cut[::2], cut[1::2], strict=True):
-        start, stop = float(t[a]), float(t[b - 1]) + step
-        if out and start - out[-1][1] <= apart:
-            out[-1] = out[-1][0], stop
-        else:
-            out.append((start, stop))
-    return tuple((round(a, 4), round(b, 4)) for a, b in out)
+    starts, stops = t[cut[::2]], t[cut[1::2] - 1] + step
+    apart = np.flatnonzero(starts[1:] - stops[:-1] > max(step, float(t[-1] - t[0]) / _FINEST))
+    first, last = starts[np.r_[0, apart + 1]].tolist(), stops[np.r_[apart, -1]].tolist()
+    return tuple((round(a, 4), round(b, 4)) for a, b in zip(first, last, strict=True))
 
 
 def side_rows(

@@ -134,17 +134,17 @@ def build_page(
         **_pictures(report, detailed, series, duration),
         **_plots(report, detailed, series, duration, budget),
         **_scripts([main, plotly, later] if plots else [main]),
-        "main": packed(main.encode()),
-        "later": packed(later.encode()) if plots else "",
+        "main": Markup(packed(main.encode())),
+        "later": Markup(packed(later.encode()) if plots else ""),
         "previous": previous_section(report),
         "evidence": evidence,
         "unlisted": len(whole["intervals"]) - len(report["intervals"]),
         "has_plots": plots,
         "empty": [k for k in series.all if k not in series.filled],
-        "plotly": bundle,
+        "plotly": Markup(bundle),
         "plotly_version": version,
     }
-    context["blocks"].append(("intervals", intervals))
+    context["blocks"].append(("intervals", Markup(intervals)))
     return _environment().get_template("template.html.j2").render(context)
 
 
@@ -202,7 +202,8 @@ def _plots(
     channels = channels_of(worst_alone, shown, figures, groups, axis, budget, series.closeups)
     return {
         "groups": groups,
-        "blocks": [(f"b{i}", s.text) for i, s in enumerate(blocks_of(channels))],
+        # base64, megabytes of it, holds nothing to escape
+        "blocks": [(f"b{i}", Markup(s.text)) for i, s in enumerate(blocks_of(channels))],
         "view": htmlsafe_json_dumps(view(report, channels, figures, groups, axis, duration), sort_keys=True),
     }
 

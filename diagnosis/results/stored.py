@@ -121,6 +121,10 @@ def stored(name: str, values: NDArray[np.floating], grid: float) -> NDArray[np.f
             _put_on_grid(part, np.float32(grid))
         if bits:
             half, kept = np.uint32(1 << (22 - bits)), np.uint32(0xFFFFFFFF << (23 - bits) & 0xFFFFFFFF)
-            raw = part.view(np.uint32)
-            np.copyto(raw, (raw + half) & kept, where=np.isfinite(part))
+            raw, finite = part.view(np.uint32), np.isfinite(part)
+            if finite.all():
+                raw += half
+                raw &= kept
+            else:
+                np.copyto(raw, (raw + half) & kept, where=finite)
     return out

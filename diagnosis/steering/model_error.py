@@ -91,6 +91,7 @@ def _evidence(axle: AxleFilter, motions: Sequence[slice]) -> NDArray[np.float64]
     for motion in motions:
         near = series.part(motion)
         size = near.mean.size
-        total, _ = path_kernel.path_evidence(near, np.full(size, HEALTHY_MODEL, np.uint8), 0, size, none, constants)
+        healthy, first = np.full(size, HEALTHY_MODEL, np.uint8), float(near.mean[0])
+        total, _ = path_kernel.path_evidence(near, healthy, 0, size, none, first, constants, False)
         out.append(total)
     return np.array(out)

@@ -104,9 +104,7 @@ def follow_path(axle: AxleFilter, models: Models) -> SteeringPath:
         noise=np.ones((size, 2)),
         gap=np.zeros((size, 2)),
     )
-    bank = path_kernel.empty_bank()
-    path_kernel.start(int(models[0]), axle.first_angle, axle.constants, bank)
-    path_kernel.follow(axle.series, axle.constants, bank, path)
+    path_kernel.path_evidence(axle.series, path.model, 0, size, path, axle.first_angle, axle.constants, True)
     return path
 
 
@@ -117,5 +115,8 @@ def evidence_of(axle: AxleFilter, known: SteeringPath, models: Models, start: in
 
     `models` of shape (m,); the state of shape (6,).
     """
-    found: tuple[float, Array] = path_kernel.path_evidence(axle.series, models, start, stop, known, axle.constants)
+    first = float(axle.series.mean[0])
+    found: tuple[float, Array] = path_kernel.path_evidence(
+        axle.series, models, start, stop, known, first, axle.constants, False
+    )
     return found

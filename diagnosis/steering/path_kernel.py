@@ -130,30 +130,6 @@ def scan(
             score[m] -= top
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
-def follow(series: BlockSeries, constants: FilterConstants, states: FilterBank, path: SteeringPath) -> None:
-    """Run only the model that `path` names in each block; writes its mean, covariance and noise after each block.
-
-    `states` hold the first model as `start` leaves it.
-    """
-    bank = FilterBank(
-        uncounted(states.mean),
-        uncounted(states.cov),
-        uncounted(states.noise),
-        uncounted(states.gap),
-        uncounted(states.room),
-    )
-    for k in range(series.mean.size):
-        m = np.int64(path.model[k])
-        if k > 0 and m != path.model[k - 1]:
-            enter(m, np.int64(path.model[k - 1]), constants, bank)
-        advance(m, _block(k, series), _redundant_block(k, series.redundancy), constants, bank)
-        put(path.mean[k], bank.mean[m])
-        put_rows(path.cov[k], bank.cov[m])
-        put(path.noise[k], bank.noise[m])
-        put(path.gap[k], bank.gap[m])
-
-
 @njit(cache=True, error_model="numpy")
 def empty_bank() -> FilterBank:
     """States of all models, before any has begun."""
@@ -183,11 +159,14 @@ def path_evidence(
     begin: int,
     end: int,
     known: SteeringPath,
+    first: float,
     constants: FilterConstants,
+    kept: bool,
 ) -> tuple[float, Array]:
     """Log-evidence of blocks begin…end of a path, less the price of its switches, and [φ, r, a, b, d, c] at the end.
 
-    The states before block `begin` are those of the path `known`.
+    The states before block `begin` are those of the path `known`; it begins a mission at the measured angle `first` [rad].
+    Where `kept`, the states after each block are written into `known`: a function of its own would compile the filter again.
 
     `models` of shape (m,), the state of shape (6,).
     """
@@ -200,7 +179,7 @@ def path_evidence(
         put(bank.gap[before], known.gap[begin - 1])
     else:
         before = np.int64(models[0])
-        start(before, series.mean[0], constants, bank)
+        start(before, first, constants, bank)
     total = 0.0
     for k in range(begin, end):
         m = np.int64(models[k])
@@ -209,4 +188,9 @@ def path_evidence(
             total -= switch_cost(m, before, constants)
             before = m
         total += advance(m, _block(k, series), _redundant_block(k, series.redundancy), constants, bank)
+        if kept:
+            put(known.mean[k], bank.mean[m])
+            put_rows(known.cov[k], bank.cov[m])
+            put(known.noise[k], bank.noise[m])
+            put(known.gap[k], bank.gap[m])
     return total, bank.mean[before].copy()

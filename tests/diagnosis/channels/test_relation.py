@@ -71,7 +71,10 @@ def test_loss_is_the_mean_of_cauchys() -> None:
     y = 1.1 * (0.7 * x[at - 2] + 0.3 * x[at - 3]) + rng.normal(size=at.size)
     y[7] = 1e60
     misfit = (y - 1.1 * (0.7 * x[at - 2] + 0.3 * x[at - 3])) / 1e-4
-    assert_allclose(_loss(x, at, y, 2, 0.3, 1.1, 1e-4), np.nanmean(np.log1p(misfit**2)), rtol=1e-12)
+    mean = np.nanmean(np.log1p(misfit**2))
+    assert_allclose(_loss(x, at, y, 2, 0.3, 1.1, 1e-4, np.inf), mean, rtol=1e-12)
+    assert_allclose(_loss(x, at, y, 2, 0.3, 1.1, 1e-4, 1.001 * mean), mean, rtol=1e-12)
+    assert _loss(x, at, y, 2, 0.3, 1.1, 1e-4, 0.5 * mean) == np.inf  # a trial before left less: the sum ends early
 
 
 def test_channels_of_one_kind_are_as_late_as_most_of_them() -> None:
