@@ -67,7 +67,6 @@ _MACHINE = """\
 
 [machine]
 name = "Haulotte 16RTJ PRO"
-id = "sample"
 wheels = ["FR", "FL", "RR", "RL"]
 
 [geometry]

@@ -33,8 +33,7 @@ def write_documented_files(folder: Path) -> None:
     """
     (folder / "sample_logs").symlink_to(SAMPLES)
     shutil.copy(SAMPLES / "three_faults.mcap", folder / "drive.mcap")
-    machine = (SAMPLES / "haulotte.toml").read_text(encoding="utf-8")
-    (folder / "machine.toml").write_text(machine.replace('id = "sample"\n', ""), encoding="utf-8")
+    shutil.copy(SAMPLES / "haulotte.toml", folder / "machine.toml")
     write_robot(folder / "robot.mcap", Robot(description=urdf(), stuck=("front_left_wheel_joint", 20.0, 35.0)))
     _write_two_files(folder)
     (folder / "healthy").mkdir()

@@ -12,6 +12,7 @@ from cli.terminal.command import App, Quiet, Verbose, terminal_of
 from cli.terminal.options import Json, MachineFile
 from diagnosis.api.inputs import machine_of, mission_paths
 from replay.errors import ConfigError
+from replay.machine.questions import open_questions
 from replay.progress import Stage
 from replay.setup.preset import Preset
 
@@ -110,7 +111,7 @@ def check(
     for doubt in doubts:
         terminal.note(f"to be checked: {doubt}")
     count = len(machine.signals)
-    still = sum(line.startswith("# QUESTION: ") for line in file.read_text(encoding="utf-8").splitlines())
+    still = open_questions(file)
     open_ = f" {still} of its comments are questions; remove each when it is answered." if still else ""
     terminal.show(f"{file}: valid. {machine.name}, wheels {', '.join(machine.wheels)}, {count} signals given.{open_}")
 

@@ -8,28 +8,29 @@ from typing import Annotated
 
 import typer
 
+from cli.commands.fault_help import FAULT_FORM
 from cli.commands.inject_run import run_injection
 from cli.terminal.command import Quiet, Verbose, terminal_of
 from cli.terminal.options import Json, Logs, MachineFile
 from diagnosis.api.injecting import InjectRequest
 from diagnosis.api.log_format import LogFormat
 
-EXAMPLES = """\b
+EXAMPLES = (
+    """\b
 Examples:
   mfhca inject drive.mcap -o faulty.mcap --fault "FR sensor stuck 30 45"
   mfhca inject drive.bag -o faulty.bag --fault "RL sensor inefficient 60 75 eps=0.4 ramp=3"
   mfhca inject drive.csv -o faulty.csv -m machine.toml --random --count 6 --seed 7
   mfhca diagnose faulty.mcap && mfhca evaluate faulty.mcap
 
-\b
-A fault is PART SIDE MODE START STOP [eps=] [sat=] [std=] [tau=] [ramp=]: PART a wheel or steering
-axle; SIDE sensor or actuator; MODE stuck, no_signal, inefficient or noisy; times in s from the first
-wheel sample; sat and std in m/s (speed), rad (angle) or fraction of full opening (valve); tau the
-correlation time in s; ramp the time in s over which eps grows.
+"""
+    + FAULT_FORM
+    + """ Times count from the first wheel sample.
 
 \b
 OUT holds the mapped signals in SI under canonical names at their own stamps, and says that it is
 open-loop: the controller did not react to these faults. Other topics and columns are not written."""
+)
 
 
 class Silent(StrEnum):

@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+from cli.commands.fault_help import FAULT_FORM
 from cli.commands.simulate_run import run_simulation
 from cli.terminal.command import Quiet, Verbose, terminal_of
 from cli.terminal.dates import moment_of, nanoseconds
@@ -15,7 +16,8 @@ from cli.terminal.options import Json
 from diagnosis.api.log_format import LogFormat
 from diagnosis.api.simulation_options import SimulateRequest
 
-EXAMPLES = """\b
+EXAMPLES = (
+    """\b
 Examples:
   mfhca simulate
   mfhca simulate -o drive.bag --scenario random --seed 7 --duration 120
@@ -30,21 +32,21 @@ Examples:
   mfhca simulate -o table.mcap --preset paper-table
   mfhca simulate -o fuzzy.mcap --controller fuzzy
 
-\b
-A fault is PART SIDE MODE START STOP [eps=] [sat=] [std=] [tau=] [ramp=]: part FR FL RR RL front
-rear; side sensor or actuator; mode stuck, no_signal, inefficient or noisy; times in s; sat and std
-in m/s (speed), rad (angle) or fraction of full opening (valve); tau the correlation time in s, ramp
-the time over which eps grows from 0.
+"""
+    + FAULT_FORM
+    + """
 
 \b
-Keys of --set, SI units. Machine: K tau wheel_spread tau_spread dead_zone valve_lag droop leakage
-pump_flow mass friction ice_friction slip_stiffness rolling_resistance v_std v_lsb phi_std phi_lsb.
-Controller: lambda k_ps zeta psi0, or with --controller parameters of that class. Ground: steepness. Scenario: ramp_share ramp_max_s early_share
-(growing faults, faults from the first sample). Recorder: jitter drop_share drop_burst_s.
+Keys of --set, SI units. Machine: K tau wheel_spread tau_spread dead_zone (opening that moves nothing)
+valve_lag droop leakage pump_flow mass friction ice_friction slip_stiffness rolling_resistance v_std
+v_lsb phi_std phi_lsb. Controller: lambda k_ps zeta psi0, or with --controller parameters of that class.
+Ground: steepness. Scenario: ramp_share ramp_max_s early_share (growing faults, faults from the first
+sample). Recorder: jitter drop_share drop_burst_s.
 structure=NAME: a machine of another structure, its sizes drawn by the seed: valves (dead band,
 hysteresis, resonance), pump (shared, load-dependent, warming), torque (drives that accelerate),
 resonant_pump, sticky_valves, electric, random (any mixture of such effects, drawn by the seed; with
 --vary all else is drawn as well)."""
+)
 
 
 class Scenario(StrEnum):

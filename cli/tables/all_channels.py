@@ -13,6 +13,7 @@ from rich.text import Text
 from cli.tables.layout import text, whole_lines
 from replay.machine.config import Machine
 from replay.setup.all_channels import ChannelRow
+from replay.setup.ranges import range_text
 
 _LONG_ARRAY = 4
 _NARROW, _WIDE = 25, 44  # characters of a field that share a line with the rest, on terminals of 80 and of 120 columns
@@ -80,7 +81,7 @@ def _row(row: ChannelRow, field: int) -> Iterator[Text]:
     """The channel's whole name, then range, unit and signals, below it where it is long."""
     name = f"  {row.field if row.topic else row.name}"
     unit = f"{row.unit}{'?' if row.guessed and row.unit else ''}" or "–"
-    span = "no number" if row.low is None else f"{row.low:.4g} … {row.high:.4g}"
+    span = "no number" if row.low is None or row.high is None else range_text(row.low, row.high, 4)
     could = ", ".join(row.could_be)
     rest = f"{span:<21}  {unit:<5}  {could}".rstrip()
     if len(name) <= field + 2:

@@ -18,6 +18,7 @@ from diagnosis.results.machine_words import MachineWords, machine_words
 from replay.machine.config import Machine
 from replay.machine.units import kept_unit
 from replay.mission import MissionFile
+from replay.setup.ranges import range_text
 from replay.signals.mapping import NO_CHANNEL
 from replay.signals.signal import Signal, Signals
 from replay.signals.timeline import median_period
@@ -208,7 +209,11 @@ def _two_lines(rows: Sequence[tuple[str, str, str, str, str]]) -> RenderableType
 def _row(signal: Signal, several: bool, words: MachineWords) -> tuple[str, str, str, str, str]:
     """Signal, channel with its file where there are several, recorded unit, rate, range in SI."""
     d = _signal(signal, words)
-    span = "no number" if d["min"] is None else f"{d['min']:.4g} … {d['max']:.4g} {d['unit'].replace('1', '')}"
+    span = (
+        "no number"
+        if d["min"] is None or d["max"] is None
+        else f"{range_text(d['min'], d['max'], 4)} {d['unit'].replace('1', '')}"
+    )
     how = (f"  in {PurePath(signal.source).name}" if several else "") + ("" if signal.guessed else "  (given)")
     rate = f"{d['rate_hz']:.4g}" if d["rate_hz"] else "–"
     return d["name"], d["channel"] + how, d["recorded_unit"] or d["unit"], rate, span.strip()

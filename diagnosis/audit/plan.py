@@ -21,6 +21,7 @@ from diagnosis.audit.task import key_of, sizes_of
 from diagnosis.results.document import PAPER_DEFAULTS
 from replay.errors import ConfigError
 from replay.machine.config import Machine, haulotte
+from replay.machine.questions import open_questions
 from replay.machine.toml_text import dump_machine
 
 _REPORT = ("report.json", "report.html")
@@ -127,7 +128,7 @@ def plan(missions: Iterable[MissionSource], options: AuditOptions) -> list[Plann
 
 
 def machine_notes(missions: Iterable[MissionSource], options: AuditOptions) -> tuple[str, ...]:
-    """What machine files bring about, one sentence each: those that the given one overrides, and folders that an id makes one machine.
+    """What machine files bring about, one sentence each: those that the given one overrides, folders that an id makes one machine, and drafts with open questions.
 
     Raises
     ------
@@ -136,7 +137,7 @@ def machine_notes(missions: Iterable[MissionSource], options: AuditOptions) -> t
     """
     missions = list(missions)
     if options.machine is None:
-        return () if options.machine_id else _made_one(missions)
+        return (*(() if options.machine_id else _made_one(missions)), *_open(missions))
     notes = []
     own = [
         m.machine_file
@@ -154,7 +155,21 @@ def machine_notes(missions: Iterable[MissionSource], options: AuditOptions) -> t
             "mission has its own, and a machine.toml in the topmost folder stands for the rest"
         )
     given = [replace(m, machine_file=str(options.machine)) for m in missions]
-    return (*notes, *(() if options.machine_id else _made_one(given)))
+    return (*notes, *(() if options.machine_id else _made_one(given)), *_open(given))
+
+
+def _open(missions: Sequence[MissionSource]) -> tuple[str, ...]:
+    """Drafts of machine files with open questions, a sentence."""
+    files = dict.fromkeys(
+        m.machine_file for m in missions if m.machine_file is not None and "://" not in m.machine_file
+    )
+    drafts = [name for name in files if open_questions(Path(name))]
+    if not drafts:
+        return ()
+    return (
+        f"{_few(drafts)}: drafted, with comments marked QUESTION; answer and remove them: what stands in for the right "
+        "length leaves missions not assessed",
+    )
 
 
 def _made_one(missions: Sequence[MissionSource]) -> tuple[str, ...]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from replay.machine.config import Machine
+from replay.machine.questions import QUESTION
 from replay.signals.signal import Signals
 
 
@@ -40,4 +41,4 @@ class Draft:
     def ask(self, section: str, text: str) -> None:
         """Add a question, also as a comment of a section."""
         self.questions.append(text)
-        self.notes.setdefault(section, []).append(f"QUESTION: {text}")
+        self.notes.setdefault(section, []).append(f"{QUESTION}{text}")

@@ -13,6 +13,7 @@ from replay.machine.toml_text import key_text, real_text, signal_line, source_li
 from replay.machine.units import kept_unit
 from replay.setup.all_channels import ChannelRow
 from replay.setup.draft_notes import Draft
+from replay.setup.ranges import range_text
 from replay.signals.signal import Signal
 from replay.signals.timeline import median_period
 
@@ -100,7 +101,7 @@ def _holds(signal: Signal) -> str:
     period, known = median_period(signal.stamps), signal.values[np.isfinite(signal.values)]
     rate = f"{1e9 / period:.4g} Hz" if period > 0 else "one sample"
     unit = kept_unit(signal.name, signal.origin.unit).replace("1", "")
-    return f"{rate}, {known.min():.3g} … {known.max():.3g} {unit}".rstrip() if len(known) else f"{rate}, no number"
+    return f"{rate}, {range_text(known.min(), known.max(), 3)} {unit}".rstrip() if len(known) else f"{rate}, no number"
 
 
 def _unused(machine: Machine, rows: Sequence[ChannelRow]) -> list[str]:

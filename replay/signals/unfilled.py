@@ -1,6 +1,6 @@
 """Parts of messages that a driver does not fill in, which stay from start to end while others of their topic move.
 
-They are an array of joint states that is 0 of every joint, and an odometry's pose or twist that keeps its first value. Taken for measurements they would be a position that contradicts its own speed, or a drive without effort.
+They are an array of joint states that is 0, or no number, of every joint, and an odometry's pose or twist that keeps its first value. Taken for measurements they would be a position that contradicts its own speed, or a drive without effort.
 """
 
 from __future__ import annotations
@@ -8,6 +8,8 @@ from __future__ import annotations
 import re
 from collections import defaultdict
 from collections.abc import Mapping
+
+import numpy as np
 
 from replay.arrays.blocks import blocks
 from replay.log.raw_log import Channel
@@ -47,15 +49,15 @@ def unfilled_note(array: str) -> str:
     what = (
         "the same throughout, though the machine moves"
         if body
-        else "0 of every joint throughout, though the joints move"
+        else "0 or no number of every joint throughout, though the joints move"
     )
     return f"{array}: {what}: its driver does not fill it in, and it is not used"
 
 
 def _moves(channel: Channel) -> bool:
-    """Whether a channel ever differs from 0, that of an odometry from its first value; of one that is too short that is not known."""
+    """Whether a number of a channel ever differs from 0, that of an odometry from its first one; of one that is too short that is not known."""
     values = channel.values
     if values.size < _LEAST:
         return True
     rest = values[0] if _ODOMETRY.match(channel.field) else 0
-    return any(bool((values[part] != rest).any()) for part in blocks(values.size))
+    return any(bool(((values[part] != rest) & ~np.isnan(values[part])).any()) for part in blocks(values.size))

@@ -164,12 +164,15 @@ def test_a_folder_that_cannot_be_written(result: mfhca.Diagnosis, tmp_path: Path
         result.save(tmp_path / "r", max_size_mb=0.1)
 
 
-def test_a_machine_itself_or_its_file(made: mfhca.MadeLog) -> None:
-    file = Path(__file__).parents[3] / "sample_logs" / "haulotte.toml"
+def test_a_machine_itself_or_its_file(made: mfhca.MadeLog, tmp_path: Path) -> None:
+    sample = Path(__file__).parents[3] / "sample_logs" / "haulotte.toml"
+    assert mfhca.load_machine(sample).id == "", "copied for several machines it would make them one"
+    file = tmp_path / "haulotte.toml"
+    file.write_text(sample.read_text(encoding="utf-8").replace("[machine]\n", '[machine]\nid = "lifter"\n'))
     machine = mfhca.load_machine(str(file))
     assert isinstance(machine, mfhca.Machine)
     by_object = mfhca.diagnose(made.log, machine=replace(machine, id="other"))
     by_file = mfhca.diagnose(made.log, machine=str(file))
-    assert (by_object.report["machine"]["id"], by_file.report["machine"]["id"]) == ("other", "sample")
+    assert (by_object.report["machine"]["id"], by_file.report["machine"]["id"]) == ("other", "lifter")
     assert by_file.report["machine"]["source"] == "haulotte.toml"
     assert by_object.faults.equals(by_file.faults)

@@ -63,3 +63,16 @@ def test_an_id_in_the_machine_files_of_several_folders_is_said_to_make_them_one_
     assert str(tree / "CX/machine.toml") in note
     assert machine_notes(found, AuditOptions(tree / "out", machine_id="all of one")) == ()
     assert machine_notes([m for m in found if m.name != "CX__m"], AuditOptions(tree / "out")) == ()
+
+
+def test_drafted_machine_files_with_open_questions_are_named(tree: Path) -> None:
+    found = discover([str(tree)]).missions
+    asked = AuditOptions(tree / "out")
+    draft = tree / "AX/machine.toml"
+    answered = draft.read_text()
+    draft.write_text(f"# QUESTION: is the track 1.5 m?\n{answered}")
+    (note,) = machine_notes(found, asked)
+    assert note.startswith(f"{draft}: drafted, with comments marked QUESTION; answer and remove them")
+    assert machine_notes(found, AuditOptions(tree / "out", draft))[-1] == note
+    draft.write_text(answered)
+    assert machine_notes(found, asked) == ()
