@@ -22,6 +22,10 @@ Part = tuple[str, str]
 _NOT_LOGGED = "in the log"  # ends the reason of an axle without a signal, or of which nothing is there
 _SAID_S = 0.05  # of judged driving: less is nothing
 _NOT_SAID = "no {valve} command"  # begins the reason of a model without it
+_WITHOUT, _UNCOMMANDED = (
+    "without ",
+    "without its command",
+)  # begin the reason of a speed with nothing beside it, or no command
 _NO_DRIVE = "no {valve} is seen there"  # ends the reason of a wheel whose effort is nothing from end to end
 
 
@@ -221,6 +225,12 @@ def main_state(assessment: Assessment) -> State | None:
     return best
 
 
+def beside_nothing(assessment: Assessment) -> bool:
+    """Whether a side was not judged because nothing in the log shows what it should read, rather than for too short."""
+    state = main_state(assessment)
+    return state is State.NOT_ASSESSED and main_reason(assessment, state).startswith(_WITHOUT)
+
+
 def _act(
     part: Part, assessment: Assessment, driven: float | None, limits: Limits, words: MachineWords, state: State | None
 ) -> str:
@@ -251,7 +261,9 @@ def _act(
             "lift the machine, run each drive alone at one speed for 10 s, and compare their currents; or log the command of the "
             "{valve} itself (wheel.{c}.u)"
         ),
-        Tier.TRACKING: words.fill("log wheel.{c}.u (the {valve} command) or ") + second,
+        Tier.TRACKING: f"log the commands (/cmd_vel of a ROS robot; cmd.v or wheel.{{c}}.v_ref) or {second}"
+        if reason.startswith(_UNCOMMANDED)
+        else words.fill("log wheel.{c}.u (the {valve} command) or ") + second,
     }
     if tier is Tier.RESPONSE and reason.endswith(words.fill(_NO_DRIVE)):
         return words.fill(
