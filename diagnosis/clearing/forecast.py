@@ -84,7 +84,7 @@ def _wheel_sensor(has: set[str], speeds: int, words: MachineWords, commanded: bo
         return True, "told at any time, against its second measurement", ()
     if not has & {"u", "u_applied"}:
         if speeds == 1 and not commanded:
-            return False, "not judged: no command is logged, and no other speed to compare with", ("cmd.v", *more)
+            return False, "only a speed that is frozen, wild or noisy shows: no command is logged", ("cmd.v", *more)
         if words.drive == "valve":
             more = ("wheel.<W>.u", *more)
         return (

@@ -42,6 +42,8 @@ class Reservations:
     ----------
     short : tuple[Part, ...]
         Parts of wheels that were not judged long enough.
+    beside_nothing : bool
+        Whether their sensors were not judged because nothing in the log shows what they should read.
     unexplained : tuple[Part, ...]
         Parts of wheels at which something deviates that no single fault explains.
     not_compared : bool
@@ -67,6 +69,7 @@ class Reservations:
     """
 
     short: tuple[Part, ...] = ()
+    beside_nothing: bool = False
     unexplained: tuple[Part, ...] = ()
     not_compared: bool = False
     damage: tuple[str, ...] = ()

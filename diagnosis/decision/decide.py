@@ -18,7 +18,7 @@ from diagnosis.decision.caveats import (
     smallest_loads,
 )
 from diagnosis.decision.endings import endings_of
-from diagnosis.decision.short import ToClear, exempt_axles
+from diagnosis.decision.short import ToClear, beside_nothing, exempt_axles
 from diagnosis.decision.to_clear import to_clear
 from diagnosis.decision.wording import actions_of, count_faults, join_words, misplaced_words, sentence_of
 from diagnosis.results.assessed import Cut, is_judged
@@ -46,6 +46,7 @@ _MOSTLY = 0.5
 _NO_YAW = "An offset of a steering sensor that is there from start to end, or grows slowly, does not show in this log; a yaw rate (imu.yaw_rate) would show it."
 
 _SENSORS_ALONE = "No sensor fault seen, drives not judged"
+_BESIDE_NOTHING = "No second speed to compare with"
 
 
 @dataclass(frozen=True)
@@ -230,8 +231,12 @@ def _reservations(
     """What stands against ``ready`` beside the faults."""
     wheels = [part for part in assessments if part[0] not in axles]
     own_model = _modelled(assessments) and model is not None and model.identified
+    short = tuple(p for p in wheels if not is_judged(decided_s.get(p, 0.0), driven.get(p, 0.0), limits.min_assessed))
+    sensors = [p for p in short if p[1] == Side.SENSOR]
     return Reservations(
-        short=tuple(p for p in wheels if not is_judged(decided_s.get(p, 0.0), driven.get(p, 0.0), limits.min_assessed)),
+        short=short,
+        beside_nothing=bool(sensors)
+        and all(driven.get(p, 0.0) >= limits.min_assessed and beside_nothing(assessments[p]) for p in sensors),
         unexplained=tuple(
             p
             for p, a in assessments.items()
@@ -287,6 +292,9 @@ def _without_faults(
         return Decision(Verdict.NOT_ASSESSED, _SENSORS_ALONE, seen)
     if against.short:
         who = against.words.listed(Kind.WHEEL, against.short)
+        if against.beside_nothing:
+            text = f"No fault was found, but the log has nothing that shows what {who} should do."
+            return Decision(Verdict.NOT_ASSESSED, _BESIDE_NOTHING, text)
         was = "was" if len(against.short) == 1 else "were"
         text = f"No fault was found, but {who} {was} not judged long enough to be called healthy."
         return Decision(Verdict.NOT_ASSESSED, "Not judged long enough", text)

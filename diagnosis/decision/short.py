@@ -224,6 +224,11 @@ def main_state(assessment: Assessment) -> State | None:
     return best
 
 
+def beside_nothing(assessment: Assessment) -> bool:
+    """Whether a side was not judged because nothing in the log shows what it should read, rather than for too short."""
+    return _lack(assessment, main_state(assessment)) in (Lack.SECOND, Lack.BESIDE)
+
+
 def _act(
     part: Part, assessment: Assessment, driven: float | None, limits: Limits, words: MachineWords, state: State | None
 ) -> str:
@@ -254,7 +259,9 @@ def _act(
             "lift the machine, run each drive alone at one speed for 10 s, and compare their currents; or log the command of the "
             "{valve} itself (wheel.{c}.u)"
         ),
-        Tier.TRACKING: words.fill("log wheel.{c}.u (the {valve} command) or ") + second,
+        Tier.TRACKING: f"log the commands (/cmd_vel of a ROS robot; cmd.v or wheel.{{c}}.v_ref) or {second}"
+        if lack is Lack.BESIDE
+        else words.fill("log wheel.{c}.u (the {valve} command) or ") + second,
     }
     if lack is Lack.DRIVE:
         return words.fill(

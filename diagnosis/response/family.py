@@ -8,10 +8,12 @@ from diagnosis.channels.standstill import STILL, together_idle
 from diagnosis.evidence import ACTUATOR, SENSOR, Contribution, MissionView, Part
 from diagnosis.response.assess import assess_response
 from diagnosis.response.body import body_speeds
+from diagnosis.response.by_body import beside_the_body
 from diagnosis.response.inputs import followers
 from diagnosis.response.lone import by_its_channel, not_shared
 from diagnosis.response.models import BLOCK_S
-from diagnosis.response.tracking import assess_tracking
+from diagnosis.response.sides import without_doubles
+from diagnosis.response.tracking import assess_channel, assess_tracking
 from diagnosis.results.assessment import Assessment
 from diagnosis.results.machine_event import not_following, other_yaw_rate
 from diagnosis.results.vocabulary import Tier
@@ -27,7 +29,8 @@ class ResponseEvidence:
         yaw = mission.values("imu.yaw_rate") if mission.logged("imu.yaw_rate") else None
         machine = mission.machine
         dt = mission.timeline.dt
-        data = followers(mission)
+        several = sum(mission.logged(f"wheel.{w}.v") for w in machine.wheels) > 1
+        data = {w: d for w, d in followers(mission).items() if several or np.isfinite(d.asked).any()}
         speeds = body_speeds(mission.timeline, max(1, round(BLOCK_S / dt))) if data else ()
         judged = assess_response(data, machine.geometry, yaw, machine.limits, dt, speeds)
         parts: dict[Part, Assessment] = {}
@@ -39,7 +42,7 @@ class ResponseEvidence:
 
 
 class TrackingEvidence:
-    """A drive whose effort is not logged, and of which no answer is found, by whether it follows its command, and by its channel alone."""
+    """A drive of which no answer to a command is found: by whether it follows its command at all, and by its channel alone."""
 
     tier = Tier.TRACKING
 
@@ -49,17 +52,19 @@ class TrackingEvidence:
         dt, limits = mission.timeline.dt, mission.machine.limits
         idle = together_idle(mission) | _never_moved(mission)
         yaw = mission.values("imu.yaw_rate") if mission.logged("imu.yaw_rate") else None
-        drives = {
-            w: d
-            for w, d in followers(mission).items()
-            if (w, SENSOR) not in mission.known and np.isfinite(d.asked).any()
-        }
+        drives = {w: d for w, d in followers(mission).items() if (w, SENSOR) not in mission.known}
         found = not_shared({w: by_its_channel(d, yaw, limits, dt) for w, d in drives.items()})
+        if len(mission.machine.wheels) == 1:  # of several each is another one's rival
+            speeds = body_speeds(mission.timeline, max(1, round(BLOCK_S / dt))) if drives else ()
+            found = {w: tuple(without_doubles([*found[w], *beside_the_body(d, speeds, dt)])) for w, d in drives.items()}
         for wheel, data in drives.items():
             if wheel not in mission.wheels:
                 continue
-            command = np.where(idle, 0.0, data.asked)
-            both = assess_tracking(data.y, command, dt, limits, (data.name, "its command"), found[wheel])
+            if np.isfinite(data.asked).any():
+                command = np.where(idle, 0.0, data.asked)
+                both = assess_tracking(data.y, command, dt, limits, (data.name, "its command"), found[wheel])
+            else:
+                both = assess_channel(data.y, dt, limits, data.name, found[wheel])
             parts[wheel, SENSOR], parts[wheel, ACTUATOR] = both
         return Contribution(parts)
 

@@ -80,19 +80,18 @@ def _moved_sideways(mission: MissionView) -> bool:
 
 
 def followers(mission: MissionView) -> dict[str, FollowerData]:
-    """Wheels whose sensor nothing has judged, by name: with a command, or with other wheels beside them."""
+    """Wheels whose sensor nothing has judged, by name."""
     timeline, machine = mission.timeline, mission.machine
     width = cell_of(timeline.dt)
     body: Array | None = None
     if mission.logged("cmd.v") and mission.logged("cmd.omega") and not machine.axles:
         sideways = ("cmd.lateral",) if _moved_sideways(mission) else ()
         body = np.column_stack([cells(mission.values(n), width) for n in ("cmd.v", "cmd.omega", *sideways)])
-    several = sum(mission.logged(f"wheel.{w}.v") for w in machine.wheels) > 1
     out: dict[str, FollowerData] = {}
     for w in machine.wheels:
         name, asked = f"wheel.{w}.v", mission.command(w)
         taken = mission.judged((w, SENSOR)) or mission.logged(f"wheel.{w}.v_true")
-        if taken or not mission.logged(name) or not (several or np.isfinite(asked).any()):
+        if taken or not mission.logged(name):
             continue
         own = mission.logged(f"wheel.{w}.v_ref") or body is None
         commands = cells(asked, width)[:, None] if own or body is None else body

@@ -6,7 +6,7 @@ while its command goes on. Whether the motor or its sensor stopped cannot be tol
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -118,17 +118,8 @@ def assess_tracking(
         ),
         key=lambda f: f.start,
     )
-    both = tuple(f for f in findings if len(f.side.sides) > 1)
-    drive = states.copy()
-    for f in findings:
-        states[f.start : f.stop] = CODE[State(f.mode.value)]
-        drive[f.start : f.stop] = CODE[State(f.mode.value) if f in both else State.MASKED]
-    series = (("residual", np.where(np.isfinite(v), v - reference, np.nan)), ("expected", reference))
-    pictured = Pictured.of(steps_of(findings, v.size, dt), series)
     reasons = {
         State.NOT_EXCITED: "nothing is commanded",
-        State.NO_DATA: "no samples",
-        State.MASKED: "its {wheel.sensor} is faulty",
     }
     why = (
         Reason(
@@ -138,15 +129,69 @@ def assess_tracking(
         if small
         else Reason(
             "without a {valve} command or a second measurement, only a standstill under command, and a speed that is frozen, wild or "
-            "noisy, can be detected"
+            "noisy, can be detected",
+            Lack.SECOND,
         )
     )
+    series = (("residual", np.where(np.isfinite(v), v - reference, np.nan)), ("expected", reference))
     note = f"{names[0]} against {names[1]}: lag {lag * dt:.3g} s."
-    sensor = Assessment(
-        states, reasons, tuple(findings), pictured.columns, Tier.TRACKING, (note,), closeups=pictured.closeups
+    return _sides(states, findings, reasons, why, Pictured.of(steps_of(findings, v.size, dt), series), note)
+
+
+def assess_channel(
+    v: Array, dt: float, limits: Limits, name: str, by_channel: Sequence[Finding]
+) -> tuple[Assessment, Assessment]:
+    """Judge a drive of which no command is known, by its measured speed alone: nothing of it is healthy.
+
+    Parameters
+    ----------
+    v : Array, shape (n,)
+        Measured speed [m/s]; NaN where not valid.
+    dt : float
+        Step [s].
+    limits : Limits
+        ``driving_speed``.
+    name : str
+        Of the signal, for the text.
+    by_channel : Sequence[Finding]
+        What the measured speed shows alone.
+
+    Returns
+    -------
+    tuple[Assessment, Assessment]
+        Sensor and actuator.
+    """
+    moves = np.abs(np.nan_to_num(v)) > limits.driving_speed
+    states = np.where(moves, CODE[State.NOT_ASSESSED], CODE[State.NOT_EXCITED]).astype(np.int8)
+    states[~np.isfinite(v)] = CODE[State.NO_DATA]
+    reasons = {State.NOT_EXCITED: "it stands still, and no command is recorded"}
+    why = Reason(
+        "without its command or a second measurement only a speed that is frozen, wild or noisy shows", Lack.BESIDE
     )
-    both_sides = (sensor, Assessment(drive, reasons, both, {}, Tier.TRACKING, (note,)))
-    first, second = (a.reasoned(State.NOT_ASSESSED, why) for a in both_sides)
+    pictured = Pictured.of(steps_of(by_channel, v.size, dt), ())
+    return _sides(states, by_channel, reasons, why, pictured, f"{name} has no command.")
+
+
+def _sides(
+    states: NDArray[np.int8],
+    findings: Sequence[Finding],
+    reasons: Mapping[State, str],
+    open_: Reason,
+    pictured: Pictured,
+    note: str,
+) -> tuple[Assessment, Assessment]:
+    """Sensor and actuator with what was found of them, and why the rest is `open_`; what may be either stands on both."""
+    both = tuple(f for f in findings if len(f.side.sides) > 1)
+    drive = states.copy()
+    for f in findings:
+        states[f.start : f.stop] = CODE[State(f.mode.value)]
+        drive[f.start : f.stop] = CODE[State(f.mode.value) if f in both else State.MASKED]
+    why = {**reasons, State.NO_DATA: "no samples", State.MASKED: "its {wheel.sensor} is faulty"}
+    sensor = Assessment(
+        states, why, tuple(findings), pictured.columns, Tier.TRACKING, (note,), closeups=pictured.closeups
+    )
+    both_sides = (sensor, Assessment(drive, why, both, {}, Tier.TRACKING, (note,)))
+    first, second = (a.reasoned(State.NOT_ASSESSED, open_) for a in both_sides)
     return first, second
 
 

@@ -80,6 +80,10 @@ class Lack(StrEnum):
     UNIT = "unit"
     #: The wheel seems to have no drive.
     DRIVE = "drive"
+    #: Its command is known, and nothing that measures what it measures.
+    SECOND = "second"
+    #: Neither is.
+    BESIDE = "beside"
 
 
 class Reason(NamedTuple):

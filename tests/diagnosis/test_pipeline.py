@@ -19,7 +19,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 import diagnosis
 from diagnosis.pipeline import diagnose, diagnose_mission
 from diagnosis.results.result import MissionResult
-from replay.errors import ConfigError, LogError, NotJudged
+from replay.errors import ConfigError, LogError
 from replay.export.mission import write_mission
 from replay.faults import FaultMode, FaultSpec, Side, State
 from replay.log.source_options import SignalSource
@@ -365,15 +365,29 @@ def test_wheel_that_does_not_exist(tmp_path: Path) -> None:
         diagnose([tmp_path / "absent.mcap"], PAPER)
 
 
-def test_log_in_which_nothing_can_be_judged(mission: SimulatedMission) -> None:
-    with pytest.raises(NotJudged, match="no command and no second speed"):
-        diagnose_mission(in_memory(mission, keep=r"^wheel\.FR\.v$"), PAPER)
-
-
 def test_speeds_alone_show_what_each_channel_shows_and_clear_nothing(mission: SimulatedMission) -> None:
     report = diagnose_mission(in_memory(mission, keep=r"^wheel\.\w+\.v$"), PAPER).report
     assert not report["verdict"]["cleared"]
     assert {(i["side"], i["mode"]) for i in report["intervals"]} <= {("sensor", "stuck"), ("sensor", "noisy")}
+
+
+@pytest.mark.parametrize("frozen", [False, True])
+def test_a_speed_alone_shows_what_its_channel_shows_and_the_title_says_what_is_missing(frozen: bool) -> None:
+    n = 1500
+    t = 0.02 * np.arange(n)
+    v = 0.5 + 0.3 * np.sin(0.5 * t) + 0.01 * np.random.default_rng(1).normal(size=n)
+    if frozen:
+        v[700:1000] = v[700]
+    stamps = 1_760_000_000_000_000_000 + 20_000_000 * np.arange(n, dtype=np.int64)
+    name = "wheel.D.v"
+    signals = Signals({name: Signal(name, stamps, v, SignalSource(column=name), "odometry.csv", guessed=True)}, {})
+    machine = Machine(name="odometry", id="", wheels=("D",), geometry=None)
+    report = diagnose_mission(Mission((), signals, align(signals)), machine).report
+    verdict = report["verdict"]
+    assert not verdict["cleared"]
+    assert [(i["side"], i["mode"]) for i in report["intervals"]] == ([("sensor", "stuck")] if frozen else [])
+    assert frozen or verdict["title"] == "No second speed to compare with"
+    assert any("log the commands" in row["act"] for row in verdict["to_clear"])
 
 
 def test_one_motor_rig() -> None:

@@ -63,7 +63,7 @@ def test_one_speed_without_a_command_is_not_judged() -> None:
     one = replace(haulotte(), wheels=("D",), geometry=None)
     told = forecast(["wheel.D.v"], one, MachineWords(drive="drive"))
     assert [(f.words, f.log) for f in told] == [
-        ("not judged: no command is logged, and no other speed to compare with", ("cmd.v", "wheel.<W>.v_true")),
+        ("only a speed that is frozen, wild or noisy shows: no command is logged", ("cmd.v", "wheel.<W>.v_true")),
         ("not judged: no command is logged", ("cmd.v", "wheel.<W>.effort")),
     ]
     sensor, drive = forecast(["wheel.D.v", "wheel.D.v_ref"], one, MachineWords(drive="drive"))
