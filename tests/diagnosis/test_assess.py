@@ -119,12 +119,13 @@ def test_axle_that_is_not_logged_is_no_data(base: SimulatedMission) -> None:
         assert share(one, State.NO_DATA) + share(one, State.NOT_ASSESSED) == 1.0
 
 
-def test_speed_alone_is_not_assessed(base: SimulatedMission) -> None:
+def test_speed_alone_is_judged_by_its_channel_and_never_healthy(base: SimulatedMission) -> None:
     got = assess({"wheel.FR.v": base.columns["wheel.FR.v"]})
-    sensor, actuator = got.assessments["FR", "sensor"], got.assessments["FR", "actuator"]
-    assert (sensor.tier, actuator.tier) == ("none", "none")
-    assert share(sensor, State.NOT_ASSESSED) == 1.0
-    assert "neither a drive command" in sensor.reasons[State.NOT_ASSESSED]
+    for side in ("sensor", "actuator"):
+        one = got.assessments["FR", side]
+        assert one.tier == "tracking"
+        assert share(one, State.NOT_ASSESSED) + share(one, State.NOT_EXCITED) == 1.0
+        assert one.reasons[State.NOT_ASSESSED].startswith("without its command or a second measurement")
 
 
 def test_speeds_of_several_wheels_alone_are_never_called_healthy(base: SimulatedMission) -> None:
