@@ -99,7 +99,7 @@ def short_parts(
         act = (
             _act(part, assessments[part], driven.get(part), limits, words, state)
             if kind is Kind.WHEEL
-            else _act_of_axle(part[1], state)
+            else _act_of_axle(part[1], state, _lack(assessments[part], state))
         )
         alike.setdefault((reason, act, decided_s.get(part, 0.0) < _SAID_S), []).append(part)
     out = []
@@ -277,11 +277,11 @@ def _act(
     return f"log {other}; without it, drive straight at three steady speeds for 10 s each"
 
 
-def _act_of_axle(side: str, state: State | None) -> str:
+def _act_of_axle(side: str, state: State | None, lack: Lack | None) -> str:
     """What somebody does to have a part of an axle judged."""
     if state is State.MASKED:
         return "repair the steering sensor first, then record a mission again"
-    if state is State.NOT_ASSESSED:
+    if lack is Lack.SECOND:
         second = (
             "phi_true (a second angle)" if side == Side.SENSOR else "u_applied (the second measurement of its command)"
         )

@@ -217,13 +217,14 @@ def _judged(inputs: AxleInputs, told: _Found, *, otherwise: bool) -> _Judged:
     dead = [(f.start, f.stop) for f in found[Side.SENSOR].findings if f.mode.total]
     masked = [] if inputs.redundant else dead
     columns = evidence_columns(inputs, axle, path, [f for side in _SIDES for f in found[side].findings])
-    sides = {}
+    sides, twice = {}, {Side.SENSOR: inputs.angle_redundant, Side.ACTUATOR: inputs.valve_redundant}
     for side in _SIDES:
         judged = told.valve_judged or side is Side.SENSOR
         unexplained = sum((b - a) * length for a, b in found[side].unexplained)
         sides[side] = Assessment(
             states=states_of(side, inputs, axle, path, found[side], masked, judged=judged),
             reasons=REASONS[side],
+            lacks={} if twice[side] else {State.NOT_ASSESSED: Lack.SECOND},
             findings=found[side].findings,
             columns=columns[side].columns,
             closeups=columns[side].closeups,
