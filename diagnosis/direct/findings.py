@@ -25,6 +25,7 @@ from diagnosis.estimation.simple_causes import Measured
 from diagnosis.estimation.spells import in_spells
 from diagnosis.estimation.spikes import with_spikes
 from diagnosis.estimation.viterbi import ModePath
+from diagnosis.results.alike import hardly_moves, or_shifted
 from diagnosis.results.assessment import Finding
 from diagnosis.results.fault_rows import ROWS, codes_of
 from diagnosis.results.result import Epsilon, Hypothesis
@@ -37,6 +38,7 @@ _HOLD_S = 0.1
 _LEAD_S, _TAIL_S, _CHAIN_S = 0.3, 0.1, 0.05
 _SETTLED_LAGS = 5.0  # after a fault a channel returns with its lag
 _CLEAR = 3.0  # times the noise
+_MOST_SHIFTED = 0.4  # of the span: no channel that lives is off by more
 _END, _SAME_WAY, _AT_END = (
     0.97,
     0.3,
@@ -190,7 +192,7 @@ def finding_of(run: Run, found: IdentifiedPair, limits: Limits) -> Finding | Non
         + noisy
         + open_too_far
     )
-    return Finding(
+    told = Finding(
         start=max(0, run.start - shift),
         stop=max(1, run.stop - shift),
         side=pair.side,
@@ -202,6 +204,9 @@ def finding_of(run: Run, found: IdentifiedPair, limits: Limits) -> Finding | Non
         evidence=lines,
         tier=Tier.DIRECT,
     )
+    seen = isolated.seen
+    stays = hardly_moves(seen.y[seen.use], seen.x[seen.use], _MOST_SHIFTED * pair.span)
+    return or_shifted(told) if run.row == STUCK and share is None and not too_far and stays else told
 
 
 def _unresolved(isolated: Isolated, found: IdentifiedPair) -> bool:

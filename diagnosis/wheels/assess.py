@@ -15,7 +15,7 @@ from diagnosis.results.loss import Loss
 from diagnosis.results.machine_event import MachineEvent, foreign, swinging
 from diagnosis.results.vocabulary import Tier
 from diagnosis.wheels.blocks import WheelBlocks, blocks_of, per_sample
-from diagnosis.wheels.claims import as_claimed
+from diagnosis.wheels.claims import as_claimed, or_off
 from diagnosis.wheels.effectiveness import relative_losses
 from diagnosis.wheels.filter import JointPass
 from diagnosis.wheels.filter_identification import joint_model
@@ -85,6 +85,8 @@ def assess_wheels(data: WheelsData, limits: Limits, *, gains: bool) -> WheelsJud
         claimed = as_claimed(
             doubted.found[i], limits.clear_at, measured=bool(data.measured[i]), swings=bool(swings.spans)
         )
+        expected: Array = np.asarray(per_sample(path.expected, path.width, path.y.size), dtype=np.float64)
+        claimed = or_off(claimed, path.y, expected)
         sensor, actuator = _assessments(data, i, path, claimed, gains=gains)
         out[i] = sensor, actuator if data.measured[i] else replace(actuator, loss=losses[i])
     events = ((swinging(swings.sentence),) if swings.spans else ()) + (

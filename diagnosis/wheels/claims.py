@@ -10,11 +10,17 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
+from numpy.typing import NDArray
+
+from diagnosis.results.alike import hardly_moves, or_shifted
 from diagnosis.results.assessment import Finding
 from diagnosis.results.limited import limited
 from diagnosis.results.result import Hypothesis
 from diagnosis.wheels.findings import WheelFindings
 from replay.faults import FaultMode, Side, State
+
+Array = NDArray[np.float64]
 
 _STUCK_AT_ALL, _SURELY_STUCK = 0.8, 0.95  # right were 2 of 14 below the one, 10 of 15 up to the other, 7 of 7 above
 #: Of any fault, below the first: the valve is stuck, loses, or is in no row, and the sensor is in none.
@@ -60,6 +66,26 @@ def as_claimed(found: WheelFindings, clear_at: float, *, measured: bool, swings:
             flags[f.start : f.stop] = True
     kept = [f for f in found.findings if not any(f is x for x in left_open)]
     return replace(found, findings=[_claimed(f, clear_at, measured=measured) for f in kept])
+
+
+def or_off(found: WheelFindings, y: Array, expected: Array) -> WheelFindings:
+    """Findings of a sensor that is stuck while its wheel should show one speed as what an offset makes of it as well.
+
+    Parameters
+    ----------
+    found : WheelFindings
+        Of one wheel.
+    y, expected : Array, shape (n,)
+        Measured speed, and that of a healthy wheel [m/s].
+    """
+    return replace(found, findings=[_or_off(f, y, expected) for f in found.findings])
+
+
+def _or_off(f: Finding, y: Array, expected: Array) -> Finding:
+    part = slice(f.start, f.stop)
+    use = np.isfinite(y[part]) & np.isfinite(expected[part])
+    stuck = f.side is Side.SENSOR and f.mode is FaultMode.STUCK
+    return or_shifted(f) if stuck and hardly_moves(y[part][use], expected[part][use]) else f
 
 
 def _hardly_stuck(f: Finding, *, measured: bool) -> bool:
