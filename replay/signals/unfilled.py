@@ -7,12 +7,16 @@ from __future__ import annotations
 
 import re
 from collections import defaultdict
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from replay.arrays.blocks import blocks
 from replay.log.raw_log import Channel
+
+Test = Callable[[NDArray[Any]], NDArray[np.bool_]]
 
 _ARRAY = re.compile(r"(position|velocity|effort)\[[^\[\]]+\]$")
 _ODOMETRY = re.compile(r"(pose|twist)\.\1\.\w+\.[xyzw]$")
@@ -22,7 +26,8 @@ _LEAST = 50  # samples
 def unfilled(channels: Mapping[str, Channel]) -> dict[str, str]:
     """Channels of such parts by their names, each with its topic and part in words (``/joint_states position``, ``/odom pose``).
 
-    A part of a topic in which nothing moves is none: the machine may have stood still.
+    A part of a topic in which nothing moves is none: the machine may have stood still. Nor is an array of some joints' numbers and none of the
+    others': not every joint has each of its quantities.
 
     Parameters
     ----------
@@ -37,7 +42,7 @@ def unfilled(channels: Mapping[str, Channel]) -> dict[str, str]:
             arrays[channel.topic][found[1]].append(name)
     out: dict[str, str] = {}
     for topic, kinds in arrays.items():
-        still = {k for k, names in kinds.items() if not any(_moves(channels[n]) for n in names)}
+        still = {k for k, names in kinds.items() if _unfilled([channels[n] for n in names])}
         if still and len(still) < len(kinds):
             out |= {n: f"{topic} {k}" for k in sorted(still) for n in kinds[k]}
     return out
@@ -54,10 +59,17 @@ def unfilled_note(array: str) -> str:
     return f"{array}: {what}: its driver does not fill it in, and it is not used"
 
 
-def _moves(channel: Channel) -> bool:
-    """Whether a number of a channel ever differs from 0, that of an odometry from its first one; of one that is too short that is not known."""
-    values = channel.values
-    if values.size < _LEAST:
-        return True
-    rest = values[0] if _ODOMETRY.match(channel.field) else 0
-    return any(bool(((values[part] != rest) & ~np.isnan(values[part])).any()) for part in blocks(values.size))
+def _unfilled(part: Sequence[Channel]) -> bool:
+    """Whether all channels of a part keep 0, those of an odometry their first value, or none of them has a number; not of those that are too short."""
+    if any(channel.values.size < _LEAST for channel in part):
+        return False
+    return all(_keeps(c, np.isnan) for c in part) or all(_keeps(c, _as_at_first(c)) for c in part)
+
+
+def _as_at_first(channel: Channel) -> Test:
+    rest = channel.values[0] if _ODOMETRY.match(channel.field) else 0
+    return lambda values: np.asarray(values == rest)
+
+
+def _keeps(channel: Channel, test: Test) -> bool:
+    return all(bool(test(channel.values[part]).all()) for part in blocks(channel.values.size))
