@@ -22,7 +22,15 @@ SHIFTED_SENTENCE = "What it should show hardly moved meanwhile: off by a constan
 
 
 def hardly_moves(y: Array, x: Array, most: float = np.inf) -> bool:
-    """Whether a reference moves over little beside what a channel is off by, which is no more than `most`; known values, shape (n,)."""
+    """Whether a reference moves over little beside what a channel is off by, which is no more than `most`.
+
+    Parameters
+    ----------
+    y, x : Array, shape (n,)
+        Known values of both [unit].
+    most : float
+        By how much a channel that lives may be off [unit].
+    """
     if x.size < _FEW:
         return False
     low, high = np.quantile(x, (0.05, 0.95))
