@@ -284,7 +284,7 @@ def more_caveats(mission: Mission, first_ns: int, machine: Machine) -> list[str]
         )
     if machine.questions:
         out.append(
-            f"The machine file still asks: {' '.join(machine.questions)} Answer there, and delete the lines marked QUESTION."
+            f"The machine file still asks: {' '.join(q[:1].upper() + q[1:] for q in machine.questions)} Answer there, and delete the lines marked QUESTION."
         )
     cut = (mission.timeline.start_ns - first_ns) * 1e-9
     if cut > mission.timeline.dt:
