@@ -6,15 +6,16 @@ another one of the machine is off by as much in the same moment. A loss or an of
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.channels.noise import shifted
 from diagnosis.direct.identification import IdentifiedPair
-from diagnosis.direct.low_speed import evened_off, left_open
+from diagnosis.direct.low_speed import LASTS_S, evened_off, left_open, without_lasting
 from diagnosis.results.assessment import Assessment, Finding
+from replay.arrays.sliding import largest_within
 
 Array = NDArray[np.float64]
 
@@ -22,6 +23,7 @@ _SENSORS = 3  # fewer show nothing
 _AROUND_S, _ALIKE = 0.3, 1.8  # how much sooner or later; times, by which one may be off more than another
 _STEADY_S, _STEADY, _TOP = 0.25, 0.04, 0.98  # to either side; of the speed that is reached, by this quantile
 _SLOW = 0.2  # of it
+_ALONE = 0.25  # of a deviation's power, at moments that no other sensor shares: more is the sensor's own
 _KEPT = 0.5  # of the deviation, that a fault shows at steady speed as well
 _LEAST = 0.15  # of a finding at steady speed, to tell
 
@@ -44,10 +46,26 @@ def without_shared_moments(
     top = max(float(np.quantile(np.abs(np.nan_to_num(one.samples.x)), _TOP)) for one in found.values())
     out = {}
     for w, a in assessments.items():
-        others = [x for name, x in off.items() if name != w]
-        steady = _steady(found[w], top)
-        out[w] = left_open(a, [f for f in a.findings if _shared(f, off[w], others, steady, found[w].pair.dt)])
+        dt, steady, others = found[w].pair.dt, _steady(found[w], top), [name for name in found if name != w]
+        own = {
+            name: without_lasting(off[name], assessments[name].findings, dt) for name in others if name in assessments
+        }
+        shared = []
+        for f in a.findings:
+            faulty = [name for name in own if _lasts_beside(f, assessments[name].findings, dt)]
+            beside = [
+                own[name] if faulty == [name] else off[name] for name in others
+            ]  # a fault of one other is no habit
+            if _shared(f, off[w], beside, steady, dt):
+                shared.append(f)
+        out[w] = left_open(a, shared)
     return out
+
+
+def _lasts_beside(finding: Finding, others: Sequence[Finding], dt: float) -> bool:
+    """Whether a lasting finding of another sensor overlaps one."""
+    lasting = (f for f in others if (f.stop - f.start) * dt > LASTS_S)
+    return any(f.start < finding.stop and f.stop > finding.start for f in lasting)
 
 
 def _steady(one: IdentifiedPair, top: float) -> NDArray[np.bool_]:
@@ -59,14 +77,20 @@ def _steady(one: IdentifiedPair, top: float) -> NDArray[np.bool_]:
 
 
 def _shared(finding: Finding, own: Array, others: list[Array], steady: NDArray[np.bool_], dt: float) -> bool:
-    """Whether another sensor is off by about as much, and the deviation is none of steady speed."""
+    """Whether another sensor is off by about as much at its moments, and the deviation is none of steady speed."""
     part = slice(finding.start, finding.stop)
     around = round(_AROUND_S / dt)
     near = slice(max(0, finding.start - around), finding.stop + around)
-    largest = float(own[part].max(initial=0.0))
-    if not any(float(x[near].max(initial=0.0)) * _ALIKE >= largest for x in others):
+    if not any(_alike(own[part], x[near], finding.start - near.start, around) for x in others):
         return False
     calm = steady[part]
     if float(np.mean(calm)) < _LEAST:
         return True
     return float(np.mean(own[part][calm] ** 2)) < _KEPT**2 * float(np.mean(own[part] ** 2))
+
+
+def _alike(own: Array, other: Array, before: int, around: int) -> bool:
+    """Whether another sensor, which begins `before` earlier, is off by as much within `around` steps of nearly all of a deviation."""
+    beside = largest_within(other, around, around)[before : before + own.size]
+    alone = own[: beside.size] > _ALIKE * beside
+    return float(np.sum(own[: beside.size][alone] ** 2)) < _ALONE * float(np.sum(own**2))

@@ -26,6 +26,7 @@ _SENSORS, _PASSAGES = 3, 8  # fewer show no habit
 _USUAL, _BEYOND = 0.7, 1.7  # quantile of passages, and times it
 _SLOWEST = 0.25  # of low speed, that a passage reaches
 _MOSTLY = 0.9  # of a finding at low speed
+LASTS_S = 3.0  # longer than any passage through low speed
 
 
 def without_low_speed_habit(
@@ -45,7 +46,8 @@ def without_low_speed_habit(
     speeds = {w: np.abs(np.nan_to_num(one.samples.x)) for w, one in found.items()}
     low = _LOW * max(float(np.quantile(x, _TOP)) for x in speeds.values())
     off = {w: evened_off(one) for w, one in found.items()}
-    peaks = np.concatenate([_peaks(off[w], speeds[w], low) for w in found])
+    usual = {w: without_lasting(off[w], assessments[w].findings, found[w].pair.dt) for w in found}
+    peaks = np.concatenate([_peaks(usual[w], speeds[w], low) for w in found])
     if peaks.size < _PASSAGES:
         return dict(assessments)
     limit = _BEYOND * float(np.quantile(peaks, _USUAL))
@@ -62,6 +64,15 @@ def evened_off(one: IdentifiedPair) -> Array:
     count = moving_sum(known, width)
     total = moving_sum(np.where(known, one.samples.y - one.samples.x, 0.0), width)
     return np.asarray(np.abs(total) / np.maximum(count, 1))
+
+
+def without_lasting(off: Array, findings: Sequence[Finding], dt: float) -> Array:
+    """Deviations [unit], shape (n,), without those of findings that last longer than a passage: a fault makes no habit. `dt` in s."""
+    out = off.copy()
+    for f in findings:
+        if (f.stop - f.start) * dt > LASTS_S:
+            out[f.start : f.stop] = 0.0
+    return out
 
 
 def _peaks(off: Array, speed: Array, low: float) -> Array:

@@ -59,3 +59,18 @@ def test_what_is_off_at_steady_speed_stays_though_all_are() -> None:
 
 def test_two_sensors_show_no_habit() -> None:
     assert kept({w: sensor(late_s=0.1) for w in WHEELS[:2]}, TURN)
+
+
+def test_a_fault_of_another_sensor_at_another_moment_is_no_habit() -> None:
+    """Its largest deviation is as large, but not when this one's is."""
+    pairs = {w: sensor(late_s=0.1 if w == "FR" else 0.0) for w in WHEELS}
+    pairs["RL"].samples.y[1100:1150] += 0.5
+    assert kept(pairs, (960, 1200))
+
+
+def test_a_lasting_fault_of_one_other_sensor_is_no_habit() -> None:
+    pairs = {w: sensor(late_s=0.1 if w == "FR" else 0.0) for w in WHEELS}
+    pairs["RL"].samples.y[600:1400] *= 0.3
+    told = without_shared_moments(pairs, {"FR": assessment(*TURN), "RL": assessment(600, 1400)})
+    assert told["FR"].findings
+    assert told["RL"].findings
