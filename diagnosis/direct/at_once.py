@@ -6,14 +6,14 @@ another one of the machine is off by as much in the same moment. A loss or an of
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.channels.noise import shifted
 from diagnosis.direct.identification import IdentifiedPair
-from diagnosis.direct.low_speed import LASTS_S, evened_off, left_open, without_lasting
+from diagnosis.direct.low_speed import evened_off, in_lasting, left_open
 from diagnosis.results.assessment import Assessment, Finding
 from replay.arrays.sliding import largest_within
 
@@ -44,28 +44,24 @@ def without_shared_moments(
         return dict(assessments)
     off = {w: evened_off(one) for w, one in found.items()}
     top = max(float(np.quantile(np.abs(np.nan_to_num(one.samples.x)), _TOP)) for one in found.values())
+    faulty = {w: in_lasting(a.findings, off[w].size, found[w].pair.dt) for w, a in assessments.items()}
     out = {}
     for w, a in assessments.items():
-        dt, steady, others = found[w].pair.dt, _steady(found[w], top), [name for name in found if name != w]
-        own = {
-            name: without_lasting(off[name], assessments[name].findings, dt) for name in others if name in assessments
-        }
-        shared = []
-        for f in a.findings:
-            faulty = [name for name in own if _lasts_beside(f, assessments[name].findings, dt)]
-            beside = [
-                own[name] if faulty == [name] else off[name] for name in others
-            ]  # a fault of one other is no habit
-            if _shared(f, off[w], beside, steady, dt):
-                shared.append(f)
+        steady, others = _steady(found[w], top), [name for name in found if name != w]
+        shared = [
+            f
+            for f in a.findings
+            if _shared(f, off[w], _beside(f, {x: off[x] for x in others}, faulty), steady, found[w].pair.dt)
+        ]
         out[w] = left_open(a, shared)
     return out
 
 
-def _lasts_beside(finding: Finding, others: Sequence[Finding], dt: float) -> bool:
-    """Whether a lasting finding of another sensor overlaps one."""
-    lasting = (f for f in others if (f.stop - f.start) * dt > LASTS_S)
-    return any(f.start < finding.stop and f.stop > finding.start for f in lasting)
+def _beside(finding: Finding, off: Mapping[str, Array], faulty: Mapping[str, NDArray[np.bool_]]) -> list[Array]:
+    """Deviations of other sensors beside a finding; a lasting fault of one of them alone is no habit."""
+    part = slice(finding.start, finding.stop)
+    lasting = [name for name in off if name in faulty and faulty[name][part].any()]
+    return [np.where(faulty[name], 0.0, x) if lasting == [name] else x for name, x in off.items()]
 
 
 def _steady(one: IdentifiedPair, top: float) -> NDArray[np.bool_]:

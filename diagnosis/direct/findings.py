@@ -39,11 +39,7 @@ _LEAD_S, _TAIL_S, _CHAIN_S = 0.3, 0.1, 0.05
 _SETTLED_LAGS = 5.0  # after a fault a channel returns with its lag
 _CLEAR = 3.0  # times the noise
 _MOST_SHIFTED = 0.4  # of the span: no channel that lives is off by more
-_END, _SAME_WAY, _AT_END = (
-    0.97,
-    0.3,
-    0.45,
-)  # of the span, there and commanded; of a valve that is stuck there: that it opens too far
+_END, _SAME_WAY = 0.97, 0.3  # of the span: where a valve stands, and at least what it is told, the same way
 _HYSTERESIS, _RESTS_S = 0.025, 10.0  # of the span, off a healthy valve's command, for no longer than this
 _MIDDLE, _MOSTLY = 0.04, 0.98  # of the span: about its middle a valve opens nothing; of the time
 _OPEN_S, _DOUBT, _FAR_OFF = 0.5, 0.05, 0.2  # s; probability that counts for nothing; of the span
@@ -114,7 +110,8 @@ def find_faults(path: ModePath, found: IdentifiedPair, limits: Limits) -> Faults
     measured = _measured(found, limits)
     joined = with_one_cause(with_spikes(beside, measured), measured)
     spells = [part for f in joined for part in in_spells(as_changing_gain(f, measured), measured)]
-    return FaultsFound([part for f in spells for part in told_by_itself(f, measured)], timing, below)
+    kept = [told_by_itself(f, measured) for f in spells]
+    return FaultsFound([part for parts in kept for part in parts], timing, below + sum(not parts for parts in kept))
 
 
 def _left_open(run: Run, found: IdentifiedPair, limits: Limits) -> bool:
@@ -177,21 +174,13 @@ def finding_of(run: Run, found: IdentifiedPair, limits: Limits) -> Finding | Non
             epsilon = Epsilon(1.0, 1.0 - share, 1.0)  # all, if it is stuck; else what is not left
         if p[STUCK] > _DOUBT:
             lines += (alike_sentence(found),)
-    too_far = 0.0
-    if run.row == STUCK and _at_its_end(isolated, found):
-        too_far = _AT_END * float(p[STUCK])
-        p[STUCK] -= too_far
-        lines += (END_SENTENCE,)
     shift = max(0, round(found.lag)) if pair.side is Side.ACTUATOR else 0
     named = {run.row: mode.value}  # a gain beyond the table has the probability of the row that it was found by
     noisy = [Hypothesis(pair.side.value, ROWS[run.row].value, within * float(p[run.row]))] if outside else []
     p[run.row] *= 1.0 - within
-    open_too_far = [Hypothesis(pair.side.value, FaultMode.OUTSIDE_TABLE.value, too_far)] if too_far else []
-    hypotheses = (
-        [Hypothesis(pair.side.value, named.get(row, ROWS[row].value), float(p[row])) for row in codes_of(pair.side)]
-        + noisy
-        + open_too_far
-    )
+    hypotheses = [
+        Hypothesis(pair.side.value, named.get(row, ROWS[row].value), float(p[row])) for row in codes_of(pair.side)
+    ] + noisy
     told = Finding(
         start=max(0, run.start - shift),
         stop=max(1, run.stop - shift),
@@ -204,9 +193,13 @@ def finding_of(run: Run, found: IdentifiedPair, limits: Limits) -> Finding | Non
         evidence=lines,
         tier=Tier.DIRECT,
     )
+    if run.row != STUCK:
+        return told
+    if _at_its_end(isolated, found):
+        return or_shifted(told, END_SENTENCE)
     seen = isolated.seen
     stays = hardly_moves(seen.y[seen.use], seen.x[seen.use], _MOST_SHIFTED * pair.span)
-    return or_shifted(told) if run.row == STUCK and share is None and not too_far and stays else told
+    return or_shifted(told) if share is None and stays else told
 
 
 def _unresolved(isolated: Isolated, found: IdentifiedPair) -> bool:

@@ -26,7 +26,7 @@ _SENSORS, _PASSAGES = 3, 8  # fewer show no habit
 _USUAL, _BEYOND = 0.7, 1.7  # quantile of passages, and times it
 _SLOWEST = 0.25  # of low speed, that a passage reaches
 _MOSTLY = 0.9  # of a finding at low speed
-LASTS_S = 3.0  # longer than any passage through low speed
+_LASTS_S = 3.0  # longer than any passage through low speed
 
 
 def without_low_speed_habit(
@@ -46,8 +46,8 @@ def without_low_speed_habit(
     speeds = {w: np.abs(np.nan_to_num(one.samples.x)) for w, one in found.items()}
     low = _LOW * max(float(np.quantile(x, _TOP)) for x in speeds.values())
     off = {w: evened_off(one) for w, one in found.items()}
-    usual = {w: without_lasting(off[w], assessments[w].findings, found[w].pair.dt) for w in found}
-    peaks = np.concatenate([_peaks(usual[w], speeds[w], low) for w in found])
+    sound = {w: ~in_lasting(assessments[w].findings, off[w].size, found[w].pair.dt) for w in found}
+    peaks = np.concatenate([_peaks(off[w], speeds[w], sound[w], low) for w in found])
     if peaks.size < _PASSAGES:
         return dict(assessments)
     limit = _BEYOND * float(np.quantile(peaks, _USUAL))
@@ -66,20 +66,20 @@ def evened_off(one: IdentifiedPair) -> Array:
     return np.asarray(np.abs(total) / np.maximum(count, 1))
 
 
-def without_lasting(off: Array, findings: Sequence[Finding], dt: float) -> Array:
-    """Deviations [unit], shape (n,), without those of findings that last longer than a passage: a fault makes no habit. `dt` in s."""
-    out = off.copy()
+def in_lasting(findings: Sequence[Finding], size: int, dt: float) -> NDArray[np.bool_]:
+    """Steps, shape (size,), in findings that last longer than a passage, of which a fault makes no habit; `dt` in s."""
+    out = np.zeros(size, np.bool_)
     for f in findings:
-        if (f.stop - f.start) * dt > LASTS_S:
-            out[f.start : f.stop] = 0.0
+        if (f.stop - f.start) * dt > _LASTS_S:
+            out[f.start : f.stop] = True
     return out
 
 
-def _peaks(off: Array, speed: Array, low: float) -> Array:
-    """Largest deviation of each passage that comes near standstill, and begins or ends with motion."""
+def _peaks(off: Array, speed: Array, sound: NDArray[np.bool_], low: float) -> Array:
+    """Largest deviation of each passage that comes near standstill, and begins or ends with motion; of sound ones alone."""
     edge = np.flatnonzero(np.diff(np.r_[False, speed < low, False].astype(np.int8)))
     spans = [(a, b) for a, b in zip(edge[::2], edge[1::2], strict=True) if a > 0 or b < speed.size]
-    return np.array([off[a:b].max() for a, b in spans if speed[a:b].min() < _SLOWEST * low])
+    return np.array([off[a:b].max() for a, b in spans if speed[a:b].min() < _SLOWEST * low and sound[a:b].all()])
 
 
 def _is_habit(finding: Finding, off: Array, low: NDArray[np.bool_], limit: float) -> bool:

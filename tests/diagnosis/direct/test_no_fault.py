@@ -189,6 +189,6 @@ def test_a_valve_that_stands_at_its_end_while_less_is_asked_for_may_open_too_far
     p = {h.mode: h.p for h in finding.hypotheses}
     assert finding.mode is FaultMode.STUCK
     assert (p["stuck"] > 0.9) is sure
-    assert p.get("outside_table", 0.0) == pytest.approx(0.0 if sure else 0.45, abs=0.02)
+    assert p.get("outside_table", 0.0) == pytest.approx(0.0 if sure else 0.4, abs=0.02)
     assert finding.start * DT == pytest.approx(20.0, abs=0.1)
     assert any("at its end" in line for line in finding.evidence) is not sure

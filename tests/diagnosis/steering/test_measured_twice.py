@@ -22,6 +22,21 @@ COMMAND = 0.5 * np.sin(np.arange(SIZE) * DT * 3.0)
 NOISE = 0.002 * np.random.default_rng(5).standard_normal(SIZE)
 
 
+def axle(values: dict[str, np.ndarray], dt: float) -> AxleInputs:
+    """An axle whose valve's command and opening are known, step by step, and nothing else."""
+    fresh = {"steer.front.u_applied": np.ones(values["u"].size, np.bool_)}
+    inputs = SimpleNamespace(
+        angle_redundant=False,
+        valve_redundant=True,
+        values=values.__getitem__,
+        channel=lambda leaf: f"steer.front.{leaf}",
+        timeline=SimpleNamespace(dt=dt, fresh=fresh),
+        blocks=None,
+        command=values["u"],
+    )
+    return cast(AxleInputs, inputs)
+
+
 def told(
     opening: np.ndarray,
     mode: FaultMode = FaultMode.STUCK,
@@ -34,18 +49,10 @@ def told(
         "u": command,
         "u_applied": np.where((np.arange(SIZE) >= SPAN[0]) & (np.arange(SIZE) < SPAN[1]), opening, before) + NOISE,
     }
-    inputs = SimpleNamespace(
-        angle_redundant=False,
-        valve_redundant=True,
-        values=values.__getitem__,
-        channel=lambda leaf: f"steer.front.{leaf}",
-        timeline=SimpleNamespace(dt=DT, fresh={"steer.front.u_applied": np.ones(SIZE, np.bool_)}),
-        blocks=None,
-        command=command,
-    )
+    inputs = axle(values, DT)
     row = (Hypothesis(Side.ACTUATOR.value, mode.value, 1.0),)
     finding = Finding(*SPAN, Side.ACTUATOR, mode, 1.0, row, Epsilon(1.0, 1.0, 1.0), None, (), Tier.MODEL)
-    return of_one_cause(Side.ACTUATOR, SideFindings((finding,), ()), cast(AxleInputs, inputs), 0.05)
+    return of_one_cause(Side.ACTUATOR, SideFindings((finding,), ()), inputs, 0.05)
 
 
 @pytest.mark.parametrize(

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
-from typing import cast
-
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -13,10 +10,10 @@ from diagnosis.results.assessment import Finding
 from diagnosis.results.result import Hypothesis
 from diagnosis.results.vocabulary import Tier
 from diagnosis.steering.findings import SideFindings
-from diagnosis.steering.inputs import AxleInputs
 from diagnosis.steering.measured_twice import of_one_cause
 from diagnosis.steering.openings import latest, opens_as_told
 from replay.faults import FaultMode, Side
+from tests.diagnosis.steering.test_measured_twice import axle
 
 Array = NDArray[np.float64]
 DT, SIZE = 0.02, 3000
@@ -67,16 +64,7 @@ def test_a_command_that_switches_to_and_fro_shows_nothing() -> None:
 def found(opening: Array, *findings: Finding) -> SideFindings:
     """What is said of a valve whose axle's model says `findings`."""
     values = {"u": COMMAND, "u_applied": opening + 0.002 * np.random.default_rng(1).standard_normal(SIZE)}
-    inputs = SimpleNamespace(
-        angle_redundant=False,
-        valve_redundant=True,
-        values=values.__getitem__,
-        channel=lambda leaf: f"steer.front.{leaf}",
-        timeline=SimpleNamespace(dt=DT, fresh={"steer.front.u_applied": np.ones(SIZE, np.bool_)}),
-        blocks=None,
-        command=COMMAND,
-    )
-    return of_one_cause(Side.ACTUATOR, SideFindings(findings, ()), cast(AxleInputs, inputs), 0.02)
+    return of_one_cause(Side.ACTUATOR, SideFindings(findings, ()), axle(values, DT), 0.02)
 
 
 def test_an_opening_that_is_off_its_command_is_told_where_the_model_says_nothing() -> None:
