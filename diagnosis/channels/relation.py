@@ -7,6 +7,7 @@ misfit by Cauchy's loss of scale s, mean ln(1 + (misfit/s)²), where the referen
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Sequence
 from typing import NamedTuple
 
@@ -31,7 +32,7 @@ _ROUNDS, _FINE = 5, (0.8, 0.9, 0.95, 1.05, 1.1, 1.25)
 _USUAL, _LARGE = 0.35, 3.0
 #: Quantile of the smallest misfits, and times that: of noise it is a little more than the usual one.
 _FEW, _OF_FEW = 0.1, 4.0
-_MOSTLY = 0.5  # of the places
+_MOSTLY, _REPEATS = 0.5, 10  # of the places; of an estimate of the scale
 _SIBLINGS, _ALIKE, _SCALES = 3, 0.6, 0.01  # channels of one kind; steps, and share, by which they may differ
 _UNLIKE = 1.6  # times the usual play or lag of valves of one kind
 _LARGEST_SCALE = 0.02  # what differs by more is a loss of effectiveness
@@ -302,7 +303,8 @@ def _gain(places: _Places, relation: Relation, dt: float) -> float:
     """
     x, y = _at(places, relation, dt), places.y
     large = np.abs(x) >= np.nanmedian(np.abs(x))
-    gain, near = _scale_of(x[large], y[large], _usual_of_few)
+    white = _white(y - x)
+    gain, near = _scale_of(x[large], y[large], lambda misfit: _usual_of_few(misfit, white))
     if np.mean(np.abs(y - gain * x) <= near) >= _MOSTLY:
         gain, _ = _scale_of(x, y, lambda misfit: float(np.nanquantile(misfit, _USUAL)))
     return gain if abs(gain - 1.0) < 0.99 * _LARGEST_SCALE else 1.0
@@ -311,7 +313,7 @@ def _gain(places: _Places, relation: Relation, dt: float) -> float:
 def _scale_of(x: Array, y: Array, usual: Callable[[Array], float]) -> tuple[float, float]:
     """Scale of y against x, of the places that it explains, and by how much these may be off it."""
     gain, near = 1.0, 0.0
-    for _ in range(5):
+    for _ in range(_REPEATS):
         misfit = np.abs(y - gain * x)
         near = _LARGE * usual(misfit)
         good = misfit <= near
@@ -322,8 +324,19 @@ def _scale_of(x: Array, y: Array, usual: Callable[[Array], float]) -> tuple[floa
     return gain, near
 
 
-def _usual_of_few(misfit: Array) -> float:
-    """Usual size of a misfit (n,) by its smallest ones: a fault of most places leaves those alone."""
+def _usual_of_few(misfit: Array, white: float) -> float:
+    """Usual size of a misfit (n,) by its smallest ones: a fault of most places leaves those alone.
+
+    Of these, what differs from place to place by itself is enough, `white` [unit of the misfit].
+    """
     few = misfit[misfit > 0.0]
     usual = float(np.nanquantile(misfit, _USUAL))
-    return min(usual, _OF_FEW * float(np.nanquantile(few, _FEW))) if few.size else usual
+    if not few.size:
+        return usual
+    least = float(np.nanquantile(few, _FEW))
+    return min(usual, _OF_FEW * least, max(least, white))
+
+
+def _white(misfit: Array) -> float:
+    """Usual size, as a median, of what a misfit (n,) has from place to place: a fault that lasts moves two neighbours alike."""
+    return float(np.nanmedian(np.abs(np.diff(misfit)))) / math.sqrt(2.0) if misfit.size > 1 else 0.0

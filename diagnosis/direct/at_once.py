@@ -44,24 +44,37 @@ def without_shared_moments(
         return dict(assessments)
     off = {w: evened_off(one) for w, one in found.items()}
     top = max(float(np.quantile(np.abs(np.nan_to_num(one.samples.x)), _TOP)) for one in found.values())
-    faulty = {w: in_lasting(a.findings, off[w].size, found[w].pair.dt) for w, a in assessments.items()}
+    steady = {w: _steady(one, top) for w, one in found.items()}
+    own, lasting = {}, {}
+    for w, one in found.items():
+        findings = assessments[w].findings if w in assessments else ()
+        own[w] = in_lasting([f for f in findings if _by_itself(f, off[w], steady[w])], off[w].size, one.pair.dt)
+        lasting[w] = in_lasting(findings, off[w].size, one.pair.dt) & ~own[w]
+    habit = {w: np.where(own[w], 0.0, x) for w, x in off.items()}
     out = {}
     for w, a in assessments.items():
-        steady, others = _steady(found[w], top), [name for name in found if name != w]
-        shared = [
-            f
-            for f in a.findings
-            if _shared(f, off[w], _beside(f, {x: off[x] for x in others}, faulty), steady, found[w].pair.dt)
-        ]
+        others = {name: x for name, x in habit.items() if name != w}
+        shared = [f for f in a.findings if _shared(f, off[w], _beside(f, others, lasting), steady[w], found[w].pair.dt)]
         out[w] = left_open(a, shared)
     return out
 
 
-def _beside(finding: Finding, off: Mapping[str, Array], faulty: Mapping[str, NDArray[np.bool_]]) -> list[Array]:
-    """Deviations of other sensors beside a finding; a lasting fault of one of them alone is no habit."""
+def _by_itself(finding: Finding, off: Array, steady: NDArray[np.bool_]) -> bool:
+    """Whether a finding is a fault whatever the speed does: nothing is left of the signal, or it is as far off at steady speed."""
     part = slice(finding.start, finding.stop)
-    lasting = [name for name in off if name in faulty and faulty[name][part].any()]
-    return [np.where(faulty[name], 0.0, x) if lasting == [name] else x for name, x in off.items()]
+    return finding.mode.total or (float(np.mean(steady[part])) >= _LEAST and not _unsteady(off[part], steady[part]))
+
+
+def _unsteady(off: Array, steady: NDArray[np.bool_]) -> bool:
+    """Whether a deviation is hardly one of steady speed."""
+    return float(np.mean(off[steady] ** 2)) < _KEPT**2 * float(np.mean(off**2))
+
+
+def _beside(finding: Finding, off: Mapping[str, Array], lasting: Mapping[str, NDArray[np.bool_]]) -> list[Array]:
+    """Deviations of other sensors beside a finding; a lasting one of one of them alone is no habit."""
+    part = slice(finding.start, finding.stop)
+    faulty = [name for name in off if lasting[name][part].any()]
+    return [np.where(lasting[name], 0.0, x) if faulty == [name] else x for name, x in off.items()]
 
 
 def _steady(one: IdentifiedPair, top: float) -> NDArray[np.bool_]:
@@ -82,7 +95,7 @@ def _shared(finding: Finding, own: Array, others: list[Array], steady: NDArray[n
     calm = steady[part]
     if float(np.mean(calm)) < _LEAST:
         return True
-    return float(np.mean(own[part][calm] ** 2)) < _KEPT**2 * float(np.mean(own[part] ** 2))
+    return _unsteady(own[part], calm)
 
 
 def _alike(own: Array, other: Array, before: int, around: int) -> bool:

@@ -27,6 +27,7 @@ _BRIDGE_S, _APART_S = 5.0, 30.0
 _BRIEF_S = 0.1
 _NEAR = 20  # samples between runs that follow each other
 _ONE_GAIN = 0.1  # by which gains of one fault may differ
+_ALL_BUT = 0.03  # by which a gain is off that is all but a healthy one
 _NEAR_MEAN = 0.25  # of its mean: standard deviation of a reference that hardly changes
 _ABOUT = 0.05  # of what a gain leaves: as near to it a channel may rest
 _ZERO = 3.0  # times the noise: no reading
@@ -55,7 +56,12 @@ def fault_runs(path: ModePath, samples: Samples, model: ModeModel, dt: float, sh
     """
     runs = absorb_short(runs_of(path), shortest)
     runs = join_noisy(runs)
-    runs = merge_equal(runs, max(2, round(0.02 / dt)), VARYING_ROWS + UNSATURATED_ROWS)
+    runs = merge_equal(
+        runs,
+        max(2, round(0.02 / dt)),
+        VARYING_ROWS + UNSATURATED_ROWS,
+        lambda first, second: _lost_in_one(first, second, samples, model),
+    )
     evidence = _Evidence(samples, model)
     runs = _bridged(_renamed([r for r in runs if r.row != HEALTHY], evidence), evidence)
     runs = _bridged(_resting(runs, samples, model, play), evidence)
@@ -193,19 +199,35 @@ def _interrupted(first: Run, middle: Run, last: Run, evidence: _Evidence) -> boo
     return (brief and _of_one_gain(first, last, evidence.samples, evidence.model)) or _one_fault(first, last, evidence)
 
 
+def _lost_in_one(first: Run, second: Run, samples: Samples, model: ModeModel) -> bool:
+    """Whether a gain is all but a healthy one in one of two runs and none in the other: a path may go from the one to the other in one row."""
+    if first.row != second.row or first.row not in SCALED_ROWS:
+        return False
+    off = sorted(abs(1.0 - gain) for gain in _gains_beside(first, second, samples, model))
+    return off[0] < _ALL_BUT and off[1] > _ONE_GAIN
+
+
 def _of_one_gain(first: Run, last: Run, samples: Samples, model: ModeModel) -> bool:
     """Whether two runs may be of one gain; what is no loss of gain has none that differs."""
     if first.row not in SCALED_ROWS:
         return True
-    reach, gains = round(_BRIDGE_S / model.dt), []
-    for run in (
-        Run(max(first.start, first.stop - reach), first.stop, first.row),
-        Run(last.start, min(last.stop, last.start + reach), last.row),
-    ):
-        y, x, _ = _pairs(run, samples, model)
+    before, after = _gains_beside(first, last, samples, model)
+    return abs(before - after) <= _ONE_GAIN
+
+
+def _gains_beside(first: Run, last: Run, samples: Samples, model: ModeModel) -> tuple[float, float]:
+    """Gain at the end of one run and at the beginning of another."""
+    reach = round(_BRIDGE_S / model.dt)
+
+    def gain(start: int, stop: int) -> float:
+        y, x, _ = _pairs(Run(start, stop, first.row), samples, model)
         power = float(x @ x)
-        gains.append(float(x @ y) / power if power > 0.0 else 1.0)
-    return abs(gains[0] - gains[1]) <= _ONE_GAIN
+        return float(x @ y) / power if power > 0.0 else 1.0
+
+    return (
+        gain(max(first.start, first.stop - reach), first.stop),
+        gain(last.start, min(last.stop, last.start + reach)),
+    )
 
 
 def _one_fault(first: Run, second: Run, evidence: _Evidence) -> bool:

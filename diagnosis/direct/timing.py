@@ -35,18 +35,20 @@ _FIRST_EDGE_S = 0.02  # of driving at the largest plausible speed: as far may be
 _ECHO = 2.0  # times a command's jumps: as large may be those of its answer
 _BRIEF_S = 0.5  # a shorter deviation may be of timing, or of a wheel that stops or starts
 _OF_LAG = 0.4  # of what a lag does: as far off is its model
+_FEW_READINGS, _SETTLED_LAGS = 3, 3.0  # in which a valve answers; and of its lags
+_READING, _LATE = 1, 0.3  # readings to either side; of a deviation, that lies beyond them all
 _FLIPS = 25  # samples in a row on one side of a command that switches to and fro between samples
 
 
 def timing_explains(found: IdentifiedPair, run: Run, mode: FaultMode) -> bool:
     """Whether a deviation may be nothing but a delay between y and its reference, or its rounding.
 
-    Shorter than a spool sensor's delay; or an overshoot that settles; or noise of an opening that is no more than its command
-    changes by from reading to reading; or, where a log is too slow for its commands: what changes from sample to
+    Shorter than a spool sensor's delay; or an overshoot that settles; or noise of an opening that stays within what is
+    expected a reading sooner and later; or, where a log is too slow for its commands: what changes from sample to
     sample is as large, or y is x with its sign at other moments, or a constant y is as far off as a healthy one may be. For a
     speed: shorter than half a second and no more than 10 ms, or one and a half samples, of the reference's slope, or as short near rest, or a reading that rests beside a
     reference that hardly moves, no longer than its noise allows. Whatever the rate, the answer to a command of which
-    nothing is left but jumps between samples depends on the valve's lag.
+    nothing is left but jumps between samples depends on the valve's lag, unless it rests beside what the command holds for a few readings.
     """
     pair, part = found.pair, slice(run.start, run.stop)
     x = found.samples.x
@@ -64,10 +66,11 @@ def timing_explains(found: IdentifiedPair, run: Run, mode: FaultMode) -> bool:
         return mode.varying and ((seconds < _BRIEF_S and deviation < moves) or _lags(found, run, deviation))
     if seconds <= _SPOOL_DELAY_S or (mode.varying and _settles(found, run)):
         return True
-    if mode.varying and deviation <= _changes(found, run):
+    if mode.varying and _read_late(found, run, deviation, _READING):
         return True
     jumps = _sudden(found, pair.x, run)
-    if not mode.total and deviation < 2 * jumps and jumps > _JUMPY * float(np.sqrt(np.nanmean(ref**2))):
+    jumpy = deviation < 2 * jumps and jumps > _JUMPY * float(np.sqrt(np.nanmean(ref**2)))
+    if not mode.total and jumpy and _read_late(found, run, deviation, _settled(found)):
         return True
     if not found.coarse:
         return False
@@ -115,10 +118,20 @@ def _readings(found: IdentifiedPair, run: Run) -> NDArray[np.intp]:
     return at[np.searchsorted(at, run.start) : np.searchsorted(at, run.stop)]
 
 
-def _changes(found: IdentifiedPair, run: Run) -> float:
-    """Root mean square of what the command changes by from reading to reading in a run: as far off is one read a reading late."""
-    values = found.pair.x[_readings(found, run)]
-    return float(np.sqrt(np.nanmean(np.diff(values) ** 2))) if np.isfinite(np.diff(values)).any() else 0.0
+def _settled(found: IdentifiedPair) -> int:
+    """Readings after which a valve has done what it was told, whatever its lag is to a few of them."""
+    return _FEW_READINGS + math.ceil(_SETTLED_LAGS * found.relation.lag / found.pair.dt)
+
+
+def _read_late(found: IdentifiedPair, run: Run, deviation: float, reach: int) -> bool:
+    """Whether nearly all of a deviation, root mean square [unit], lies within what is expected `reach` readings sooner and later."""
+    at = _readings(found, run)
+    if at.size < 2 * reach + 1:
+        return True
+    y, x = found.pair.y[at], found.samples.x[at]
+    low, high = smallest_within(x, reach, reach), largest_within(x, reach, reach)
+    beyond = np.maximum(y - high, low - y).clip(0.0)
+    return bool(np.isfinite(beyond).any() and float(np.sqrt(np.nanmean(beyond**2))) <= _LATE * deviation)
 
 
 def _sudden(found: IdentifiedPair, x: Array, run: Run) -> float:

@@ -21,6 +21,7 @@ Array = NDArray[np.float64]
 _WINDOW_S, _FEW, _FEW_READINGS = 1.0, 5, 10
 _MOVES = 10.0  # times the noise, root mean square: a reference beside which a share shows
 _LEFT = 0.1  # of the deviation's power, that the shares leave
+_LEFT_OF_ONE = 0.2  # of what one share leaves, likewise: noise of a second's correlation leaves a third and more
 _ABOUT = 0.05  # by which a share is uncertain, and may be beyond the table
 _NOT_YET = 0.1  # of the gain: a window that has lost less is one of before
 _CHANGES, _SLOWLY = 0.15, 3.0  # of the gain, by which it changes; times that, the sum of all its changes
@@ -50,6 +51,8 @@ def as_changing_gain(finding: Finding, measured: Measured) -> Finding:
     )  # a single window may be a reversal's
     spread = float(np.ptp(usual))
     slowly = float(np.abs(np.diff(usual)).sum()) <= _SLOWLY * spread
+    if _left_by(gains, windows, measured) > _LEFT_OF_ONE * _left_by_one(windows, measured):
+        return finding
     before = int(np.argmax(np.append(usual < 1.0 - _NOT_YET, True)))  # windows in which nothing is lost yet
     gains, usual, windows = gains[before:], usual[before:], windows[before:]
     if spread < _CHANGES or not slowly or len(windows) < _FEW:
@@ -58,7 +61,7 @@ def as_changing_gain(finding: Finding, measured: Measured) -> Finding:
         return finding
     off = [y - x for y, x in windows]
     whole = max(every_power(np.concatenate(off), measured), 1e-30)
-    left = every_power(np.concatenate([y - g * x for (y, x), g in zip(windows, gains, strict=True)]), measured) / whole
+    left = _left_by(gains, windows, measured) / whole
     offset = every_power(np.concatenate([z - np.mean(z) for z in off]), measured) / whole
     if left > _LEFT:
         return finding
@@ -90,6 +93,17 @@ def as_changing_gain(finding: Finding, measured: Measured) -> Finding:
         sat=None,
         evidence=(words, *((_EITHER,) if either else ()), *figures),
     )
+
+
+def _left_by(gains: Array, windows: list[tuple[Array, Array]], measured: Measured) -> float:
+    """Power of what a share for every window, shape (windows,), leaves of them [unit²]."""
+    return every_power(np.concatenate([y - g * x for (y, x), g in zip(windows, gains, strict=True)]), measured)
+
+
+def _left_by_one(windows: list[tuple[Array, Array]], measured: Measured) -> float:
+    """Power of what one share of the reference leaves of all windows [unit²]."""
+    y, x = (np.concatenate(z) for z in zip(*windows, strict=True))
+    return every_power(y - float(x @ y) / float(x @ x) * x, measured)
 
 
 def _windows(finding: Finding, measured: Measured) -> tuple[list[int], list[tuple[Array, Array]]]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -83,15 +83,21 @@ def join_noisy(runs: Iterable[Run]) -> list[Run]:
     return out
 
 
-def merge_equal(runs: Iterable[Run], gap: int, rows: tuple[int, ...] = VARYING_ROWS) -> list[Run]:
-    """Join runs of one of `rows` that touch or are separated by less than `gap` healthy samples."""
+def merge_equal(
+    runs: Iterable[Run],
+    gap: int,
+    rows: tuple[int, ...] = VARYING_ROWS,
+    apart: Callable[[Run, Run], bool] = lambda first, second: False,
+) -> list[Run]:
+    """Join runs of one of `rows` that touch or are separated by less than `gap` healthy samples, unless they are `apart`."""
     out: list[Run] = []
     for run in runs:
         if run.row in rows and out:
-            if out[-1].row == run.row:
+            if out[-1].row == run.row and not apart(out[-1], run):
                 out[-1] = Run(out[-1].start, run.stop, run.row)
                 continue
-            if len(out) > 1 and out[-1].row == HEALTHY and out[-1].size < gap and out[-2].row == run.row:
+            near = len(out) > 1 and out[-1].row == HEALTHY and out[-1].size < gap
+            if near and out[-2].row == run.row and not apart(out[-2], run):
                 out[-2:] = [Run(out[-2].start, run.stop, run.row)]
                 continue
         out.append(run)

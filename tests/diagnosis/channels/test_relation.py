@@ -57,6 +57,17 @@ def test_scale_of_a_second_sensor_but_no_loss_of_gain() -> None:
     assert found(noisy(0.8 * x), x, 0.0, -50).gain == 1.0
 
 
+def test_scale_of_a_sensor_that_is_faulty_most_of_the_time() -> None:
+    """Losses, and noise that stays for a second, leave the places alone by which the sound part is known."""
+    x, random = 0.3 + 0.4 * command(), np.random.default_rng(2)
+    slow = np.convolve(random.normal(size=N + 4000), np.exp(-np.arange(4000) / 800.0))[4000 : N + 4000] / 20.0
+    y = 1.008 * x
+    y[3_000:26_000] = (0.75 * y + 0.04 * slow - 0.01)[3_000:26_000]
+    y[27_000:36_000] *= 0.9
+    y[38_000:56_000] = (0.9 * y + 0.03 * slow)[38_000:56_000]
+    assert found(noisy(y, 0.005), x, 0.0, -50).gain == pytest.approx(1.008, abs=0.004)
+
+
 def test_expectation_is_the_lag_of_the_play() -> None:
     x = np.r_[np.zeros(100), np.ones(400)]
     y = Relation(delay=3.0, lag=0.05, play=0.2).expected(x, DT)

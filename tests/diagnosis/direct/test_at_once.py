@@ -74,3 +74,18 @@ def test_a_lasting_fault_of_one_other_sensor_is_no_habit() -> None:
     told = without_shared_moments(pairs, {"FR": assessment(*TURN), "RL": assessment(600, 1400)})
     assert told["FR"].findings
     assert told["RL"].findings
+
+
+def test_lasting_faults_of_two_other_sensors_are_no_habit_where_they_show_at_steady_speed() -> None:
+    pairs = {w: sensor(late_s=0.1 if w == "FR" else 0.0) for w in WHEELS}
+    pairs["RL"].samples.y[600:1400] *= 0.3
+    pairs["RR"].samples.y[500:1300] += 0.4
+    spans = {"FR": TURN, "RL": (600, 1400), "RR": (500, 1300)}
+    told = without_shared_moments(pairs, {w: assessment(*span) for w, span in spans.items()})
+    assert all(told[w].findings for w in spans)
+
+
+def test_what_three_sensors_do_when_the_speed_changes_alone_is_a_habit_however_long() -> None:
+    pairs = {w: sensor(late_s=0.1 if w != "FL" else 0.0) for w in WHEELS}
+    told = without_shared_moments(pairs, {w: assessment(600, 1400) for w in ("FR", "RL", "RR")})
+    assert not any(a.findings for a in told.values())

@@ -136,3 +136,23 @@ def test_a_coarse_reading_is_repeated_at_its_own_speed_alone(faster: float, expe
     start, stop = 12_050, 13_150  # of a steady second
     true[start:stop] *= faster
     assert explained(pair(Side.SENSOR, y, true), FaultMode.STUCK, start, stop) is expected
+
+
+def test_noise_beside_a_command_that_flips_now_and_then_is_none_of_timing() -> None:
+    """The command's few jumps are as large as the noise, but the valve is off where it rests, too."""
+    x = np.full(N, 0.8)
+    x[::37] = -0.8
+    slow = np.convolve(np.random.default_rng(2).normal(size=N), np.ones(800) / 30.0, mode="same")
+    y = np.roll(x, 2) * 0.6 + 0.05 * slow
+    assert not explained(pair(Side.ACTUATOR, y, np.roll(x, 2)), FaultMode.NOISY, 2000, 12_000)
+    assert not explained(pair(Side.ACTUATOR, 0.6 * np.roll(x, 2), np.roll(x, 2)), FaultMode.INEFFICIENT, 2000, 12_000)
+
+
+def test_an_opening_read_a_reading_late_is_of_timing() -> None:
+    x = np.where(np.arange(N) // 3 % 2 == 0, 0.5, -0.5)
+    assert explained(pair(Side.ACTUATOR, np.roll(x, 1), x), FaultMode.NOISY, 2000, 12_000)
+
+
+def test_a_valve_that_never_rests_between_flips_is_not_told_by_its_lag() -> None:
+    x = np.where(np.random.default_rng(4).random(N) < 0.5, 0.8, -0.8)
+    assert explained(pair(Side.ACTUATOR, 0.6 * x, x), FaultMode.INEFFICIENT, 2000, 12_000)

@@ -69,3 +69,14 @@ def test_what_is_no_share_that_changes_slowly_stays_what_it_was(y: Array) -> Non
 
 def test_other_rows_stay() -> None:
     assert told(FADES * COMMAND, mode=FaultMode.STUCK).mode is FaultMode.STUCK
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_noise_of_a_second_beside_a_loss_stays_noise(seed: int) -> None:
+    """Every second of it is nearly a share of the command; but one share leaves little more."""
+    rng, keep = np.random.default_rng(seed), np.exp(-DT / 0.8)
+    slow = np.zeros(SIZE)
+    for i, z in enumerate(rng.standard_normal(SIZE)[1:], 1):
+        slow[i] = keep * slow[i - 1] + np.sqrt(1.0 - keep**2) * z
+    after = told(0.6 * COMMAND * (1.0 + 0.12 * slow), COMMAND)
+    assert after.mode is FaultMode.NOISY
