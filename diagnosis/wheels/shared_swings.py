@@ -22,6 +22,7 @@ Array = NDArray[np.float64]
 _MEAN_S = 0.1
 _AS_LARGE = 2.0  # most times the others' amplitude
 _TOGETHER, _ALIKE = 0.7, 1.5  # share of two findings' time that is common to both; times in amplitude
+_COHERENT, _APART = 0.4, 5  # correlation of one cause; means by which one wheel may follow another
 _OTHERS, _PLACES = 2, 6  # fewer wheels, or means, tell nothing
 
 
@@ -69,7 +70,11 @@ def without_shared(paths: Mapping[int, WheelPath], found: Mapping[int, WheelFind
     for i in found:
         for f in noisy[i]:
             # What a wheel with another fault deviates by says nothing of the machine.
-            others = {j: a for j, a in apart.items() if j != i and not _other_fault(found[j], f)}
+            others = {
+                j: a
+                for j, a in apart.items()
+                if j != i and not (_other_fault(found[j], f) or _noise_of_its_own(f, noisy[j], apart[i], a, width))
+            }
             if len(others) >= _OTHERS and _shared(f, apart[i], others, noisy, width):
                 shared.setdefault(i, []).append(f)
     level = max((_size(f, apart[i], width) for i, fs in shared.items() for f in fs), default=0.0)
@@ -88,6 +93,27 @@ def without_shared(paths: Mapping[int, WheelPath], found: Mapping[int, WheelFind
 def _other_fault(wheel: WheelFindings, f: Finding) -> bool:
     """Whether a wheel has a fault of another row at the time of a finding."""
     return any(not (g.mode.varying or is_opened(g)) and g.start < f.stop and f.start < g.stop for g in wheel.findings)
+
+
+def _noise_of_its_own(f: Finding, noisy: Sequence[Finding], own: Array, other: Array, width: int) -> bool:
+    """Whether another wheel has such a finding at another time, into this one's, and moves apart from it: two faults, no swing of both."""
+    if is_opened(f) or not any(f.start < g.stop and g.start < f.stop and not is_opened(g) for g in noisy):
+        return False
+    if any(_common(f, g) >= _TOGETHER for g in noisy):
+        return False
+    part = slice(f.start // width, f.stop // width)
+    return _coherence(own[part], other[part]) < _COHERENT
+
+
+def _coherence(own: Array, other: Array) -> float:
+    """Largest correlation of what two deviations change by from mean to mean, the one sooner or later by up to `_APART` of them [1]."""
+    both = np.nan_to_num(np.diff(np.stack([own, other])))
+    a, b = both - both.mean(axis=1, keepdims=True)
+    power = float(np.sqrt((a @ a) * (b @ b)))
+    if a.size <= 2 * _APART or power == 0.0:
+        return 1.0
+    shifts = np.correlate(a, b, "full")[a.size - 1 - _APART : a.size + _APART]
+    return float(np.abs(shifts).max()) / power
 
 
 def _size(f: Finding, own: Array, width: int) -> float:

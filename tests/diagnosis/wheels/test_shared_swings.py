@@ -74,3 +74,38 @@ def test_two_wheels_that_begin_and_end_together_share_a_cause() -> None:
 def test_other_rows_and_machines_of_two_wheels_are_left_alone() -> None:
     assert len(judged({i: swing(0.0) for i in range(4)}, FaultMode.INEFFICIENT).found[0].findings) == 1
     assert len(judged({i: swing(0.0) for i in range(2)}).found[0].findings) == 1
+
+
+def noises(coherent: bool) -> dict[int, np.ndarray]:
+    """Two noisy wheels, the second of them later, and two quiet ones."""
+    rng = np.random.default_rng(5)
+    slow = [np.convolve(rng.standard_normal(N), np.exp(-np.arange(500) / 80.0))[:N] / 10.0 for _ in range(2)]
+    out = {i: np.zeros(N) for i in range(3)}
+    out[0][PART] = 0.05 * slow[0][PART]
+    out[1][2_400:5_600] = 0.05 * slow[0 if coherent else 1][2_400:5_600]
+    out[2][PART] = 0.03 * slow[0][PART]
+    return out
+
+
+@pytest.mark.parametrize("coherent", [False, True])
+def test_noise_of_another_wheel_at_another_time_is_no_swing_of_both_unless_both_move_alike(coherent: bool) -> None:
+    swings = noises(coherent)
+    rng = np.random.default_rng(1)
+    paths: Any = {
+        i: SimpleNamespace(y=s + 0.002 * rng.standard_normal(N), dt=DT, width=WIDTH, expected=np.zeros(N // WIDTH))
+        for i, s in swings.items()
+    }
+    spans = {0: [PART], 1: [slice(2_400, 5_600)], 2: []}
+    found = {
+        i: WheelFindings(
+            [
+                SimpleNamespace(start=p.start, stop=p.stop, mode=FaultMode.NOISY, side=Side.SENSOR)  # type: ignore[misc]
+                for p in spans[i]
+            ],
+            {side: np.zeros(N, dtype=np.bool_) for side in (Side.SENSOR, Side.ACTUATOR)},
+            {side: np.zeros(N, dtype=np.bool_) for side in (Side.SENSOR, Side.ACTUATOR)},
+        )
+        for i in swings
+    }
+    got = without_shared(paths, found)
+    assert bool(got.found[0].findings) is not coherent
