@@ -37,7 +37,7 @@ _BURST_S = 0.6  # at which half of the bursts of noise are what a motion leaves 
 _WILD, _WILD_S, _WILD_SAMPLES = 10.0, 0.04, 4.0  # times the noise; motion that a wrong time may be off by
 _RESTLESS, _RESTLESS_P = 0.1, 0.8  # share of changing news from which a channel is not stuck, and how probably so
 _OF_PLAY = 0.3  # of its width per rms opening: standard deviation of the gain that a play leaves in simulated valves
-_CALM_P = 0.95  # that a steady row which leaves hardly anything is the fault's
+_CALM_P, _NEARLY_P = 0.95, 0.65  # that a steady row is the fault's which leaves hardly anything; nearly as much as counts
 ZERO = 0.01  # of the span: as far apart may two healthy instruments have their zero
 _NOTHING = 0.05  # of the span, root mean square: a channel that shows more is not silent, however rough its usual noise
 
@@ -190,7 +190,9 @@ def isolate(run: Run, found: IdentifiedPair, min_sat: float) -> Isolated | None:
         other = estimate_run(replace(run, row=calm), found)
         if other is not None:
             both = p[run.row] + p[calm]
-            p[calm], p[run.row] = _CALM_P * both, (1.0 - _CALM_P) * both
+            sure = _calm_row_of(seen, 0.5 * min_sat, ZERO * found.pair.span) == calm
+            sure_p = _CALM_P if sure else _NEARLY_P
+            p[calm], p[run.row] = sure_p * both, (1.0 - sure_p) * both
             run, estimate = replace(run, row=calm), other
     gain = float(evidence[run.row] - evidence[HEALTHY])
     seconds = run.size * found.pair.dt
