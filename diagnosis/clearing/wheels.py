@@ -56,10 +56,8 @@ def wheel_checks(cells: Cells, clear_at: float) -> Iterator[Checked]:
     responses = responses_of(cells, speed, used, reference)
     tells = openings_tell(cells, responses)
     windows, lasting = responses.windows, responses.usual
-    slow = np.full(windows.shape, np.nan)
-    if not all(second for _, second in twice):
-        slow = responses_of(cells, speed, used, reference, CREEPING * USUAL_TOP).windows
-        slow[np.isfinite(windows)] = np.nan
+    slow = responses_of(cells, speed, used, reference, CREEPING * USUAL_TOP).windows
+    slow[np.isfinite(windows)] = np.nan
     limits = response_limits(responses, twice, clear_at, cells.carried_shares)
     tracking, rough = _tracking(cells, speed, reference), _rough_beside_others(roughness_of(cells, speed, reference))
     rough = np.fmax(rough, wild_readings(cells, speed, FLOOR * cells.machine.max_speed))
@@ -93,11 +91,8 @@ def wheel_checks(cells: Cells, clear_at: float) -> Iterator[Checked]:
             own = limits[i]
             response = (*about, either, Check.RESPONSE)
             driven = worst(cells, response, -windows[:, i], own.below, apart=True)
-            if twice[i][1]:
-                yield driven
-            else:
-                most_slow = max(own.below, -_CREEPING_RESPONSE * float(np.log1p(-clear_at)))
-                yield max(driven, worst(cells, response, -slow[:, i], most_slow, apart=True), key=times)
+            most_slow = max(own.below, -_CREEPING_RESPONSE * float(np.log1p(-clear_at)))
+            yield max(driven, worst(cells, response, -slow[:, i], most_slow, apart=True), key=times)
             yield lasts(cells, (*about, either, Check.LASTING_RESPONSE), lasting[i].below, own.lasting_below)
             changed = lasts(cells, (*about, either, Check.CHANGE), responses.changes[i], own.changed)
             grown = lasts(cells, (*about, either, Check.CHANGE), responses.grown[i], own.grown)
