@@ -37,7 +37,10 @@ _BURST_S = 0.6  # at which half of the bursts of noise are what a motion leaves 
 _WILD, _WILD_S, _WILD_SAMPLES = 10.0, 0.04, 4.0  # times the noise; motion that a wrong time may be off by
 _RESTLESS, _RESTLESS_P = 0.1, 0.8  # share of changing news from which a channel is not stuck, and how probably so
 _OF_PLAY = 0.3  # of its width per rms opening: standard deviation of the gain that a play leaves in simulated valves
-_CALM_P, _NEARLY_P = 0.95, 0.65  # that a steady row is the fault's which leaves hardly anything; nearly as much as counts
+_CALM_P, _NEARLY_P = (
+    0.95,
+    0.65,
+)  # that a steady row is the fault's which leaves hardly anything; nearly as much as counts
 ZERO = 0.01  # of the span: as far apart may two healthy instruments have their zero
 _NOTHING = 0.05  # of the span, root mean square: a channel that shows more is not silent, however rough its usual noise
 

@@ -15,12 +15,14 @@ from diagnosis.channels.sample_status import PAIR
 from diagnosis.direct.identification import IdentifiedPair
 from diagnosis.direct.low_speed import left_open
 from diagnosis.results.assessment import Assessment, Finding
+from replay.faults import FaultMode
 
 _SMALL = 0.08  # of the span, root mean square: a larger deviation is none of a healthy valve, whatever the others do
 _SHARE, _SHARE_OTHERS = 0.2, 0.3  # of its command, likewise: by habit, and while others are off as well
 _WINDOW_S, _WINDOWS = 2.0, 4  # s; fewer show nothing
 _USUAL, _BEYOND = 0.9, 1.8  # quantile of the windows, and times it
 _BEYOND_OTHERS = 1.6  # times what the others are off meanwhile
+_EITHER = 0.3  # probability of a share beside a constant
 _VALVES = 3  # fewer show no habit
 
 
@@ -48,10 +50,15 @@ def without_small_deviations(
             [
                 f
                 for f in a.findings
-                if not f.mode.total and _small(f, found[w], most, _meanwhile(f, [found[x] for x in others]))
+                if _may_be_small(f) and _small(f, found[w], most, _meanwhile(f, [found[x] for x in others]))
             ],
         )
     return out
+
+
+def _may_be_small(finding: Finding) -> bool:
+    """Whether a finding is a share or noise, or may as well be a share: nothing moved."""
+    return not finding.mode.total or any(h.mode == FaultMode.INEFFICIENT and h.p >= _EITHER for h in finding.hypotheses)
 
 
 def _usual(one: IdentifiedPair) -> float:

@@ -1,13 +1,14 @@
-"""Simple causes of a channel's deviation from its reference: an offset, a loss, a gain that fades, a drift, a delay."""
+"""Simple causes of a channel's deviation from its reference: an offset, a loss, a gain that fades, a drift, a delay, a lag."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from diagnosis.estimation.lag import low_passed
 from diagnosis.results.result import Epsilon
 from diagnosis.results.sizes import amount
 from replay.faults import FaultMode
@@ -17,6 +18,10 @@ Flags = NDArray[np.bool_]
 
 _ABOUT = 0.03  # by which a gain is uncertain, and may be beyond the table
 _LATEST_S, _DELAYS = 1.0, 41
+_LAGS_S, _SETTLED = (
+    tuple(0.1 * 1.25**k for k in range(16)),
+    4.0,
+)  # time constants; times the longest, of what came before
 _USUAL = 0.9  # of the samples
 _OWN = 1.5  # times the noise: a healthy channel's own deviation
 _LATER, _STARTS = 0.5, 11  # of a piece, within which a gain may begin to fade, and moments that are tried
@@ -74,7 +79,7 @@ class Cause:
     epsilon : Epsilon or None
         What is lost; None: it is no loss.
     changes, late : bool
-        Whether it changes with time; whether it is a delay.
+        Whether it changes with time; whether it is a delay or a lag.
     alone, clear : bool
         Whether no other one explains as much; whether none of another row does but such as change likewise.
     start, stop : int or None
@@ -140,20 +145,42 @@ def causes(y: Array, x: Array, at: NDArray[np.intp], measured: Measured) -> Iter
         f"It departs from {reference} by {amount(float(drift[1]), measured.unit, 2)} a second, whatever that is: a drift.",
         changes=True,
     )
-    least, delay, rest = np.inf, 0.0, off
-    for later in np.linspace(0.0, _LATEST_S, _DELAYS)[1:].tolist():
-        before = measured.x[np.maximum(at - round(later / measured.dt), 0)]
-        behind = y - np.where(np.isfinite(before), before, x)
+    seconds, rest = _least(_delayed(at, x, measured), y, measured)
+    yield _late(left(rest), f"It comes {1e3 * seconds:.0f} ms after {reference}: a delay.")
+    seconds, rest = _least(_lagged(at, x, measured), y, measured)
+    yield _late(left(rest), f"It follows {reference} with a time constant of {seconds:.2g} s: a lag.")
+
+
+def _late(left: tuple[float, float], words: str) -> Cause:
+    """A reading that comes late."""
+    return Cause(FaultMode.OUTSIDE_TABLE, *left, words, changes=True, late=True)
+
+
+def _least(trials: Iterable[tuple[float, Array]], y: Array, measured: Measured) -> tuple[float, Array]:
+    """Time [s] and rest [unit], shape (k,), of what leaves least of y among references that come late."""
+    least, best, rest = np.inf, 0.0, y
+    for seconds, x in trials:
+        behind = y - x
         share = power(behind, measured)
         if share < least or (share == least and every_power(behind, measured) < every_power(rest, measured)):
-            least, delay, rest = share, later, behind
-    yield Cause(
-        FaultMode.OUTSIDE_TABLE,
-        *left(rest),
-        f"It comes {1e3 * delay:.0f} ms after {reference}: a delay.",
-        changes=True,
-        late=True,
-    )
+            least, best, rest = share, seconds, behind
+    return best, rest
+
+
+def _delayed(at: NDArray[np.intp], x: Array, measured: Measured) -> Iterator[tuple[float, Array]]:
+    """The reference at some steps, x there, by how much it is delayed [s]."""
+    for seconds in np.linspace(0.0, _LATEST_S, _DELAYS)[1:].tolist():
+        before = measured.x[np.maximum(at - round(seconds / measured.dt), 0)]
+        yield seconds, np.where(np.isfinite(before), before, x)
+
+
+def _lagged(at: NDArray[np.intp], x: Array, measured: Measured) -> Iterator[tuple[float, Array]]:
+    """The same behind a lag of first order, by its time constant [s]."""
+    first = max(0, int(at[0]) - round(_SETTLED * _LAGS_S[-1] / measured.dt))
+    reference = measured.x[first : at[-1] + 1]
+    for seconds in _LAGS_S:
+        behind = low_passed(reference, seconds, measured.dt)[at - first]
+        yield seconds, np.where(np.isfinite(behind), behind, x)
 
 
 def _later(off: Array, x: Array, when: Array) -> tuple[int, Array, float]:

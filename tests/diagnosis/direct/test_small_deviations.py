@@ -13,6 +13,7 @@ from diagnosis.channels.sample_status import PAIR
 from diagnosis.direct.identification import IdentifiedPair
 from diagnosis.direct.small_deviations import without_small_deviations
 from diagnosis.results.assessment import CODE, Assessment, Finding
+from diagnosis.results.result import Hypothesis
 from diagnosis.results.vocabulary import Tier
 from replay.faults import FaultMode, Side, State
 
@@ -33,10 +34,15 @@ def valve(gain: float, opens: slice = slice(None)) -> IdentifiedPair:
     return cast(IdentifiedPair, SimpleNamespace(samples=samples, pair=SimpleNamespace(dt=DT, span=1.0)))
 
 
-def told(gains: tuple[float, ...], mode: FaultMode = FaultMode.INEFFICIENT, opens: slice = slice(None)) -> Assessment:
+def told(
+    gains: tuple[float, ...],
+    mode: FaultMode = FaultMode.INEFFICIENT,
+    opens: slice = slice(None),
+    hypotheses: tuple[Hypothesis, ...] = (),
+) -> Assessment:
     states = np.full(SIZE, CODE[State.HEALTHY])
     states[slice(*SPAN)] = CODE[State(mode.value)]
-    finding = Finding(*SPAN, Side.ACTUATOR, mode, 0.97, (), None, None, (), Tier.DIRECT)
+    finding = Finding(*SPAN, Side.ACTUATOR, mode, 0.97, hypotheses, None, None, (), Tier.DIRECT)
     pairs = dict(zip(WHEELS, (valve(x, opens) for x in gains), strict=False))
     return without_small_deviations(pairs, {"FR": Assessment(states, findings=(finding,), tier=Tier.DIRECT)})["FR"]
 
@@ -61,3 +67,9 @@ def test_what_others_are_off_by_meanwhile_is_left_open_though_they_seldom_are(
     gains: tuple[float, ...], stays: bool
 ) -> None:
     assert bool(told(gains, opens=slice(1000, 1400)).findings) is stays
+
+
+def test_a_constant_that_may_be_a_share_is_left_open_likewise() -> None:
+    """Nothing moves, so that a stuck valve and one that opens a little less are alike."""
+    either = (Hypothesis("actuator", "stuck", 0.5), Hypothesis("actuator", "inefficient", 0.5))
+    assert told((0.9, 1.0, 0.93, 0.96), FaultMode.STUCK, hypotheses=either).findings == ()

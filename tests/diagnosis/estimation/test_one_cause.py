@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from diagnosis.estimation.lag import low_passed
 from diagnosis.estimation.one_cause import _fading, with_one_cause
 from diagnosis.estimation.simple_causes import Cause, Measured
 from diagnosis.results.assessment import Finding
@@ -43,11 +44,12 @@ def measured(change: Callable[[Array], Array]) -> Measured:
     [
         (lambda x: x + 0.08, FaultMode.OUTSIDE_TABLE, "0.08 {speed_unit} more than b all through it"),
         (lambda x: np.interp(T - 0.4, T, x), FaultMode.OUTSIDE_TABLE, "400 ms after b: a delay"),
+        (lambda x: low_passed(x, 0.8, T[1] - T[0]), FaultMode.OUTSIDE_TABLE, "a time constant of 0.75 s: a lag"),
         (lambda x: 1.35 * x, FaultMode.OUTSIDE_TABLE, "1.35 of b"),
         (lambda x: 0.6 * x, FaultMode.INEFFICIENT, "0.60 of b"),
         (lambda x: (1.0 - 0.6 * (T - 10.0) / 14.0) * x, FaultMode.INEFFICIENT, "at first and"),
     ],
-    ids=["offset", "delay", "too much", "loss", "fading"],
+    ids=["offset", "delay", "lag", "too much", "loss", "fading"],
 )
 def test_one_cause_joins_its_pieces(change: Callable[[Array], Array], mode: FaultMode, words: str) -> None:
     (found,) = with_one_cause(pieces(), measured(change))
