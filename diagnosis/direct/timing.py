@@ -48,7 +48,8 @@ def timing_explains(found: IdentifiedPair, run: Run, mode: FaultMode) -> bool:
     sample is as large, or y is x with its sign at other moments, or a constant y is as far off as a healthy one may be. For a
     speed: shorter than half a second and no more than 10 ms, or one and a half samples, of the reference's slope, or as short near rest, or a reading that rests beside a
     reference that hardly moves, no longer than its noise allows. Whatever the rate, the answer to a command of which
-    nothing is left but jumps between samples depends on the valve's lag, unless it rests beside what the command holds for a few readings.
+    nothing is left but jumps between samples depends on the valve's lag, unless, in a log that is
+    not too slow for it, it rests beside what the command holds for a few readings.
     """
     pair, part = found.pair, slice(run.start, run.stop)
     x = found.samples.x
@@ -70,7 +71,7 @@ def timing_explains(found: IdentifiedPair, run: Run, mode: FaultMode) -> bool:
         return True
     jumps = _sudden(found, pair.x, run)
     jumpy = deviation < 2 * jumps and jumps > _JUMPY * float(np.sqrt(np.nanmean(ref**2)))
-    if not mode.total and jumpy and _read_late(found, run, deviation, _settled(found)):
+    if not mode.total and jumpy and (found.coarse or _read_late(found, run, deviation, _settled(found))):
         return True
     if not found.coarse:
         return False

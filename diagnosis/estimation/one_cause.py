@@ -25,6 +25,7 @@ _LEAST_S, _LEAST, _MOST = 1.0, 20, 200_000  # of a cluster: seconds, samples; sa
 _LEFT = 0.06  # of the power of a deviation: what a cause leaves of it, at most
 # what any cause of another row leaves, at least: times what the cause leaves, and of the power
 _RIVAL, _RIVAL_LEFT = 3.0, 0.15
+_LEFT_OF_ONE = 0.2  # of the power of one of many pieces, that their common cause leaves of it
 _NEAR = 0.05  # of the power, likewise, beside an offset: noise leaves as much of a loss
 _FAR, _FAR_LEFT = 5.0, 0.006  # both likewise, beside a cause that leaves nothing
 _NOTHING = 0.01  # of the power, that a cause may leave beside what a gain with an offset does
@@ -64,7 +65,8 @@ def with_one_cause(findings: Sequence[Finding], measured: Measured) -> list[Find
         common = None  # what changed between two pieces may have changed anyhow
     for pieces in clusters:
         near = pieces
-        cause = replace(common, start=None, stop=None) if common is not None else cause_of(near, measured)
+        shared = common is not None and _explains(common, near, measured)
+        cause = replace(common, start=None, stop=None) if common is not None and shared else cause_of(near, measured)
         lost = all(f.mode is FaultMode.INEFFICIENT for f in near)
         wide = _as_far_as_it_shows(near, out[-1].stop if out else 0, measured) if lost else near
         offset = cause_of(wide, measured) if wide != near else None
@@ -73,6 +75,21 @@ def with_one_cause(findings: Sequence[Finding], measured: Measured) -> list[Find
         told = cause is None or (cause.alone and all(f.mode == cause.mode for f in near))
         out += near if told or cause is None else [joined(near, cause)]
     return out
+
+
+def _explains(common: Cause, near: Sequence[Finding], measured: Measured) -> bool:
+    """Whether a cause that explains all pieces of a part together explains some of them by themselves: else each is what it is."""
+    first, last = np.searchsorted(common.at, [near[0].start, max(f.stop for f in near)])
+    if first == last:
+        return True
+    at, rest = common.at[first:last], common.rest[first:last]
+    off = (measured.y - measured.x)[at]
+    left, whole = power(rest, measured), power(off, measured)
+    if left > _LEFT_OF_ONE * whole:
+        return False
+    piece = np.searchsorted([f.start for f in near], at, "right")
+    rests = all(f.mode.total for f in near) and power(_about(measured.y[at], piece), measured) == 0.0
+    return left == 0.0 or not rests
 
 
 def _clusters(findings: Sequence[Finding], gap: int) -> Iterator[list[Finding]]:
@@ -149,9 +166,13 @@ def cause_of(near: Sequence[Finding], measured: Measured) -> Cause | None:
 
 def _rests(y: Array, piece: NDArray[np.intp], measured: Measured) -> bool:
     """Whether a channel stays where it is in every piece: it sticks, wherever that is."""
-    number = np.maximum(np.bincount(piece), 1)
-    mean = np.bincount(piece, weights=y) / number
-    return every_power(y - mean[piece], measured) <= measured.noise**2
+    return every_power(_about(y, piece), measured) <= measured.noise**2
+
+
+def _about(y: Array, piece: NDArray[np.intp]) -> Array:
+    """Values of a channel less their mean in each piece, shape (k,)."""
+    mean = np.bincount(piece, weights=y) / np.maximum(np.bincount(piece), 1)
+    return np.asarray(y - mean[piece])
 
 
 def _nothing_asked(cause: Cause, x: Array, measured: Measured) -> bool:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -70,12 +70,12 @@ class Cause:
     ----------
     mode : FaultMode
         Its row.
+    words : str
+        What it is.
     left : float
         Share of the deviation's power that it leaves [1].
     moves : float
         The same with the largest deviations, which the timing of moves makes [1].
-    words : str
-        What it is.
     epsilon : Epsilon or None
         What is lost; None: it is no loss.
     changes, late : bool
@@ -84,12 +84,14 @@ class Cause:
         Whether no other one explains as much; whether none of another row does but such as change likewise.
     start, stop : int or None
         Step where it begins, if later than the pieces, and the one after its last, if earlier.
+    at, rest : NDArray[np.intp], Array, shape (k,)
+        Steps that were looked at, and what it leaves of the deviation there [unit].
     """
 
     mode: FaultMode
-    left: float
-    moves: float
     words: str
+    left: float = 1.0
+    moves: float = 1.0
     epsilon: Epsilon | None = None
     changes: bool = False
     late: bool = False
@@ -97,6 +99,8 @@ class Cause:
     clear: bool = True
     start: int | None = None
     stop: int | None = None
+    at: NDArray[np.intp] = field(default_factory=lambda: np.zeros(0, np.intp), compare=False, repr=False)
+    rest: Array = field(default_factory=lambda: np.zeros(0), compare=False, repr=False)
 
 
 def causes(y: Array, x: Array, at: NDArray[np.intp], measured: Measured) -> Iterator[Cause]:
@@ -114,46 +118,41 @@ def causes(y: Array, x: Array, at: NDArray[np.intp], measured: Measured) -> Iter
     off = y - x
     whole, every = max(power(off, measured), 1e-30), max(every_power(off, measured), 1e-30)
 
-    def left(rest: Array) -> tuple[float, float]:
-        return power(rest, measured) / whole, every_power(rest, measured) / every
+    def leaves(rest: Array, cause: Cause) -> Cause:
+        return replace(
+            cause, left=power(rest, measured) / whole, moves=every_power(rest, measured) / every, at=at, rest=rest
+        )
 
     reference = measured.names[1]
     offset = float(np.mean(off))
     if abs(offset) >= measured.least:
         more = "more" if offset > 0.0 else "less"
-        yield Cause(
-            FaultMode.OUTSIDE_TABLE,
-            *left(off - offset),
-            f"It reads {amount(abs(offset), measured.unit, 2)} {more} than {reference} all through it, whatever that is: an offset.",
-        )
+        words = f"It reads {amount(abs(offset), measured.unit, 2)} {more} than {reference} all through it, whatever that is: an offset."
+        yield leaves(off - offset, Cause(FaultMode.OUTSIDE_TABLE, words))
     gain = float(x @ y) / float(x @ x)
-    yield _loss(left(y - gain * x), (gain, gain), measured)
+    yield leaves(y - gain * x, _loss((gain, gain), measured))
     when = (at - at[0]) * measured.dt
     shapes = np.column_stack([x, x * when])
     (start, slope), *_ = np.linalg.lstsq(shapes, y, rcond=None)
     if start > 1.0 + _ABOUT and slope < 0.0:  # the piece begins too early
         begins, rest, last = _later(off, x, when)
-        yield replace(_loss(left(rest), (1.0, last), measured), start=int(at[begins]))
+        yield leaves(rest, replace(_loss((1.0, last), measured), start=int(at[begins])))
     else:
         ends = (float(start), float(start + slope * when[-1]))
-        yield _loss(left(y - shapes @ np.array([start, slope])), ends, measured)
+        yield leaves(y - shapes @ np.array([start, slope]), _loss(ends, measured))
     line = np.column_stack([np.ones(at.size), when])
     drift, *_ = np.linalg.lstsq(line, off, rcond=None)
-    yield Cause(
-        FaultMode.OUTSIDE_TABLE,
-        *left(off - line @ drift),
-        f"It departs from {reference} by {amount(float(drift[1]), measured.unit, 2)} a second, whatever that is: a drift.",
-        changes=True,
-    )
+    words = f"It departs from {reference} by {amount(float(drift[1]), measured.unit, 2)} a second, whatever that is: a drift."
+    yield leaves(off - line @ drift, Cause(FaultMode.OUTSIDE_TABLE, words, changes=True))
     seconds, rest = _least(_delayed(at, x, measured), y, measured)
-    yield _late(left(rest), f"It comes {1e3 * seconds:.0f} ms after {reference}: a delay.")
+    yield leaves(rest, _late(f"It comes {1e3 * seconds:.0f} ms after {reference}: a delay."))
     seconds, rest = _least(_lagged(at, x, measured), y, measured)
-    yield _late(left(rest), f"It follows {reference} with a time constant of {seconds:.2g} s: a lag.")
+    yield leaves(rest, _late(f"It follows {reference} with a time constant of {seconds:.2g} s: a lag."))
 
 
-def _late(left: tuple[float, float], words: str) -> Cause:
+def _late(words: str) -> Cause:
     """A reading that comes late."""
-    return Cause(FaultMode.OUTSIDE_TABLE, *left, words, changes=True, late=True)
+    return Cause(FaultMode.OUTSIDE_TABLE, words, changes=True, late=True)
 
 
 def _least(trials: Iterable[tuple[float, Array]], y: Array, measured: Measured) -> tuple[float, Array]:
@@ -195,7 +194,7 @@ def _later(off: Array, x: Array, when: Array) -> tuple[int, Array, float]:
     return k, rest, 1.0 + float(lost)
 
 
-def _loss(left: tuple[float, float], gains: tuple[float, float], measured: Measured) -> Cause:
+def _loss(gains: tuple[float, float], measured: Measured) -> Cause:
     """A gain that is steady or changes from the one to the other."""
     channel, reference = measured.names
     table = all(-_ABOUT <= g <= 1.0 + _ABOUT for g in gains)
@@ -205,9 +204,8 @@ def _loss(left: tuple[float, float], gains: tuple[float, float], measured: Measu
     share = f"{gains[0]:.2f}" if steady else f"{gains[0]:.2f} at first and {gains[1]:.2f} at last"
     return Cause(
         mode,
-        *left,
         f"{channel} is {share} of {reference} all through it.",
-        Epsilon(0.5 * (low + high), low - _ABOUT, high + _ABOUT),
+        epsilon=Epsilon(0.5 * (low + high), low - _ABOUT, high + _ABOUT),
         changes=not steady,
     )
 

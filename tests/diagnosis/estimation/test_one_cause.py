@@ -209,7 +209,7 @@ def test_a_fade_begins_within_its_piece() -> None:
 
 def test_a_gain_that_does_not_change_does_not_fade() -> None:
     """Where the gain that may change is the same at both ends, to the last digit, no cause changes."""
-    seen, steady = measured(lambda x: 0.6 * x), Cause(FaultMode.INEFFICIENT, 0.0, 0.0, "", Epsilon(0.4, 0.3, 0.5))
+    seen, steady = measured(lambda x: 0.6 * x), Cause(FaultMode.INEFFICIENT, "", 0.0, 0.0, Epsilon(0.4, 0.3, 0.5))
     assert _fading(seen.y, seen.x, [steady, steady], 1.0, seen) is None
 
 
@@ -234,3 +234,14 @@ def test_an_offset_beside_a_command_that_stays_is_told_by_what_follows() -> None
     off = Measured(y, x, np.ones(SIZE, np.bool_), DT, ("a", "b"), "m/s", NOISE, 0.02)
     (found,) = with_one_cause(pieces([(1400, 1800, FaultMode.INEFFICIENT)]), off)
     assert (found.mode, found.start, found.stop) == (FaultMode.OUTSIDE_TABLE, 1400, pytest.approx(2100, abs=2))
+
+
+def test_two_values_at_which_a_valve_sticks_are_no_gain() -> None:
+    """A command that asks for one side and then for the other one makes a gain of -0.15 of them, which leaves hardly anything."""
+    x = np.where(T < 20.0, -0.6, 0.8) + 0.2 * np.sin(0.9 * T)
+    y = np.where((T > 10.0) & (T < 18.0), 0.075, np.where((T > 26.0) & (T < 36.0), -0.12, x))
+    stuck = Measured(
+        y + NOISE * RNG.standard_normal(SIZE), x, np.ones(SIZE, np.bool_), DT, ("a", "b"), "1", NOISE, 0.02
+    )
+    told = with_one_cause(pieces([(1000, 1800, FaultMode.STUCK), (2600, 3600, FaultMode.STUCK)]), stuck)
+    assert [f.mode for f in told] == [FaultMode.STUCK, FaultMode.STUCK]
