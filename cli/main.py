@@ -12,8 +12,9 @@ import sys
 import traceback
 import warnings
 from collections.abc import Sequence
+from functools import cache
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -96,12 +97,18 @@ for _panel, _function, _name, _epilog in (
 app.add_typer(config.app, name="config", rich_help_panel=_MAKE)
 
 
+@cache
+def _whole() -> Any:
+    """All commands with their options; a process that runs several reads them from the functions once."""
+    return typer.main.get_command(app)
+
+
 def run(arguments: Sequence[str] | None = None) -> int:
     """Run one command line and give its exit code; every error becomes one line on stderr."""
     terminal = Terminal()
     forget()
     try:
-        result = app(args=arguments, obj=terminal, standalone_mode=False, prog_name="mfhca")
+        result = _whole()(args=arguments, obj=terminal, standalone_mode=False, prog_name="mfhca")
         code = result if isinstance(result, int) else 0
         check()
         sys.stdout.flush()

@@ -36,11 +36,13 @@ def found(kind: str) -> list[str]:
     return [str(path.relative_to(HOSTILE)) for path in chosen[kind]] or [""]
 
 
-#: Starts commands in processes of their own, forked from one that has imported what they all need.
+#: Starts commands in processes of their own, forked from one that has imported and loaded what they all need, as an audit's are.
 _STARTER = f"""
 import json, os, resource, sys
 sys.path.insert(0, {str(ROOT)!r})
 import cli.main, diagnosis.output, diagnosis.pipeline, diagnosis.report.page
+from diagnosis.audit.isolation.fork_server import warm
+warm()
 for line in sys.stdin:
     words, *streams = json.loads(line)
     if child := os.fork():

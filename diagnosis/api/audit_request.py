@@ -64,12 +64,12 @@ class AuditRequest:
         """Missions at once on this machine."""
         return self.jobs or processors()
 
-    def engine(self) -> Callable[[], AbstractContextManager[Engine]]:
-        """What runs missions: processes of this machine, or a Dask cluster."""
+    def engine(self, kind: str = "") -> Callable[[], AbstractContextManager[Engine]]:
+        """What runs missions: processes of this machine, which start as `diagnosis.audit.isolation.run.isolation` says, or a Dask cluster."""
         from diagnosis.audit import engines
 
         address = self.dask
-        return (lambda: engines.dask(address)) if address else (lambda: engines.local(self.at_once))
+        return (lambda: engines.dask(address)) if address else (lambda: engines.local(self.at_once, kind))
 
     def check(self) -> None:
         """Raise a `ConfigError` where an option cannot be."""
@@ -87,6 +87,7 @@ class AuditRequest:
         from diagnosis.audit.discovery.discover import discover
         from diagnosis.audit.discovery.machine_files import with_machine_files
         from diagnosis.audit.isolation.limits import Limits, usual_memory_mb
+        from diagnosis.audit.isolation.run import isolation_for
         from diagnosis.audit.plan import AuditOptions, machine_notes
 
         found = discover(self.words, exclude=self.output)
@@ -95,6 +96,8 @@ class AuditRequest:
         asked = AuditOptions(
             self.output, self.machine, self.machine_id or "", limits, self.retries, self.resume, self.max_size_mb
         )
+        if self.dask is None:
+            asked = replace(asked, isolation=isolation_for(len(found.missions), limits))
         missions, told = found.missions, machine_notes(found.missions, asked)
         if self.machine is None:
             missions, told = with_machine_files(found.missions, asked.machine_id)

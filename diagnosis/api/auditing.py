@@ -219,7 +219,7 @@ def run(
         emit("problem", {"reason": text})
     if not found.missions:
         raise LogError(none_found(found))
-    done = audit_all(found, asked, request.engine(), emit, baseline=baseline, axis=axis)
+    done = audit_all(found, asked, request.engine(asked.isolation), emit, baseline=baseline, axis=axis)
     problems = (*found.problems, *found.notes)
     return Audit(
         asked.output,

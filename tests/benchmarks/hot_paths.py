@@ -4,8 +4,9 @@ One unit is the CPU time of a Python loop of ten million additions, taken before
 machines can be compared. Each figure is the smallest of `--runs`, on one core, with compiled code warm. Exit code 1 where a path takes
 over 25 % more units than `hot_paths.json` beside this file has; `--record` writes that file anew.
 
-`--quick` is for CI: one kind of mission, and only a path that seems slower is taken again, up to five times. By how much all paths
-together (their median) differ from the baseline is the machine's, as far as that is less than a half, and is taken off first.
+`--quick` is for CI: one kind of mission, and only a path that seems slower, for want of compiled code too, is taken again, up to five
+times. By how much all paths together (their median) differ from the baseline is the machine's, as far as that is less than a half, and
+is taken off first.
 """
 
 from __future__ import annotations
@@ -115,8 +116,6 @@ def quickly(asked: argparse.Namespace, known: Mapping[str, float]) -> dict[str, 
         for _ in range(_TRIES):
             for path in again:
                 work = works[path]
-                if path not in found:
-                    work()
                 loop = unit()
                 taken = 2.0 * cpu_seconds(work) / (loop + unit())
                 found[path] = round(min(taken, found.get(path, taken)), 3)

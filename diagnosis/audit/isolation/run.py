@@ -86,8 +86,18 @@ def _left_by(work: Work) -> ChildOutcome | None:
     return found
 
 
+_FEW, _AMPLE_MB = 2, 1024.0
 _MADE: dict[tuple[str, int, str], Isolation] = {}
 _MAKING = threading.Lock()
+
+
+def isolation_for(missions: int, limits: Limits) -> str:
+    """Way to start children that takes the least for so many missions, as `isolation` takes it.
+
+    A made-up mission beforehand takes longer than what two missions load themselves, which is memory of theirs then.
+    """
+    few = missions <= _FEW and limits.memory_mb >= _AMPLE_MB
+    return "fork-cold" if LINUX and few else ""
 
 
 def isolation(kind: str = "") -> Isolation:

@@ -50,7 +50,8 @@ def audited(logs: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="session", autouse=True)
 def _no_server_left() -> Iterator[None]:
     yield
-    isolation().close()
+    for kind in ("", "fork-cold"):
+        isolation(kind).close()
 
 
 def document(capsys: pytest.CaptureFixture[str]) -> dict[str, Any]:

@@ -14,7 +14,6 @@ from replay.simulation.structures import StructureOptions
 from replay.simulation.variation import varied_options
 from tests.campaigns import campaign
 
-MANY = [random_structure(seed) for seed in range(300)]
 EFFECTS: dict[str, Callable[[Structure], bool]] = {
     **{
         name: lambda s, name=name: getattr(s, name)[1] > 0.0  # type: ignore[misc]
@@ -38,27 +37,32 @@ EFFECTS: dict[str, Callable[[Structure], bool]] = {
 }
 
 
-def test_a_seed_draws_one_structure() -> None:
-    assert random_structure(7) == MANY[7]
-    assert len(set(MANY)) == len(MANY)
+@pytest.fixture(scope="module")
+def many() -> list[Structure]:
+    return [random_structure(seed) for seed in range(300)]
+
+
+def test_a_seed_draws_one_structure(many: list[Structure]) -> None:
+    assert random_structure(7) == many[7]
+    assert len(set(many)) == len(many)
 
 
 @pytest.mark.parametrize("name", EFFECTS)
-def test_every_effect_is_there_and_absent(name: str) -> None:
-    assert 0.15 < np.mean([EFFECTS[name](s) for s in MANY]) < 0.65
+def test_every_effect_is_there_and_absent(name: str, many: list[Structure]) -> None:
+    assert 0.15 < np.mean([EFFECTS[name](s) for s in many]) < 0.65
 
 
-def test_all_drives_and_sensors_are_drawn() -> None:
-    assert {s.drive for s in MANY} == set(DRIVES)
-    assert {s.sensor for s in MANY} == set(SPEED_SENSORS)
+def test_all_drives_and_sensors_are_drawn(many: list[Structure]) -> None:
+    assert {s.drive for s in many} == set(DRIVES)
+    assert {s.sensor for s in many} == set(SPEED_SENSORS)
 
 
-def test_what_is_kept_for_figures_is_never_drawn() -> None:
-    assert all(s.kind == "tuning" and s.sharing != "least_loaded" and s.hysteresis[1] <= 0.02 for s in MANY)
+def test_what_is_kept_for_figures_is_never_drawn(many: list[Structure]) -> None:
+    assert all(s.kind == "tuning" and s.sharing != "least_loaded" and s.hysteresis[1] <= 0.02 for s in many)
 
 
-def test_spans_are_in_order() -> None:
-    for structure in MANY[:50]:
+def test_spans_are_in_order(many: list[Structure]) -> None:
+    for structure in many[:50]:
         for field in fields(structure):
             value = getattr(structure, field.name)
             if isinstance(value, tuple) and field.name != "rate_hz":

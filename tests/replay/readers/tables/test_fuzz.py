@@ -131,23 +131,23 @@ HEAD = "t,v\n0,1\n1,2\n"
 @pytest.mark.parametrize(
     ("text", "reason"),
     [
-        (",".join(f"c{i}" for i in range(1_000_000)) + "\n" + "1," * 999_999 + "1\n", "is not a log|line is longer|columns"),
-        ("t,v" + ",x" * 30_000 + "\n" + ("0" + ",1" * 30_001 + "\n") * 3, "30002 columns; at most 20000"),
-        ("t,v" + ",x" * 5_000 + "\n" + ("0" + ",1" * 5_001 + "\n") * 40 + "1\n" * 300_000,
+        (lambda: ",".join(f"c{i}" for i in range(1_000_000)) + "\n" + "1," * 999_999 + "1\n", "is not a log|line is longer|columns"),
+        (lambda: "t,v" + ",x" * 30_000 + "\n" + ("0" + ",1" * 30_001 + "\n") * 3, "30002 columns; at most 20000"),
+        (lambda: "t,v" + ",x" * 5_000 + "\n" + ("0" + ",1" * 5_001 + "\n") * 40 + "1\n" * 300_000,
          "rows are almost empty"),
-        (HEAD + '2,"' * 50_000, ""),
-        ('"' * 200_000 + ",v\n" + "0,1\n" * 50, ""),
-        (HEAD + "2," + "9x" * 10_000_000 + "\n3,4\n", ""),
-        (HEAD + "\0" * 20_000_000, ""),
-        (HEAD + "," * 20_000_000, ""),
-        (HEAD + "1\n" * 1_000_000, ""),
-        (HEAD + '"' + "x\n" * 1_000_000, ""),
+        (lambda: HEAD + '2,"' * 50_000, ""),
+        (lambda: '"' * 200_000 + ",v\n" + "0,1\n" * 50, ""),
+        (lambda: HEAD + "2," + "9x" * 10_000_000 + "\n3,4\n", ""),
+        (lambda: HEAD + "\0" * 20_000_000, ""),
+        (lambda: HEAD + "," * 20_000_000, ""),
+        (lambda: HEAD + "1\n" * 1_000_000, ""),
+        (lambda: HEAD + '"' + "x\n" * 1_000_000, ""),
     ],
     ids=["million", "wide", "short", "quotes", "header", "digits", "zeros", "commas", "rows", "open"],
 )  # fmt: skip
-def test_hostile_text_takes_bounded_memory(tmp_path: Path, text: str, reason: str) -> None:
+def test_hostile_text_takes_bounded_memory(tmp_path: Path, text: Callable[[], str], reason: str) -> None:
     path = tmp_path / "log.csv"
-    path.write_text(text)
+    path.write_text(text())
     tracemalloc.start()
     found = outcome(path)
     peak = tracemalloc.get_traced_memory()[1]
