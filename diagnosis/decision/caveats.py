@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from diagnosis.decision.explained import explaining, is_of_another
+from diagnosis.decision.explained import explaining
 from diagnosis.decision.severity import halved_words, unanswered
 from diagnosis.decision.short import main_reason, main_state, short_parts, unjudged_axles
 from diagnosis.decision.wording import count_words, join_words
@@ -153,7 +153,7 @@ def doubt_of(watch: Sequence[FaultInterval], against: Reservations) -> str:
         out.append("the machine's settings do not fit the log")
     out += [cut.text for cut in against.scope]
     out += dict.fromkeys(event.doubt for event in against.events)
-    own = [c for c in against.open if not is_of_another(c, explaining(c, watch))]
+    own = [c for c in against.open if (by := explaining(c, watch)) is None or not by.of_another]
     if own:
         out.append(open_words(own))
     elif against.open:
