@@ -257,7 +257,7 @@ def _act(
         if sensor
         else words.fill(
             "lift the machine, run each drive alone at one speed for 10 s, and compare their currents; or log the command of the "
-            "{valve} itself (wheel.{c}.u)"
+            "{valve} itself (wheel.{c}.u), or name it under [signals] if it is logged"
         ),
         Tier.TRACKING: f"log the commands (/cmd_vel of a ROS robot; cmd.v or wheel.{{c}}.v_ref) or {second}"
         if lack is Lack.BESIDE
