@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 
-from diagnosis.decision.caveats import Reservations, doubts_of, furthest_first
+from diagnosis.decision.caveats import Reservations, doubts_of
 from diagnosis.decision.explained import Explanation, explaining
+from diagnosis.decision.open_checks import furthest_first
 from diagnosis.decision.short import Part, ToClear, short_parts, sides_of, unjudged_axles
 from diagnosis.decision.wording import count_words, join_words, remedy_words
 from diagnosis.results.assessed import CutKind, is_judged

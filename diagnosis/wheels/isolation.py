@@ -242,8 +242,10 @@ def _sentences(
     """What decided, with figures; `stated` is the side that is stated, and the row."""
     side, row = stated
     share = dict(ranked)[row]
+    by_itself = m in TOTAL_SENSOR  # its channel alone shows it, whatever the opening
+    fits = f"{names[0]} fits" if by_itself else f"{names[0]} and {names[1]} fit"
     lines = [
-        f"Over {seconds:.3f} s {names[0]} and {names[1]} fit “{_words((side, row[1]))}”: on simulated machines with such signals it was this "
+        f"Over {seconds:.3f} s {fits} “{_words((side, row[1]))}”: on simulated machines with such signals it was this "
         f"in {100 * share:.0f} of 100 cases."
     ]
     ahead = run.ahead(m)

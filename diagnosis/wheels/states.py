@@ -22,7 +22,7 @@ _REASONS = {
 }
 _NO_COMMAND = Reason("no {valve} command to compare with", Lack.COMMAND)
 _UNCERTAIN = "the {wheel} model is too uncertain in this mission"
-_UNEXPLAINED = "its signals fit a healthy part and a faulty one alike"
+_UNEXPLAINED = "the signals fit a healthy part and a faulty one alike"
 
 
 @dataclass(frozen=True)

@@ -134,3 +134,15 @@ def test_every_check_has_words(check: Check) -> None:
 )
 def test_ratios_are_told_as_such_and_nothing_is_below_by_more_than_all(check: Check, worst: float, words: str) -> None:
     assert Checked(Kind.WHEEL, "FR", Side.SENSOR, check, worst, 0.1).text == words
+
+
+def test_what_stands_out_by_far_is_named_in_the_reason_of_a_mission_that_was_not_judged_long_enough() -> None:
+    far = Checked(Kind.WHEEL, "FR", Side.SENSOR_OR_ACTUATOR, Check.LASTING_RESPONSE, 1.7, 0.33)
+    near = replace(far, component="FL", worst=0.5)
+    short = replace(LIMITS, min_assessed=60.0)
+    told = verdict(machine(), short, checks=(near, far))
+    assert told.title == "Not judged long enough"
+    assert (
+        "The speed of FR per opening is 82 % below the other wheels' over the mission: look there first." in told.text
+    )
+    assert "look there first" not in verdict(machine(), short, checks=(near,)).text
