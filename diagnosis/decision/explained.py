@@ -56,7 +56,7 @@ class Explanation:
     Attributes
     ----------
     faults : tuple[FaultInterval, ...]
-        Of which any may be the cause, the likeliest ones, by their beginning.
+        Of which any may be the cause, the likeliest ones, by their names.
     of_another : bool
         Whether they are of other components, which the check compares with its own, and are no small losses: nothing speaks against its own.
     when : When
@@ -93,7 +93,7 @@ def _of(check: Checked, likeliest: Sequence[FaultInterval]) -> Explanation:
     first = likeliest[0]
     when, others = when_of(check, first), _clears(check, first)
     alike = [f for f in likeliest if others and _clears(check, f) and when_of(check, f) is when][:_TOLD] or [first]
-    return Explanation(tuple(sorted(alike, key=lambda f: f.start_ns)), others, when)
+    return Explanation(tuple(sorted(alike, key=lambda f: int(f.id[1:]))), others, when)
 
 
 def _may(check: Checked, fault: FaultInterval) -> bool:

@@ -158,7 +158,7 @@ def _of_doubts(faults: Sequence[FaultInterval], words: MachineWords) -> list[ToC
     return [
         ToClear(
             f"{f.id}: {doubt}.",
-            f"{remedy_words(f, faults, words)}, then diagnose the next mission",
+            f"{remedy_words([f], faults, words)}, then diagnose the next mission",
             sides_of([(f.component, f.side)]),
             f.id,
         )
@@ -182,13 +182,12 @@ def _of_faults(
     out = []
     for why, checks in by.items():
         said = _some([check.text for check in checks])
-        remedies = join_words(list(dict.fromkeys(remedy_words(f, faults, words) for f in why.faults)))
         point = ToClear(
             f"Explained by {_named(why, words)}: {said}. "
             f"This speaks against no part of {_components_in_words(checks)}, and clears none."
             if why.of_another
             else f"{why.when.before} {why.faults[0].id}, which may explain it: {said}.",
-            f"{remedies}, then diagnose the next mission",
+            f"{remedy_words(why.faults, faults, words)}, then diagnose the next mission",
             sides_of((check.component, check.side) for check in checks),
         )
         out.append((checks[0], point))

@@ -124,7 +124,7 @@ def test_several_faults_that_may_be_the_cause_are_named_together_each_with_its_r
     assert row.reason.startswith(
         "Explained by F1 (RL speed sensor) and F2 (RR speed sensor), at their time: the speed of FR"
     )
-    assert row.act.startswith("repair the RL speed sensor (F1) and repair the RR speed sensor (F2), then")
+    assert row.act.startswith("repair the RL speed sensor (F1) and the RR speed sensor (F2), then")
 
 
 def test_a_log_without_commands_asks_for_them_first() -> None:
