@@ -296,7 +296,7 @@ def _without_faults(
             text = f"No fault was found, but the log has nothing that shows what {who} should do."
             return Decision(Verdict.NOT_ASSESSED, _BESIDE_NOTHING, text)
         was = "was" if len(against.short) == 1 else "were"
-        text = f"No fault was found, but {who} {was} not judged long enough to be called healthy.{stands_out(against.open)}"
+        text = f"No fault was found, but {who} {was} not judged long enough to be called healthy{stands_out(against.open)}."
         return Decision(Verdict.NOT_ASSESSED, "Not judged long enough", text)
     if against.unexplained:
         named = sorted({c for c, _ in against.unexplained})

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from diagnosis.results.clearing import Checked
+from diagnosis.results.clearing import Check, Checked
 
 _STANDS_OUT = 3.0  # times the limit of a check: nobody should have to look for that among what is open
+_BESIDE_OTHERS = (Check.RESPONSE, Check.LASTING_RESPONSE, Check.CHANGE, Check.EXCESS, Check.LASTING_EXCESS)
 
 
 def furthest_first(checks: Sequence[Checked]) -> list[Checked]:
@@ -21,7 +22,6 @@ def open_words(checks: Sequence[Checked]) -> str:
 
 
 def stands_out(checks: Sequence[Checked]) -> str:
-    """What deviates by several times what stands against an all-clear, the furthest, as one more sentence; empty where nothing does."""
-    far = [c for c in checks if c.worst is not None and c.worst >= _STANDS_OUT * c.limit]
-    said = furthest_first(far)[0].text if far else ""
-    return f" {said[:1].upper()}{said[1:]}: look there first." if said else ""
+    """What deviates from the other parts by several times what stands against an all-clear, the furthest, to follow a clause; else empty."""
+    far = [c for c in checks if c.check in _BESIDE_OTHERS and c.worst is not None and c.worst >= _STANDS_OUT * c.limit]
+    return f", and {furthest_first(far)[0].text}" if far else ""

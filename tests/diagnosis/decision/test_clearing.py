@@ -143,6 +143,7 @@ def test_what_stands_out_by_far_is_named_in_the_reason_of_a_mission_that_was_not
     told = verdict(machine(), short, checks=(near, far))
     assert told.title == "Not judged long enough"
     assert (
-        "The speed of FR per opening is 82 % below the other wheels' over the mission: look there first." in told.text
+        "healthy, and the speed of FR per opening is 82 % below the other wheels' over the mission. To clear"
+        in told.text
     )
-    assert "look there first" not in verdict(machine(), short, checks=(near,)).text
+    assert "per opening" not in verdict(machine(), short, checks=(near,)).text
