@@ -272,6 +272,10 @@ def _act(check: Checked, twice: Collection[str]) -> str:
         )
     if check.check is Check.SECOND_MEASUREMENT and check.worst is not None:
         return "compare both measurements at one steady speed with a third one, such as a hand tachometer, then repair or rescale the one that is off"
+    if check.check is Check.ROUGHNESS and check.worst is not None:
+        return words.fill(
+            "check the connector, the cable and the target of the {wheel.sensor}, and drive the same again"
+        ) + ("" if check.component in twice else "; a log with wheel.<part>.v_true (a second speed) settles it")
     if check.worst is None:
         return f"move all {words.parts} together at one steady speed for at least 10 s, and diagnose that log"
     lifted = f"lift the machine, give every {words.part} the same command for 10 s, and compare their speeds with a hand tachometer"

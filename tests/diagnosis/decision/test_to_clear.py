@@ -116,6 +116,12 @@ def test_what_deviates_after_a_fault_is_told_so_and_an_angle_that_jumps_then_is_
     assert "F1" not in row.reason + row.act
 
 
+def test_a_speed_that_jumps_asks_for_its_sensor_and_for_no_other_wheel() -> None:
+    (one,) = told(Reservations(open=(Checked(Kind.WHEEL, "FR", Side.SENSOR, Check.ROUGHNESS, 0.4, 0.15, 1.0, 4.0),)))
+    assert "check the connector, the cable and the target of the speed sensor" in one
+    assert "tachometer" not in one
+
+
 def test_several_faults_that_may_be_the_cause_are_named_together_each_with_its_remedy() -> None:
     parts = {(w, "sensor"): assessed(finding(Side.SENSOR, FaultMode.STUCK, 1000, 3000)) for w in ("RR", "RL")}
     faults = intervals_of(parts, haulotte(), HYDRAULIC, 0, 1_000_000)
