@@ -46,6 +46,7 @@ _BESIDE_WHEELS = (
     Check.DELAY,
 )
 _BESIDE_AXLES = (Check.LASTING_RATE, Check.YAW, Check.LASTING_YAW)
+_OVER_MISSION = (Check.LASTING_RATE, Check.RATE)  # a rate that changes is compared with the other axle's
 _BY_ITSELF_ALONE = (Check.SECOND_MEASUREMENT, Check.JUMP)
 
 
@@ -76,7 +77,7 @@ def explaining(check: Checked, faults: Sequence[FaultInterval]) -> Explanation |
     start, stop = check.start_s, check.stop_s
     counted = [f for f in faults if f.severity is not Severity.INFO and _may(check, f)]
     if start is None or stop is None:
-        against = check.check is Check.LASTING_RATE  # one axle against the other: a fault of either
+        against = check.check in _OVER_MISSION  # one axle against the other: a fault of either
         steered = [f for f in counted if against and f.kind is Kind.STEER]
         longest = max(steered, key=lambda f: f.stop_s - f.start_s, default=None)
         return _of(check, [longest]) if longest is not None else None
@@ -105,7 +106,8 @@ def _compared(check: Checked, fault: FaultInterval) -> bool:
     """Whether what a check compares with its component is what a fault of another one changes."""
     if check.check in _BESIDE_WHEELS:
         return fault.component != check.component
-    return check.check in _BESIDE_AXLES and fault.kind is Kind.STEER and fault.component != check.component
+    beside = check.check in _BESIDE_AXLES or (check.check is Check.RATE and check.start_s is None)
+    return beside and fault.kind is Kind.STEER and fault.component != check.component
 
 
 def _clears(check: Checked, fault: FaultInterval) -> bool:

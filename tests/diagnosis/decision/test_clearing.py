@@ -123,7 +123,7 @@ def test_every_check_has_words(check: Check) -> None:
         ),
         (Check.EXCESS, 0.4, "the speed of FR per opening is 49 % above the other wheels'"),
         (Check.EXCESS, 3.15, "the speed of FR per opening is 23.3 times the other wheels'"),
-        (Check.RATE, 0.5, "the steering rate of the FR axle per opening is off its usual one by a factor of 1.65"),
+        (Check.RATE, 0.5, "the steering rate of the FR axle per opening changes by a factor of 1.65 in the mission"),
         (
             Check.TRACKING,
             1.78,

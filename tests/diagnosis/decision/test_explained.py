@@ -77,3 +77,13 @@ def test_a_small_loss_of_another_wheel_clears_nothing() -> None:
     why = explaining(check_of("FR", Check.EXCESS), intervals_of(found, haulotte(), HYDRAULIC, 0, 1_000_000))
     assert why is not None
     assert not why.of_another
+
+
+def test_a_steering_rate_that_changes_in_the_mission_is_compared_with_the_other_axle() -> None:
+    check = Checked(Kind.STEER, "front", Side.SENSOR_OR_ACTUATOR, Check.RATE, 0.9, 0.1)
+    assert check.text == "the steering rate of the front axle per opening changes by a factor of 2.5 in the mission"
+    why = explaining(check, faults_of(("rear", Side.SENSOR)))
+    assert why is not None
+    assert why.of_another
+    assert why.when is When.MISSION
+    assert explaining(check, faults_of(("RR", Side.SENSOR))) is None
