@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import re
 from collections.abc import Iterator, Mapping
 from typing import Any
@@ -43,12 +44,14 @@ def of_checks(report: Mapping[str, Any]) -> Iterator[str]:
     faults = {f["id"]: f for f in report["intervals"]}
     for row in report["verdict"]["to_clear"]:
         found = re.match(
-            r"(?:(At the time of|Just after) |Explained by )(F\d+), (?:the [^,:]+(, just after it)?)?", row["reason"]
+            r"(?:(At the time of|Just after) |Explained by )F\d+[^:]*?(, just after (?:it|them))?:", row["reason"]
         )
         if not found:
             continue
-        fault, during = faults[found.group(2)], found.group(1) != "Just after" and not found.group(3)
-        for start, stop in re.findall(r" at ([\d.]+)–([\d.]+) s", row["reason"]):
+        during = found.group(1) != "Just after" and not found.group(2)
+        named = [faults[name] for name in re.findall(r"F\d+", found.group(0))]
+        windows = re.findall(r" at ([\d.]+)–([\d.]+) s", row["reason"])
+        for fault, (start, stop) in itertools.product(named, windows):
             a, b = float(start), float(stop)
             shows = 0.0 if during else min(max(fault["stop_s"] - fault["start_s"], _STILL_SHOWS_S), _STILL_SHOWS_MOST_S)
             shared = min(b, fault["stop_s"] + shows) - max(a, fault["start_s"])

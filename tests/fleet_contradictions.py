@@ -19,7 +19,8 @@ from diagnosis.results.vocabulary import Leave, Verdict
 
 def fleet_contradictions(document: FleetDocument) -> list[str]:
     """One sentence for each contradiction in a ``fleet.json`` and what is made of it; empty where there is none."""
-    return [*_lists(document), *_headline(document), *_table(document), *_endings(document), *_words(document)]
+    checks = (_lists, _headline, _counts, _table, _endings, _words)
+    return [text for check in checks for text in check(document)]
 
 
 def _lists(document: FleetDocument) -> Iterator[str]:
@@ -56,6 +57,17 @@ def _headline(document: FleetDocument) -> Iterator[str]:
     ):
         if (found := re.search(form, title)) and int(found.group(1)) != counts[leave]:
             yield f"{title!r}, and {counts[leave]} in the list {leave!r}"
+
+
+def _counts(document: FleetDocument) -> Iterator[str]:
+    """Missions that judged a part, which are the same for each of its faults."""
+    told: dict[tuple[int, str, str], set[int]] = {}
+    for f in document["faults"]:
+        told.setdefault((f["machine"], f["component"], f["side"]), set()).add(f["assessed"])
+    for (machine, component, side), counts in told.items():
+        if len(counts) > 1:
+            label = document["machines"][machine]["label"]
+            yield f"{label}: {component} {side} was judged by {' and by '.join(map(str, sorted(counts)))} missions"
 
 
 def _table(document: FleetDocument) -> Iterator[str]:

@@ -18,7 +18,6 @@ from diagnosis.results.vocabulary import Leave, Verdict
 
 if TYPE_CHECKING:
     from diagnosis.audit.discovery.discover import Discovery
-    from diagnosis.audit.endings import Ending
     from diagnosis.audit.fleet.listed import ListedMachine
     from diagnosis.audit.plan import Planned
     from diagnosis.audit.session import Audited
@@ -76,7 +75,9 @@ def summary_parts(audited: Audited, found: Discovery, output: Path) -> list[Rend
         rest = len(damaged) - _NAMED
         more = f" and {rest} more" if rest > 0 else ""
         parts.append(text(f"damaged, or in part not judged: {', '.join(damaged[:_NAMED])}{more}", "dim"))
-    parts += [text(f"copies of one log, which count once: {', '.join(same)}", "dim") for same in _copies(ends)[:_NAMED]]
+    parts += [
+        text(f"copies of one log, which count once: {', '.join(same)}", "dim") for same in _copies(audited)[:_NAMED]
+    ]
     if audited.gone:
         was = "mission that is" if audited.gone == 1 else "missions that are"
         parts.append(text(f"the fleet page also counts {audited.gone} {was} no longer there", "dim"))
@@ -86,12 +87,14 @@ def summary_parts(audited: Audited, found: Discovery, output: Path) -> list[Rend
     return [*parts, "", key_values(files)]
 
 
-def _copies(ends: Sequence[Ending]) -> list[list[str]]:
-    """Names of missions that have one report, for they are one log."""
+def _copies(audited: Audited) -> list[list[str]]:
+    """Names of missions that are one log: they have one report, or lie in folders of several machines, where each has its own."""
     names: dict[str, list[str]] = defaultdict(list)
-    for end in ends:
+    first = {name: original for m in audited.machines for name, original in m.copies}
+    reports = {end.report: first.get(end.name, end.name) for end in reversed(audited.ends) if end.report is not None}
+    for end in audited.ends:
         if end.report is not None:
-            names[end.report].append(end.name)
+            names[first.get(end.name, reports[end.report])].append(end.name)
     return [same for same in names.values() if len(same) > 1]
 
 

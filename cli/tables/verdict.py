@@ -105,8 +105,9 @@ def _actions(actions: Sequence[ActionRow], report: ReportDocument) -> Table:
     said: dict[str, int] = {}
     for action in actions:
         lead = action.get("lead", "")
-        faults = ", ".join(action["faults"][:_FAULTS_NAMED])
-        more = "" if len(action["faults"]) <= _FAULTS_NAMED else ", …"
+        rest = len(action["faults"]) - _FAULTS_NAMED
+        faults = ", ".join(action["faults"][: _FAULTS_NAMED if rest > 1 else None])
+        more = f" and {rest} more" if rest > 1 else ""
         out.add_row(
             severity_text(action["severity"], action["n"]),
             Text.assemble(text(lead, "bold"), text(action["text"].removeprefix(lead)), "  ", (faults + more, "dim")),

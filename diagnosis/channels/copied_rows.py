@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -17,6 +18,9 @@ _MOST = 0.25  # of the moving time: what is more common is the source's habit
 _ZERO, _EXTREME = 0.02, 0.98  # of a channel's largest value: what stands there may well stand still
 _CHANNELS = 2  # that must stand still at a value of their own
 _MOVING = ("v", "v_true", "u", "u_applied", "effort", "phi")
+_HELD_ALONG = re.compile(
+    r"steer\..*\.u"
+)  # an axle is held at its angle by a gain alone: a sensor that is held holds its command, too
 Span = tuple[int, int]
 
 
@@ -24,7 +28,7 @@ def without_copied_rows(timeline: Timeline) -> Timeline:
     """A timeline without samples where a source repeats its rows as a whole; the same one where none does.
 
     A drive's controller never holds its effort to the last digit while the speed stands still at a value too: such rows
-    are the logger's. Where only one channel repeats itself, its sensor may be stuck, and nothing is removed.
+    are the logger's. Where only one channel repeats itself, or an axle's angle with its command, a sensor may be stuck, and nothing is removed.
     """
     signals, fresh = dict(timeline.signals), dict(timeline.fresh)
     notes = list(timeline.notes)
@@ -60,7 +64,8 @@ def copied_rows(timeline: Timeline, names: Sequence[str]) -> list[Span]:
     names : Sequence[str]
         Channels of one source.
     """
-    moving = [n for n in names if n.rsplit(".", 1)[-1] in _MOVING and not np.isnan(timeline.signals[n]).all()]
+    telling = [n for n in names if n.rsplit(".", 1)[-1] in _MOVING and not _HELD_ALONG.fullmatch(n)]
+    moving = [n for n in telling if not np.isnan(timeline.signals[n]).all()]
     if len(moving) < _CHANNELS:
         return []
     changes = np.flatnonzero(_changed(timeline, names))

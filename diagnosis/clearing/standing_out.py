@@ -24,6 +24,7 @@ from diagnosis.results.clearing import Check, Checked
 from diagnosis.results.limited import limited
 from diagnosis.results.machine_event import MachineEvent
 from diagnosis.results.machine_words import MachineWords
+from diagnosis.results.sentence import mapped
 from diagnosis.results.vocabulary import Kind, Tier
 from replay.faults import FaultMode, Side, State
 
@@ -64,7 +65,8 @@ def what_stands_out(checks: Sequence[Checked], cells: Cells, words: MachineWords
     if wheel is not None and (told := fault_of_wheel(wheel, cells, alone=alone is not None)) is not None:
         found[wheel.component] = told
     return {
-        component: replace(f, evidence=tuple(words.fill(text) for text in f.evidence)) for component, f in found.items()
+        component: replace(f, evidence=tuple(mapped(text, words.fill) for text in f.evidence))
+        for component, f in found.items()
     }
 
 

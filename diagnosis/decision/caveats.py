@@ -7,7 +7,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from diagnosis.decision.explained import explaining, is_of_another
+from diagnosis.decision.explained import explaining
+from diagnosis.decision.open_checks import open_words
 from diagnosis.decision.severity import halved_words, unanswered
 from diagnosis.decision.short import main_reason, main_state, short_parts, unjudged_axles
 from diagnosis.decision.wording import count_words, join_words
@@ -153,7 +154,7 @@ def doubt_of(watch: Sequence[FaultInterval], against: Reservations) -> str:
         out.append("the machine's settings do not fit the log")
     out += [cut.text for cut in against.scope]
     out += dict.fromkeys(event.doubt for event in against.events)
-    own = [c for c in against.open if not is_of_another(c, explaining(c, watch))]
+    own = [c for c in against.open if (by := explaining(c, watch)) is None or not by.of_another]
     if own:
         out.append(open_words(own))
     elif against.open:
@@ -170,17 +171,6 @@ def doubts_of(faults: Sequence[FaultInterval], words: MachineWords) -> list[tupl
         if f.severity in (Severity.MEDIUM, Severity.LOW)
         and (why := "may not answer" if unanswered(f) else halved_words(f.side, f.mode, f.epsilon))
     ]
-
-
-def furthest_first(checks: Sequence[Checked]) -> list[Checked]:
-    """Checks that deviate, the furthest beyond its limit first, then those that the mission does not show."""
-    return sorted(checks, key=lambda c: -1.0 if c.worst is None else c.worst / c.limit, reverse=True)
-
-
-def open_words(checks: Sequence[Checked]) -> str:
-    """Why checks clear nothing, by the one that is furthest beyond its limit; the list below the verdict has the others."""
-    others = len({(c.component, c.check) for c in checks}) > 1
-    return furthest_first(checks)[0].text + ("; other checks of the all-clear are open, too" if others else "")
 
 
 def caveats_of(

@@ -14,10 +14,10 @@ from diagnosis.decision.caveats import (
     caveats_of,
     doubt_of,
     limits_of,
-    open_words,
     smallest_loads,
 )
 from diagnosis.decision.endings import endings_of
+from diagnosis.decision.open_checks import open_words, stands_out
 from diagnosis.decision.short import ToClear, beside_nothing, exempt_axles
 from diagnosis.decision.to_clear import to_clear
 from diagnosis.decision.wording import actions_of, count_faults, join_words, misplaced_words, sentence_of
@@ -296,7 +296,7 @@ def _without_faults(
             text = f"No fault was found, but the log has nothing that shows what {who} should do."
             return Decision(Verdict.NOT_ASSESSED, _BESIDE_NOTHING, text)
         was = "was" if len(against.short) == 1 else "were"
-        text = f"No fault was found, but {who} {was} not judged long enough to be called healthy."
+        text = f"No fault was found, but {who} {was} not judged long enough to be called healthy{stands_out(against.open)}."
         return Decision(Verdict.NOT_ASSESSED, "Not judged long enough", text)
     if against.unexplained:
         named = sorted({c for c, _ in against.unexplained})

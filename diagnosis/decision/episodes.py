@@ -8,7 +8,6 @@ beginning of it.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
@@ -19,6 +18,7 @@ from numpy.typing import NDArray
 from diagnosis.results.assessment import CODE, Assessment, Finding
 from diagnosis.results.candidates import candidates
 from diagnosis.results.result import Epsilon
+from diagnosis.results.sentence import About, stated_anew
 from diagnosis.results.vocabulary import Tier
 from replay.faults import TOTAL, FaultMode, State
 
@@ -29,8 +29,6 @@ _SEEN_SCALED_S = 0.3  # what loses a share looks healthy while its reference pas
 _SPARE = 0.1  # of ε̂: by which two bounds may miss each other
 _NAMED = 6
 _TOUCHES_S = 0.1
-_CASES = "it was this in ", " of 100 cases"
-_IN_CASES = re.compile(rf"{_CASES[0]}\d+{_CASES[1]}")
 Part = tuple[str, str]
 
 
@@ -55,8 +53,8 @@ def with_episodes(assessments: Mapping[Part, Assessment], dt: float) -> dict[Par
 
 def _with_its_chance(finding: Finding) -> Finding:
     """The same with sentences that give the probability of what it was joined or put together to, not of a part of it."""
-    said = f"{_CASES[0]}{100 * finding.probability:.0f}{_CASES[1]}"
-    return replace(finding, evidence=tuple(_IN_CASES.sub(said, text) for text in finding.evidence))
+    said = f"{100 * finding.probability:.0f}"
+    return replace(finding, evidence=tuple(stated_anew(text, About.CASES, said) for text in finding.evidence))
 
 
 def joined(findings: Sequence[Finding], states: Mapping[str, NDArray[np.int8]], dt: float) -> tuple[Finding, ...]:

@@ -20,6 +20,7 @@ from replay.machine.config import Limits
 Part = tuple[str, str]
 
 _SAID_S = 0.05  # of judged driving: less is nothing
+_WITH_COMMAND = "record again, with wheel.{c}.u (the {valve} command) in the log all the time"
 
 
 @dataclass(frozen=True)
@@ -240,13 +241,15 @@ def _act(
     if tier is Tier.NONE:
         return _of_silent(sensor, state, lack)
     by_state = {
-        State.NO_DATA: "record again, with wheel.{c}.v and its command in the log all the time",
+        State.NO_DATA: _WITH_COMMAND
+        if lack is Lack.COMMAND
+        else "record again, with wheel.{c}.v and its command in the log all the time",
         State.NOT_EXCITED: f"move {words.parts_moved} {faster} for at least {limits.min_assessed:g} s",
         State.MASKED: words.fill("repair the {wheel.sensor} first, then record a mission again"),
         State.SLIP: "drive straight ahead on ground with grip for at least 10 s",
     }
     if state in by_state:
-        return by_state[state]
+        return words.fill(by_state[state])
     second = "wheel.{c}.v_true (a second speed)"
     by_tier = {
         Tier.DIRECT: "log both measurements by one clock, with finer steps"
@@ -257,7 +260,7 @@ def _act(
         if sensor
         else words.fill(
             "lift the machine, run each drive alone at one speed for 10 s, and compare their currents; or log the command of the "
-            "{valve} itself (wheel.{c}.u)"
+            "{valve} itself (wheel.{c}.u), or name it under [signals] if it is logged"
         ),
         Tier.TRACKING: f"log the commands (/cmd_vel of a ROS robot; cmd.v or wheel.{{c}}.v_ref) or {second}"
         if lack is Lack.BESIDE
@@ -272,7 +275,7 @@ def _act(
     if tier in by_tier:
         return by_tier[tier]
     if lack is Lack.COMMAND:
-        return words.fill("log wheel.{c}.u (the {valve} command)")
+        return words.fill(_WITH_COMMAND)
     other = second if sensor else f"wheel.{{c}}.u_applied (the {words.position})"
     return f"log {other}; without it, drive straight at three steady speeds for 10 s each"
 

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 
-from diagnosis.decision.caveats import Reservations, doubts_of, furthest_first
-from diagnosis.decision.explained import When, explaining, is_of_another, when_of
+from diagnosis.decision.caveats import Reservations, doubts_of
+from diagnosis.decision.explained import Explanation, explaining
+from diagnosis.decision.open_checks import furthest_first
 from diagnosis.decision.short import Part, ToClear, short_parts, sides_of, unjudged_axles
 from diagnosis.decision.wording import count_words, join_words, remedy_words
 from diagnosis.results.assessed import CutKind, is_judged
@@ -131,8 +132,8 @@ def to_clear(
     at_rest = {k for k, state in against.open_state.items() if state is State.NOT_EXCITED}  # exempt: its checks count
     brief = [k for k in steered if k not in {*unjudged, *at_rest} and _brief(k, decided_s, driven, limits)]
     twice = {c for (c, side), a in assessments.items() if a.tier is Tier.DIRECT and side == Side.SENSOR}
-    blamed = {k: f for k, c in enumerate(against.open) if (f := explaining(c, faults)) is not None}
-    deviating = _of_faults([(against.open[k], f) for k, f in blamed.items()], faults, words)
+    blamed = {k: by for k, c in enumerate(against.open) if (by := explaining(c, faults)) is not None}
+    deviating = _of_faults([(against.open[k], by) for k, by in blamed.items()], faults, words)
     told = {component for component, _ in (*unjudged, *brief)}  # what has them judged lets their checks pass
     left = [c for k, c in enumerate(against.open) if k not in blamed]
     deviating += _of_checks([c for c in left if c.component not in told or not _asks_for_steering(c, twice)], twice)
@@ -157,7 +158,7 @@ def _of_doubts(faults: Sequence[FaultInterval], words: MachineWords) -> list[ToC
     return [
         ToClear(
             f"{f.id}: {doubt}.",
-            f"{remedy_words(f, faults, words)}, then diagnose the next mission",
+            f"{remedy_words([f], faults, words)}, then diagnose the next mission",
             sides_of([(f.component, f.side)]),
             f.id,
         )
@@ -166,33 +167,39 @@ def _of_doubts(faults: Sequence[FaultInterval], words: MachineWords) -> list[ToC
 
 
 def _of_faults(
-    blamed: Sequence[tuple[Checked, FaultInterval]], faults: Sequence[FaultInterval], words: MachineWords
+    blamed: Sequence[tuple[Checked, Explanation]], faults: Sequence[FaultInterval], words: MachineWords
 ) -> list[tuple[Checked, ToClear]]:
-    """Checks that deviate while faults last, or just after, those of one fault together: of each component the furthest beyond its limit.
+    """Checks that deviate while faults last, or just after, those of the same faults together: of each component the furthest beyond its limit.
 
     Each with the furthest of its checks.
     """
-    by: dict[tuple[str, When, bool], list[tuple[Checked, FaultInterval]]] = {}
+    by: dict[Explanation, list[Checked]] = {}
     of = dict(blamed)
     for check in furthest_first(list(of)):
-        fault = of[check]
-        mine = by.setdefault((fault.id, when_of(check, fault), is_of_another(check, fault)), [])
-        if all(check.component != c.component for c, _ in mine):
-            mine.append((check, fault))
+        mine = by.setdefault(of[check], [])
+        if all(check.component != c.component for c in mine):
+            mine.append(check)
     out = []
-    for (_, when, others), mine in by.items():
-        fault, checks = mine[0][1], [check for check, _ in mine]
+    for why, checks in by.items():
         said = _some([check.text for check in checks])
         point = ToClear(
-            f"Explained by {fault.id}, the {words.part_words(fault.kind, fault.component, fault.side)}{when.after}: {said}. "
+            f"Explained by {_named(why, words)}: {said}. "
             f"This speaks against no part of {_components_in_words(checks)}, and clears none."
-            if others
-            else f"{when.before} {fault.id}, which may explain it: {said}.",
-            f"{remedy_words(fault, faults, words)}, then diagnose the next mission",
+            if why.of_another
+            else f"{why.when.before} {why.faults[0].id}, which may explain it: {said}.",
+            f"{remedy_words(why.faults, faults, words)}, then diagnose the next mission",
             sides_of((check.component, check.side) for check in checks),
         )
-        out.append((mine[0][0], point))
+        out.append((checks[0], point))
     return out
+
+
+def _named(why: Explanation, words: MachineWords) -> str:
+    """The faults of an explanation with their parts, and how their time lies to it."""
+    parts = [(f.id, words.part_words(f.kind, f.component, f.side)) for f in why.faults]
+    if len(parts) == 1:
+        return f"{parts[0][0]}, the {parts[0][1]}{why.when.after.format(its='its', it='it')}"
+    return join_words([f"{name} ({part})" for name, part in parts]) + why.when.after.format(its="their", it="them")
 
 
 def _components_in_words(checks: Sequence[Checked]) -> str:
@@ -265,6 +272,10 @@ def _act(check: Checked, twice: Collection[str]) -> str:
         )
     if check.check is Check.SECOND_MEASUREMENT and check.worst is not None:
         return "compare both measurements at one steady speed with a third one, such as a hand tachometer, then repair or rescale the one that is off"
+    if check.check is Check.ROUGHNESS and check.worst is not None:
+        return words.fill(
+            "check the connector, the cable and the target of the {wheel.sensor}, and drive the same again"
+        ) + ("" if check.component in twice else "; a log with wheel.<part>.v_true (a second speed) settles it")
     if check.worst is None:
         return f"move all {words.parts} together at one steady speed for at least 10 s, and diagnose that log"
     lifted = f"lift the machine, give every {words.part} the same command for 10 s, and compare their speeds with a hand tachometer"

@@ -68,14 +68,18 @@ def _order(faults: Sequence[FaultInterval]) -> str:
     return "Check at the next service" if worst.mode.total else "Check"
 
 
-def remedy_words(fault: FaultInterval, faults: Sequence[FaultInterval], words: MachineWords) -> str:
-    """What the action of a fault's part comes to, by what is open for it: ``check the FR drive valve (F1) and repair what is found``.
+def remedy_words(of: Sequence[FaultInterval], faults: Sequence[FaultInterval], words: MachineWords) -> str:
+    """What the actions of some faults' parts come to, by what is open for each: ``check the FR drive valve (F1) and repair what is found``.
 
     `faults`: all of the mission, for the worst of a part decides.
     """
-    part = f"the {words.part_words(fault.kind, fault.component, fault.side)} ({fault.id})"
-    stop = any((f.component, f.side) == (fault.component, fault.side) and f.severity is Severity.HIGH for f in faults)
-    return f"repair {part}" if stop else f"check {part} and repair what is found"
+    stop = {(f.component, f.side) for f in faults if f.severity is Severity.HIGH}
+    parts: dict[bool, list[str]] = {True: [], False: []}
+    for f in of:
+        part = f"the {words.part_words(f.kind, f.component, f.side)} ({f.id})"
+        parts[(f.component, f.side) in stop].append(part)
+    said = [f"repair {join_words(parts[True])}"] if parts[True] else []
+    return ", ".join([*said, *([f"check {join_words(parts[False])} and repair what is found"] if parts[False] else [])])
 
 
 def _urgency(worst: FaultInterval) -> int:

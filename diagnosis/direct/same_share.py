@@ -5,7 +5,6 @@ A part that sticks does not stick at just the share of its command that it loses
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -14,9 +13,10 @@ from numpy.typing import NDArray
 
 from diagnosis.channels.sample_status import PAIR
 from diagnosis.direct.identification import IdentifiedPair
-from diagnosis.direct.sentences import BOUNDS, OF_SAT
+from diagnosis.direct.sentences import bounds_words
 from diagnosis.results.assessment import Finding
 from diagnosis.results.result import Epsilon, Hypothesis
+from diagnosis.results.sentence import About, is_about, stated_anew
 from replay.faults import FaultMode
 
 Array = NDArray[np.float64]
@@ -57,8 +57,8 @@ def as_beside(finding: Finding, all_of_them: Sequence[Finding], found: Identifie
         return finding
     both = 2 * likely if still else likely + p[finding.mode]
     p |= {FaultMode.STUCK if still else finding.mode: (1.0 - _SAME_P) * both, FaultMode.INEFFICIENT: _SAME_P * both}
-    bounds = f"(95 %: {1 - lost - _ONE_GAIN:.3f} to {1 - lost + _ONE_GAIN:.3f})"
-    said = (e for e in finding.evidence if OF_SAT not in e)
+    bounds = bounds_words(1 - lost - _ONE_GAIN, 1 - lost + _ONE_GAIN)
+    said = (e for e in finding.evidence if not is_about(e, About.SAT))
     return replace(
         finding,
         mode=FaultMode.INEFFICIENT,
@@ -66,7 +66,7 @@ def as_beside(finding: Finding, all_of_them: Sequence[Finding], found: Identifie
         hypotheses=tuple(sorted((replace(h, p=p[h.mode]) for h in finding.hypotheses), key=lambda h: -h.p)),
         epsilon=Epsilon(lost, lost - _ONE_GAIN, lost + _ONE_GAIN),
         sat=None,
-        evidence=(*(re.sub(BOUNDS, bounds, e) for e in said), _SAME_SHARE),
+        evidence=(*(stated_anew(e, About.SHARE, bounds) for e in said), _SAME_SHARE),
     )
 
 

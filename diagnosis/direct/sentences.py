@@ -10,11 +10,9 @@ from diagnosis.direct.isolation import Isolated
 from diagnosis.direct.shape import shape_sentence
 from diagnosis.estimation.fault_models import TOTAL_ROWS
 from diagnosis.results.result import Epsilon
+from diagnosis.results.sentence import About, Sentence
 from diagnosis.results.sizes import amount, kept_to, times_as_probable
 from replay.faults import FaultMode
-
-#: Bounds in a sentence, and what tells that one is of the saturation term: a finding that is joined to another states both anew.
-BOUNDS, OF_SAT = r"\(95 %: \S+ to \S+\)", "which is ε̂ × sat"
 
 END_SENTENCE = (
     "It stands at its end while its command asks for less, the same way: a {valve} that opens too far does so as well."
@@ -36,7 +34,7 @@ def sentences(isolated: Isolated, found: IdentifiedPair, mode: FaultMode, epsilo
         What is stated of it.
     """
     pair, seen = found.pair, isolated.seen
-    out = []
+    out: list[str] = []
     seconds = seen.y.size * pair.dt
     silent = int(np.count_nonzero(seen.status == SILENT))
     if silent:
@@ -48,18 +46,24 @@ def sentences(isolated: Isolated, found: IdentifiedPair, mode: FaultMode, epsilo
             names = pair.y_name, pair.x_name
             out += [s for s in [shape_sentence(seen.y[seen.use], seen.x[seen.use], pair.dt, names, pair.unit)] if s]
         out += _values(isolated, found, epsilon, seconds)
-        out.append(
-            f"Residual, loss and noise together, {amount(seen.deviation, pair.unit)} root mean square; threshold {amount(3 * seen.noise, pair.unit, 2)}."
-        )
+        words = f"Residual, loss and noise together, {amount(seen.deviation, pair.unit)} root mean square; threshold {amount(3 * seen.noise, pair.unit, 2)}."
+        out.append(Sentence(About.DEVIATION, words))
     if mode is FaultMode.OUTSIDE_TABLE:
         out.append("The gain is outside 0…1, which no row of the tables describes.")
-    out.append(f"{pair.y_name} is {times_as_probable(isolated.gain)} with this fault as without one.")
+    out.append(
+        Sentence(About.TIMES, f"{pair.y_name} is {times_as_probable(isolated.gain)} with this fault as without one.")
+    )
     return tuple(out)
 
 
 def alike_sentence(found: IdentifiedPair) -> str:
     """Why a constant value and a constant share are equally probable."""
     return f"{found.pair.x_name} hardly moved but for its noise, so stuck and inefficient cannot be distinguished."
+
+
+def bounds_words(low: float, high: float) -> str:
+    """Bounds of a share [1]: ``(95 %: 0.290 to 0.310)``."""
+    return f"(95 %: {low:.3f} to {high:.3f})"
 
 
 def _values(isolated: Isolated, found: IdentifiedPair, epsilon: Epsilon | None, seconds: float) -> list[str]:
@@ -79,14 +83,19 @@ def _values(isolated: Isolated, found: IdentifiedPair, epsilon: Epsilon | None, 
         ]
     if epsilon is None:
         return []
-    out = [
-        f"{pair.y_name} followed {1 - epsilon.value:.3f} × {pair.x_name} (95 %: {1 - epsilon.high:.3f} to "
-        f"{1 - epsilon.low:.3f}) over {seconds:.3f} s."
+    out: list[str] = [
+        Sentence(
+            About.SHARE,
+            f"{pair.y_name} followed {1 - epsilon.value:.3f} × {pair.x_name} ",
+            bounds_words(1 - epsilon.high, 1 - epsilon.low),
+            f" over {seconds:.3f} s.",
+        )
     ]
     sat = isolated.estimate[1]
     if sat is not None:
-        out.append(
+        words = (
             f"The rest has a mean of {amount(sat.mean * epsilon.value, pair.unit)} and a root mean square of "
-            f"{amount(sat.rms * epsilon.value, pair.unit)}, {OF_SAT}; healthy noise is {amount(seen.noise, pair.unit, 2)}."
+            f"{amount(sat.rms * epsilon.value, pair.unit)}, which is ε̂ × sat; healthy noise is {amount(seen.noise, pair.unit, 2)}."
         )
+        out.append(Sentence(About.SAT, words))
     return out

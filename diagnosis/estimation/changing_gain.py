@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from diagnosis.estimation.simple_causes import Measured, every_power
 from diagnosis.results.assessment import Finding
 from diagnosis.results.result import Epsilon, Hypothesis
+from diagnosis.results.sentence import About, is_about
 from replay.faults import FaultMode
 
 Array = NDArray[np.float64]
@@ -75,7 +76,7 @@ def as_changing_gain(finding: Finding, measured: Measured) -> Finding:
         f"{measured.names[0]} is a share of {measured.names[1]} that changes slowly, from {usual.max():.2f} to {usual.min():.2f}; "
         f"this leaves {100 * left:.0f} % of the deviation's power."
     )
-    figures = tuple(e for e in finding.evidence if e.startswith("Residual,") or "times as probable" in e)
+    figures = tuple(e for e in finding.evidence if is_about(e, About.DEVIATION, About.TIMES))
     start = at[before] if before else finding.start
     known = finding.detected is not None and finding.detected >= start  # what raised it before was none of it
     return replace(

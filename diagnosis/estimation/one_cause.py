@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from diagnosis.estimation.simple_causes import Cause, Measured, causes, every_power, power
 from diagnosis.results.assessment import Finding
 from diagnosis.results.result import Hypothesis
+from diagnosis.results.sentence import About, is_about
 from replay.faults import FaultMode, State
 
 Array = NDArray[np.float64]
@@ -293,7 +294,7 @@ def joined(near: Sequence[Finding], cause: Cause) -> Finding:
     start = near[0].start if cause.start is None else cause.start
     stop = max(f.stop for f in near) if cause.stop is None else cause.stop
     raised = [f.detected for f in near if f.detected is not None and start <= f.detected < stop]
-    figures = tuple(e for e in longest.evidence if e.startswith(("Residual,", "Over ")) or "times as probable" in e)
+    figures = tuple(e for e in longest.evidence if is_about(e, About.DEVIATION, About.CASES, About.TIMES))
     pieces = f"This alone leaves {100 * cause.left:.0f} % of the deviation's power over {len(near)} pieces that were found one after the other."
     return replace(
         longest,

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from diagnosis.estimation.simple_causes import Measured
 from diagnosis.results.assessment import Finding
 from diagnosis.results.result import Epsilon, Hypothesis
+from diagnosis.results.sentence import About, is_about
 from replay.faults import FaultMode
 
 Array = NDArray[np.float64]
@@ -141,7 +142,7 @@ def _as_loss(finding: Finding, spell: tuple[int, int], windows: _Windows, measur
     )
     rows = ((FaultMode.INEFFICIENT, _P), (FaultMode.NOISY, _P_NOISE), (FaultMode.OUTSIDE_TABLE, 1.0 - _P - _P_NOISE))
     known = finding.detected is not None and start <= finding.detected < stop
-    figures = tuple(e for e in finding.evidence if "times as probable" in e)
+    figures = tuple(e for e in finding.evidence if is_about(e, About.TIMES))
     return replace(
         finding,
         start=start,

@@ -9,6 +9,7 @@ import numpy as np
 
 from diagnosis.estimation.simple_causes import Measured
 from diagnosis.results.assessment import Finding
+from diagnosis.results.sentence import About, is_about
 from diagnosis.results.sizes import amount
 
 _FAR = 6.0  # times the noise: a spike
@@ -57,7 +58,7 @@ def with_spikes(findings: Sequence[Finding], measured: Measured) -> list[Finding
         stop=last,
         epsilon=None,
         sat=None,
-        evidence=(words, *(e for e in surest.evidence if "times as probable" in e)),
+        evidence=(words, *(e for e in surest.evidence if is_about(e, About.TIMES))),
         detected=min(raised, default=None),
     )
     return sorted([joined, *(f for f in findings if not f.mode.varying)], key=lambda f: f.start)

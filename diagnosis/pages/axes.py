@@ -79,6 +79,9 @@ class Frame:
         )
 
 
+_CONSTANT, _ROUNDING = 0.01, 1e-9  # of a level: room about one value, and what no axis can resolve
+
+
 def ticks(low: float, high: float, most: int) -> list[float]:
     """At most `most` round values between two. In the unit of the axis."""
     rough = (high - low) / most
@@ -100,7 +103,8 @@ def limits(*series: NDArray[np.float64], least: float = 0.0) -> tuple[float, flo
     if not values.size:
         return None
     low, high = float(values.min()), float(values.max())
-    extra = max(0.08 * (high - low), 0.5 * (least - (high - low)), 1e-9 * max(1.0, abs(low), abs(high)))
+    level = max(1.0, abs(low), abs(high)) * (_CONSTANT if high == low else _ROUNDING)
+    extra = max(0.08 * (high - low), 0.5 * (least - (high - low)), level)
     return low - extra, high + extra
 
 

@@ -18,6 +18,7 @@ from diagnosis.response.common_cause import (
     spans_of,
     standing,
     stands_with_all,
+    unwinds,
     without_consequences,
 )
 from diagnosis.response.drive import by_peers, unanswered
@@ -143,6 +144,7 @@ def assess_response(
             if not others_fault(s, w, judged)
             and not told_and_doing_alike(s, w, judged)
             and not consequence(s, w, judged)
+            and not unwinds(s, w, judged, width * dt)
             and not wrong_yaw_rate(s, j)
             and s not in slips[w]
             and s not in turned[w]

@@ -18,12 +18,14 @@ from diagnosis.response.models import LEAST_P
 from diagnosis.response.rivals import jumped
 from diagnosis.response.spells import Spell
 from diagnosis.results.assessment import Finding
+from diagnosis.results.clearing import after_s
 from replay.faults import FaultMode
 
 Flags = NDArray[np.bool_]
 
 _LEAST_TOGETHER = 2  # wheels that stand still, beside one that seems not to
 _OVERLAP = 0.5  # of what may be a consequence
+_SOON_S = 0.5  # after a sensor reads again: what its loop has wound up shows at once
 _AFTER_S, _LESS = (
     10.0,
     0.85,
@@ -75,6 +77,33 @@ def consequence(spell: Spell, wheel: str, judged: Mapping[str, Judged]) -> bool:
     span = spell.start, spell.stop
     return any(
         o != wheel and evident(s, j) and overlaps((s.start, s.stop), span) for o, j in judged.items() for s in j.spells
+    )
+
+
+def unwinds(spell: Spell, wheel: str, judged: Mapping[str, Judged], block_s: float) -> bool:
+    """Whether a speed is off its command just after its own sensor read nothing usable: the loop unwinds what it wound up against that.
+
+    Parameters
+    ----------
+    spell : Spell
+        Of `wheel`.
+    wheel : str
+        The wheel.
+    judged : Mapping[str, Judged]
+        All wheels.
+    block_s : float
+        Length of a block [s].
+    """
+    if spell.own or not (spell.mode.scaled or spell.mode is FaultMode.OUTSIDE_TABLE):
+        return False
+    one, last = judged[wheel], spell.stop * block_s
+    return any(
+        s.mode.total
+        and s.p >= LEAST_P
+        and evident(s, one)
+        and -1 <= spell.start - s.stop <= _SOON_S / block_s
+        and last <= s.stop * block_s + after_s(s.start * block_s, s.stop * block_s)
+        for s in one.spells
     )
 
 

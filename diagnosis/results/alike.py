@@ -16,6 +16,8 @@ Array = NDArray[np.float64]
 _MOVES = 0.15  # of what it is off by: a reference that moves over less tells a constant channel from no shifted one
 _SHIFTED = 0.4  # of such a channel that seems stuck: that it is off by a constant
 _FEW = 5
+_MOVING = 0.1  # of the usual reference: from here on a channel that lives shows its own noise
+_HELD, _LONGER = 0.9, 5.0  # of the time, and times as long as it ever stays elsewhere
 
 #: Says so.
 SHIFTED_SENTENCE = "What it should show hardly moved meanwhile: off by a constant it would read the same."
@@ -36,6 +38,38 @@ def hardly_moves(y: Array, x: Array, most: float = np.inf) -> bool:
     low, high = np.quantile(x, (0.05, 0.95))
     off = abs(float(np.median(y - x)))
     return float(high - low) < _MOVES * off <= _MOVES * most
+
+
+def is_held(y: Array, x: Array, span: tuple[int, int]) -> bool:
+    """Whether a channel reads one value to the last digit while its reference moves on, as it does nowhere else.
+
+    One that is off by a constant goes on to show its noise, wherever it is.
+
+    Parameters
+    ----------
+    y, x : Array, shape (n,)
+        The channel and its reference over the mission [unit]; NaN where not known.
+    span : tuple[int, int]
+        Samples [start, stop) in question.
+    """
+    known = np.isfinite(y) & np.isfinite(x)
+    size = np.abs(x[known])
+    if size.size < _FEW:
+        return False
+    moving = known & (np.abs(np.nan_to_num(x)) > _MOVING * np.quantile(size, 0.95))
+    inside = np.zeros(y.size, np.bool_)
+    inside[slice(*span)] = True
+    if np.mean(moving[inside]) < _HELD:
+        return False
+    held, elsewhere = _longest(y, moving & inside), _longest(y, moving & ~inside)
+    return held >= max(_FEW, _HELD * (span[1] - span[0])) and held >= _LONGER * elsewhere > 0
+
+
+def _longest(y: Array, where: NDArray[np.bool_]) -> int:
+    """Most samples one after another, in some places, that are alike."""
+    new = np.ones(y.size, np.bool_)
+    new[1:] = (y[1:] != y[:-1]) | ~(where[1:] & where[:-1])
+    return int(np.max(np.bincount(np.cumsum(new)[where]), initial=0)) if where.any() else 0
 
 
 def or_shifted(finding: Finding, why: str = SHIFTED_SENTENCE) -> Finding:

@@ -111,6 +111,9 @@ CHECK_WORDS: dict[Check, tuple[str, str]] = {
 }
 
 
+#: The same of a steering rate that changes from one part of the mission to another.
+_RATE_CHANGES = "the steering rate of the {part} axle per {unit_command} changes by a {value} in the mission"
+
 #: Share of a window that a fault must cover to explain what deviates over it: means of less are no total loss.
 MAY_EXPLAIN = 1 / 3
 _AFTER_S = (0.5, 3.0)  # of a fault, in which it still shows, at least and at most
@@ -175,7 +178,9 @@ class Checked:
             return f"{words}: this mission leaves the check “{self.asked}” open"
         two = self.check is Check.SECOND_MEASUREMENT
         value = "" if self.worst is None else self._value
-        said = self.words.fill(CHECK_WORDS[self.check][1]).format(part=words if two else self.component, value=value)
+        changes = self.check is Check.RATE and self.start_s is None
+        said = self.words.fill(_RATE_CHANGES if changes else CHECK_WORDS[self.check][1])
+        said = said.format(part=words if two else self.component, value=value)
         return said + (f" at {self.start_s:.1f}–{self.stop_s:.1f} s" if self.start_s is not None else "")
 
     @property

@@ -10,6 +10,7 @@ from dataclasses import replace
 
 from diagnosis.results.assessment import Assessment, Finding
 from diagnosis.results.machine_words import MachineWords
+from diagnosis.results.sentence import mapped
 
 
 def worded(found: Assessment, words: MachineWords) -> Assessment:
@@ -26,4 +27,4 @@ def _finding(found: Finding, words: MachineWords) -> Finding:
     sat = found.sat
     if sat is not None and sat.unit == "m/s":
         sat = replace(sat, unit=words.speed_unit)
-    return replace(found, evidence=tuple(words.fill(text) for text in found.evidence), sat=sat)
+    return replace(found, evidence=tuple(mapped(text, words.fill) for text in found.evidence), sat=sat)

@@ -15,6 +15,7 @@ from diagnosis.estimation.one_cause import with_one_cause
 from diagnosis.estimation.simple_causes import Measured
 from diagnosis.results.assessment import Finding
 from diagnosis.results.result import Epsilon, Hypothesis
+from diagnosis.results.sentence import About, is_about
 from diagnosis.results.sizes import amount
 from diagnosis.steering.findings import SideFindings
 from diagnosis.steering.inputs import AxleInputs
@@ -42,7 +43,6 @@ _IN_MIDDLE, _BESIDE = (
     0.02,
     0.04,
 )  # of full opening: as far off its zero a valve without signal rests, and further off a stuck one
-_BY_MODEL = "times as probable with"  # says what the model of the axle took it for
 _MEANWHILE = "Meanwhile {second}, a second measurement of the angle, moved over {other}, and {name} over {own}."
 _CONSTANT = "The command hardly moved meanwhile: a {valve} that is off by a constant would look the same."
 
@@ -204,7 +204,10 @@ def _as_it_opens(
                 ),
                 epsilon=Epsilon(lost, lost - _LOSES, min(1.0, lost + _LOSES)),
                 sat=None,
-                evidence=(_SHOWN.format(gain=gain, zero=100.0 * zero), *(e for e in f.evidence if _BY_MODEL not in e)),
+                evidence=(
+                    _SHOWN.format(gain=gain, zero=100.0 * zero),
+                    *(e for e in f.evidence if not is_about(e, About.TIMES)),
+                ),
             )
         )
     return SideFindings(tuple(kept), tuple(open_))
@@ -226,7 +229,7 @@ def _by_its_place(finding: Finding, opening: Array) -> Finding:
     named = tuple(
         replace(h, mode=other.get(h.mode, h.mode)) if h.side == finding.side else h for h in finding.hypotheses
     )
-    evidence = (_STANDS.format(place=100.0 * middle), *(e for e in finding.evidence if _BY_MODEL not in e))
+    evidence = (_STANDS.format(place=100.0 * middle), *(e for e in finding.evidence if not is_about(e, About.TIMES)))
     return replace(finding, mode=mode, hypotheses=named, evidence=evidence)
 
 

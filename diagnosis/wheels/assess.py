@@ -179,7 +179,7 @@ def _assessments(
             unexplained_s=unexplained_s(states, side, found, data.dt),
             closeups=pictured.closeups,
         )
-        out.append(with_reasons(judged, no_opening, gains=gains))
+        out.append(with_reasons(judged, no_opening, data.dt, gains=gains))
     return out[0], out[1]
 
 

@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnosis.results.alike import hardly_moves, or_shifted
+from diagnosis.results.alike import hardly_moves, is_held, or_shifted
 from diagnosis.results.assessment import Finding
 from diagnosis.results.limited import limited
 from diagnosis.results.result import Hypothesis
@@ -85,7 +85,8 @@ def _or_off(f: Finding, y: Array, expected: Array) -> Finding:
     part = slice(f.start, f.stop)
     use = np.isfinite(y[part]) & np.isfinite(expected[part])
     stuck = f.side is Side.SENSOR and f.mode is FaultMode.STUCK
-    return or_shifted(f) if stuck and hardly_moves(y[part][use], expected[part][use]) else f
+    alike = stuck and hardly_moves(y[part][use], expected[part][use]) and not is_held(y, expected, (f.start, f.stop))
+    return or_shifted(f) if alike else f
 
 
 def _hardly_stuck(f: Finding, *, measured: bool) -> bool:

@@ -12,6 +12,7 @@ from diagnosis.results.assessment import Finding
 from diagnosis.results.fault_rows import mode_words
 from diagnosis.results.machine_words import part_token
 from diagnosis.results.result import Hypothesis
+from diagnosis.results.sentence import About, Sentence
 from diagnosis.results.sizes import kept_to, times_as_probable
 from diagnosis.results.vocabulary import Kind, Tier
 from diagnosis.wheels.estimates import estimate
@@ -242,13 +243,14 @@ def _sentences(
     """What decided, with figures; `stated` is the side that is stated, and the row."""
     side, row = stated
     share = dict(ranked)[row]
-    lines = [
-        f"Over {seconds:.3f} s {names[0]} and {names[1]} fit “{_words((side, row[1]))}”: on simulated machines with such signals it was this "
-        f"in {100 * share:.0f} of 100 cases."
-    ]
+    by_itself = m in TOTAL_SENSOR  # its channel alone shows it, whatever the opening
+    fits = f"{names[0]} fits" if by_itself else f"{names[0]} and {names[1]} fit"
+    words = f"Over {seconds:.3f} s {fits} “{_words((side, row[1]))}”: on simulated machines with such signals it was this in "
+    lines: list[str] = [Sentence(About.CASES, words, f"{100 * share:.0f}", " of 100 cases.")]
     ahead = run.ahead(m)
     if ahead > 0:
-        lines.append(f"{names[0]} is {times_as_probable(ahead)} by its Kalman model as by that of a healthy {{wheel}}.")
+        words = f"{names[0]} is {times_as_probable(ahead)} by its Kalman model as by that of a healthy {{wheel}}."
+        lines.append(Sentence(About.TIMES, words))
     else:
         lines.append("Its Kalman model alone would not be preferred to that of a healthy {wheel}.")
     if m == S_NONE and not known.size:

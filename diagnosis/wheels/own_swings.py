@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from diagnosis.results.assessment import Finding
 from diagnosis.results.result import Hypothesis
+from diagnosis.results.sentence import About, is_about
 from diagnosis.wheels.blocks import per_sample
 from diagnosis.wheels.findings import WheelFindings, WheelPath
 from replay.faults import FaultMode, Side, State
@@ -28,8 +29,6 @@ _SHARE, _SHARE_OF_FEW, _OF_ALL = (
 )  # of the power that lies there: of what is not slower than the least, and of all
 _FEW = 4  # pieces
 _FAULT, _ROW = 0.65, 0.1  # that it is a fault of this wheel, and that it is noise: on tuning seeds 35 and 5 of 52 were
-
-_CASES = " of 100 cases"  # of the row that it is no more said to be
 
 
 def swing_hz(off: Array, dt: float) -> float | None:
@@ -111,7 +110,7 @@ def opened(finding: Finding, why: str) -> Finding:
         hypotheses=_hypotheses(row, fault),
         epsilon=None,
         sat=None,
-        evidence=(why, *(e for e in finding.evidence if _CASES not in e)),
+        evidence=(why, *(e for e in finding.evidence if not is_about(e, About.CASES))),
     )
 
 

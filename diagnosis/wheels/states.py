@@ -20,9 +20,9 @@ _REASONS = {
     State.NO_DATA: "no samples",
     State.SLIP: "the {wheel}'s speed contradicts the other {wheels} while it follows its {valve}: it slips, or its sensor is faulty",
 }
-_NO_COMMAND = Reason("no {valve} command to compare with", Lack.COMMAND)
+_NO_COMMAND = "no {valve} command to compare with"
 _UNCERTAIN = "the {wheel} model is too uncertain in this mission"
-_UNEXPLAINED = "its signals fit a healthy part and a faulty one alike"
+_UNEXPLAINED = "the signals fit a healthy part and a faulty one alike"
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,7 @@ def states_of(data: WheelsData, i: int, path: WheelPath, found: WheelFindings) -
     return WheelStates({Side.SENSOR: sensor, Side.ACTUATOR: actuator}, quiet)
 
 
-def with_reasons(one: Assessment, no_opening: NDArray[np.bool_], *, gains: bool) -> Assessment:
+def with_reasons(one: Assessment, no_opening: NDArray[np.bool_], dt: float, *, gains: bool) -> Assessment:
     """The same with why states that are no judgement were given.
 
     Parameters
@@ -65,13 +65,33 @@ def with_reasons(one: Assessment, no_opening: NDArray[np.bool_], *, gains: bool)
         One side, its states of shape (n,).
     no_opening : NDArray[np.bool_], shape (n,)
         Where nobody knows the valve's opening.
+    dt : float
+        Step [s].
     gains : bool
         Whether the wheel model is good enough to judge gains and the valve by.
     """
-    open_ = one.states == CODE[State.NOT_ASSESSED]
+    absent = Reason(_NO_COMMAND + _times_of(no_opening, dt), Lack.COMMAND)
     commanded = Reason(_UNEXPLAINED if gains else _UNCERTAIN)
-    reason = _NO_COMMAND if 2 * np.count_nonzero(open_ & no_opening) > np.count_nonzero(open_) else commanded
-    return replace(one, reasons=_REASONS).reasoned(State.NOT_ASSESSED, reason)
+    reason = absent if _mostly(one, State.NOT_ASSESSED, no_opening) else commanded
+    out = replace(one, reasons=_REASONS).reasoned(State.NOT_ASSESSED, reason)
+    return out.reasoned(State.NO_DATA, absent) if _mostly(one, State.NO_DATA, no_opening) else out
+
+
+def _mostly(one: Assessment, state: State, where: NDArray[np.bool_]) -> bool:
+    """Whether a state is given mostly where something holds, shape (n,)."""
+    there = one.states == CODE[state]
+    return bool(2 * np.count_nonzero(there & where) > np.count_nonzero(there))
+
+
+def _times_of(there: NDArray[np.bool_], dt: float) -> str:
+    """When something holds, to follow words; empty where it always does: ``, from 52.5 s on``."""
+    at = np.flatnonzero(there)
+    if not at.size or at.size == there.size:
+        return ""
+    start, stop = int(at[0]), int(at[-1]) + 1
+    if stop - start > at.size:
+        return f", for {at.size * dt:.1f} s"
+    return f", from {start * dt:.1f} s on" if stop == there.size else f", from {start * dt:.1f} to {stop * dt:.1f} s"
 
 
 def unexplained_s(states: WheelStates, side: Side, found: WheelFindings, dt: float) -> float:

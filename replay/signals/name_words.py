@@ -34,7 +34,7 @@ _PARTS = (
     "geschwindigkeit", "geschw", "drehzahl", "drehmoment", "drehrate", "gierrate", "gier", "winkel", "lenkung", "lenk",
     "ventil", "schieber", "stellung", "stell", "groesse", "ansteuerung", "strom", "spannung", "moment", "druck", "motor",
     "fahr", "antrieb", "achse", "achs", "vorder", "hinter", "vorne", "vorn", "hinten", "links", "rechts", "rad", "soll", "ist",
-    "mess", "wert", "werte", "vorgabe", "rate", "position", "dreh", "kolben", "weg", "hub", "oeffnung", "oeffnungsgrad",
+    "mess", "wert", "werte", "signal", "befehl", "vorgabe", "rate", "position", "dreh", "kolben", "weg", "hub", "oeffnung", "oeffnungsgrad",
 )  # fmt: skip
 _TOGETHER = re.compile(rf"(?:{'|'.join(_PARTS)})+")
 _PART = re.compile("|".join(sorted(_PARTS, key=len, reverse=True)))
@@ -75,6 +75,7 @@ _FILLERS = frozenset(
     ("wert", "werte", "value", "val", "values", "percent", "pct", "prozent", "pourcent",
      *("mps", "kmh", "kph", "radps", "rads", "degps", "degs", "dps"))  # units that are no other word
 )  # fmt: skip
+_SET = ("groesse", "wert", "signal", "befehl")  # Stellgröße, Stellwert: what a valve is told
 _OPENING = frozenset(
     ("opening", "oeffnung", "oeffnungsgrad", "ouverture", "apertura")
 )  # of a valve: what every valve's channel is
@@ -107,7 +108,7 @@ def _tokens(name: str) -> tuple[str, ...]:
 def english(words: Sequence[str]) -> list[str]:
     """Words as the patterns of the signal table know them.
 
-    ``n`` and ``v`` beside a setpoint or a measurement are a rotational speed and a speed, ``Stellgröße`` is a valve's command.
+    ``n`` and ``v`` beside a setpoint or a measurement are a rotational speed and a speed, ``Stellgröße`` and ``Stellwert`` are a valve's command.
 
     Parameters
     ----------
@@ -116,8 +117,8 @@ def english(words: Sequence[str]) -> list[str]:
     """
     out: list[str] = []
     for word in words:
-        if word == "groesse" and out[-1:] == ["stell"]:
-            out[-1:] = ["valve", "cmd"]
+        if word in _SET and out[-1:] == ["stell"]:
+            out[-1:] = ["cmd"] if "valve" in out else ["valve", "cmd"]
         elif word == "stellung" and out[-1:] == ["valve"]:
             out.append("pos")
         elif word in _FILLERS or (word in _DROPPED.get(out[-1], ()) if out else False):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter, defaultdict
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from typing import NamedTuple
@@ -12,7 +12,7 @@ from diagnosis.audit.fleet.fault_types import Status
 from diagnosis.audit.fleet.machines import OPEN, STANDING, FleetFault, Machine
 from diagnosis.audit.fleet.owners import Owner, Owners
 from diagnosis.audit.fleet.read import FoundFault, Mission
-from diagnosis.audit.fleet.runs import Limits, Run
+from diagnosis.audit.fleet.runs import Limits, Run, sides_of
 from diagnosis.audit.store.repairs import Repair, repaired_at
 from diagnosis.results.vocabulary import Severity, Verdict
 
@@ -149,12 +149,19 @@ def _with_faults(m: Machine, own: _Known) -> Machine:
     repaired = frozenset(
         (run.result.id, *key) for key, found in groups.items() for run, _ in found if own.is_repaired(run, key)
     )
-    faults = [_fleet_fault(m, found, own) for found in groups.values()]
+    on_part: dict[tuple[str, str], set[int]] = defaultdict(set)
+    for (component, side, _), found in groups.items():
+        for one in sides_of(side):
+            on_part[component, one] |= {run.result.id for run, _ in found}
+    faults = [_fleet_fault(m, found, own, on_part) for found in groups.values()]
     faults.sort(key=lambda f: (not f.standing, -f.severity.rank, -f.missions, f.component, f.side, f.mode))
     return m.told(faults=tuple(faults), repaired=repaired)
 
 
-def _fleet_fault(m: Machine, found: Sequence[tuple[Run, FoundFault]], own: _Known) -> FleetFault:
+def _fleet_fault(
+    m: Machine, found: Sequence[tuple[Run, FoundFault]], own: _Known, on_part: Mapping[tuple[str, str], Collection[int]]
+) -> FleetFault:
+    """One fault of a machine over its missions; `on_part`: results with any fault of a component's side, which judged it."""
     f = found[0][1]
     key = (f.component, f.side, f.mode)
     ids = list(dict.fromkeys(r.result.id for r, _ in found))
@@ -172,7 +179,8 @@ def _fleet_fault(m: Machine, found: Sequence[tuple[Run, FoundFault]], own: _Know
     ordered = bool(dated) and len(dated) == len(now)
     since = sum(assessed[dated[-1] + 1 :]) if ordered else 0
     before = sum(assessed[: dated[0]]) if dated else 0
-    undated = sum(every_assessed[len(m.dated) :])
+    told = {name for side in sides_of(f.side) for name in on_part[f.component, side]}
+    judged = sum(a or run.result.id in told for a, run in zip(every_assessed, m.runs, strict=True))
     with_it = set(dated)
     without = [k for k in range(dated[-1]) if assessed[k] and k not in with_it] if dated else []
     past = {m.dated[k].result.id for k in dated if without and k < without[-1]}
@@ -193,7 +201,7 @@ def _fleet_fault(m: Machine, found: Sequence[tuple[Run, FoundFault]], own: _Know
         severity=max((g.severity for r, g in shown if r.result.id not in past), key=lambda severity: severity.rank),
         status=status,
         missions=len(ids),
-        assessed=max(len(ids), sum(assessed) + undated),
+        assessed=max(len(ids), judged),
         first=m.dated[every[0]] if every else found[0][0],
         last=last_run,
         last_id=worst.id,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -30,6 +31,8 @@ class ListedMachine:
         Its faults that stand.
     with_faults, judged : int
         Missions with faults, and missions that were judged.
+    copies : tuple[tuple[str, str], ...]
+        Missions that are copies of one of its logs, in whichever folder, each with the name of that one.
     leave, reason, mission : str
         Whether it may go out, why, and the name of the mission that says so or blocks it.
     """
@@ -43,6 +46,7 @@ class ListedMachine:
     leave: str = ""
     reason: str = ""
     mission: str = ""
+    copies: tuple[tuple[str, str], ...] = ()
 
 
 def machine_words(m: MachineRow, standing: Sequence[FleetFaultRow], approaching: bool, leave: Leave = Leave.MAY) -> str:
@@ -78,6 +82,10 @@ def listed_machines(document: FleetDocument) -> tuple[ListedMachine, ...]:
     """Machines of a fleet's document in its order, worst first."""
     near = {t["machine"] for t in document["trends"] if t["approaching"]}
     out, lists = [], lists_of(document)
+    copies: dict[int | None, list[tuple[str, str]]] = defaultdict(list)
+    for x in document["missions"]:
+        if original := x.get("copy_of"):
+            copies[x["machine"]].append((x["name"], original))
     for k, m in enumerate(document["machines"]):
         standing = [f for f in document["faults"] if f["machine"] == k and f["status"] not in GONE]
         out.append(
@@ -91,6 +99,7 @@ def listed_machines(document: FleetDocument) -> tuple[ListedMachine, ...]:
                 lists[k].leave.value,
                 lists[k].reason,
                 lists[k].name,
+                tuple(copies[k]),
             )
         )
     return tuple(out)

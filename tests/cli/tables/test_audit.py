@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import io
+from dataclasses import replace
 from pathlib import Path
 
 from rich.console import Console
@@ -74,6 +75,13 @@ def test_of_many_failures_some_are_shown() -> None:
 def test_copies_are_named() -> None:
     lines = printed(*(ending(n, "ok", "ready", report=f"missions/{n[0]}") for n in ("a", "b", "b (1)")))
     assert "copies of one log, which count once: b, b (1)" in lines
+
+
+def test_copies_in_the_folders_of_two_machines_are_told_though_each_has_a_report() -> None:
+    ends = (ending("M1__a", "ok", "ready", "M1", report="1"), ending("M2__a", "ok", "ready", "M2", report="2"))
+    lines = printed(*ends, machines=(M2, replace(M1, copies=(("M2__a", "M1__a"),))))
+    assert "copies of one log, which count once: M1__a, M2__a" in lines
+    assert not any("copies" in line for line in printed(*ends))
 
 
 def test_missions_that_are_gone_are_told() -> None:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -72,3 +74,22 @@ def test_channels_of_different_sources_are_not_one_row() -> None:
     given = timeline("wheel.M.v", "wheel.M.u")
     apart = replace(given, groups={"wheel.M.v": "a /speed", "wheel.M.u": "a /effort", "wheel.M.v_ref": "a /command"})
     assert without_copied_rows(apart) is apart
+
+
+def test_an_angle_that_is_held_with_its_command_may_be_a_stuck_sensor() -> None:
+    given = timeline("wheel.M.v", "wheel.M.u")
+    name = {"wheel.M.v": "steer.rear.phi", "wheel.M.u": "steer.rear.u", "wheel.M.v_ref": "steer.rear.phi_ref"}
+    one = "log.csv t steer"
+
+    def named(by: Mapping[str, Any]) -> dict[str, Any]:
+        return {name[n]: x for n, x in by.items()}
+
+    axle = replace(
+        given,
+        signals=named(given.signals),
+        fresh=named(given.fresh),
+        sources=named(given.sources),
+        periods_ns=named(given.periods_ns),
+        groups=dict.fromkeys(name.values(), one),
+    )
+    assert without_copied_rows(axle) is axle

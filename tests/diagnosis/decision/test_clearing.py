@@ -123,7 +123,7 @@ def test_every_check_has_words(check: Check) -> None:
         ),
         (Check.EXCESS, 0.4, "the speed of FR per opening is 49 % above the other wheels'"),
         (Check.EXCESS, 3.15, "the speed of FR per opening is 23.3 times the other wheels'"),
-        (Check.RATE, 0.5, "the steering rate of the FR axle per opening is off its usual one by a factor of 1.65"),
+        (Check.RATE, 0.5, "the steering rate of the FR axle per opening changes by a factor of 1.65 in the mission"),
         (
             Check.TRACKING,
             1.78,
@@ -134,3 +134,16 @@ def test_every_check_has_words(check: Check) -> None:
 )
 def test_ratios_are_told_as_such_and_nothing_is_below_by_more_than_all(check: Check, worst: float, words: str) -> None:
     assert Checked(Kind.WHEEL, "FR", Side.SENSOR, check, worst, 0.1).text == words
+
+
+def test_what_stands_out_by_far_is_named_in_the_reason_of_a_mission_that_was_not_judged_long_enough() -> None:
+    far = Checked(Kind.WHEEL, "FR", Side.SENSOR_OR_ACTUATOR, Check.LASTING_RESPONSE, 1.7, 0.33)
+    near = replace(far, component="FL", worst=0.5)
+    short = replace(LIMITS, min_assessed=60.0)
+    told = verdict(machine(), short, checks=(near, far))
+    assert told.title == "Not judged long enough"
+    assert (
+        "healthy, and the speed of FR per opening is 82 % below the other wheels' over the mission. To clear"
+        in told.text
+    )
+    assert "per opening" not in verdict(machine(), short, checks=(near,)).text

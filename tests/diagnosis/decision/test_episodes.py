@@ -13,6 +13,7 @@ from diagnosis.decision.intervals import intervals_of
 from diagnosis.results.assessment import CODE, Assessment, Finding
 from diagnosis.results.machine_words import HYDRAULIC
 from diagnosis.results.result import Hypothesis
+from diagnosis.results.sentence import About, Sentence
 from diagnosis.results.vocabulary import Tier
 from replay.faults import FaultMode, Side, State
 from tests.diagnosis.decision.findings import MACHINE, STEP, N, assessed, finding
@@ -95,7 +96,7 @@ def test_a_single_fault_stays_as_it_is() -> None:
 
 
 def test_a_sentence_gives_the_probability_of_the_whole() -> None:
-    said = "on simulated machines with such signals it was this in 38 of 100 cases."
+    said = Sentence(About.CASES, "on simulated machines with such signals it was this in ", "38", " of 100 cases.")
     (one,) = joined(replace(loss(1000, 1500), probability=0.89, evidence=(said, "Next best: 7 of 100.")))
     assert one.evidence == (said.replace("38", "89"), "Next best: 7 of 100.")
 

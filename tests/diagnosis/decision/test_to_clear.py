@@ -116,6 +116,23 @@ def test_what_deviates_after_a_fault_is_told_so_and_an_angle_that_jumps_then_is_
     assert "F1" not in row.reason + row.act
 
 
+def test_a_speed_that_jumps_asks_for_its_sensor_and_for_no_other_wheel() -> None:
+    (one,) = told(Reservations(open=(Checked(Kind.WHEEL, "FR", Side.SENSOR, Check.ROUGHNESS, 0.4, 0.15, 1.0, 4.0),)))
+    assert "check the connector, the cable and the target of the speed sensor" in one
+    assert "tachometer" not in one
+
+
+def test_several_faults_that_may_be_the_cause_are_named_together_each_with_its_remedy() -> None:
+    parts = {(w, "sensor"): assessed(finding(Side.SENSOR, FaultMode.STUCK, 1000, 3000)) for w in ("RR", "RL")}
+    faults = intervals_of(parts, haulotte(), HYDRAULIC, 0, 1_000_000)
+    more = Checked(Kind.WHEEL, "FR", Side.SENSOR_OR_ACTUATOR, Check.EXCESS, 0.9, 0.1, 1.5, 4.0)
+    (row,) = to_clear(Reservations(open=(more,)), PARTS, {}, {}, [], Limits(), faults)
+    assert row.reason.startswith(
+        "Explained by F1 (RL speed sensor) and F2 (RR speed sensor), at their time: the speed of FR"
+    )
+    assert row.act.startswith("repair the RL speed sensor (F1) and the RR speed sensor (F2), then")
+
+
 def test_a_log_without_commands_asks_for_them_first() -> None:
     first, *_ = told(Reservations(short=tuple(PARTS), uncommanded=True))
     assert first.startswith("No command is in the log")

@@ -13,6 +13,7 @@ from diagnosis.channels.sample_status import PAIR as PAIR_STATUS
 from diagnosis.direct.same_share import as_beside, as_excess_beside
 from diagnosis.results.assessment import Finding
 from diagnosis.results.result import Epsilon, Hypothesis, Sat
+from diagnosis.results.sentence import About, Sentence
 from diagnosis.results.vocabulary import Tier
 from replay.faults import FaultMode, Side
 
@@ -23,8 +24,15 @@ def loss(mode: FaultMode, epsilon: Epsilon, p: float, other: float = 0.0) -> Fin
     second = FaultMode.INEFFICIENT if mode is FaultMode.NOISY else FaultMode.NOISY
     rows = (Hypothesis("actuator", mode, p), Hypothesis("actuator", second, other))
     said = (
-        f"y followed {1 - epsilon.value:.3f} × u (95 %: {1 - epsilon.high:.3f} to {1 - epsilon.low:.3f}) over 4 s.",
-        "The rest has a mean of 0 and a root mean square of 0, which is ε̂ × sat; healthy noise is 0.",
+        Sentence(
+            About.SHARE,
+            f"y followed {1 - epsilon.value:.3f} × u ",
+            f"(95 %: {1 - epsilon.high:.3f} to {1 - epsilon.low:.3f})",
+            " over 4 s.",
+        ),
+        Sentence(
+            About.SAT, "The rest has a mean of 0 and a root mean square of 0, which is ε̂ × sat; healthy noise is 0."
+        ),
     )
     return Finding(
         start=0,

@@ -113,3 +113,15 @@ def test_a_wheel_that_stands_for_most_of_the_mission_is_told_and_not_the_one_bes
     j = assess_response(followers_of(measured, asked, body), geometry(), None, LIMITS, DT)
     found = {w: {f.mode for f in sensor.findings} for w, (sensor, _) in j.parts.items()}
     assert found == {"FR": set(), "FL": set(), "RR": set(), "RL": {FaultMode.NO_SIGNAL}}
+
+
+@pytest.mark.parametrize("kept", [False, True], ids=["unwinds", "goes on"])
+def test_what_a_loop_unwinds_after_a_held_sensor_is_no_fault_of_its_own(kept: bool) -> None:
+    """The controller saw too little while the sensor stood, and drives the wheel too fast for two seconds when it reads again."""
+    measured, asked, body = speeds(21)
+    measured["RL"][span(60, 74)] = measured["RL"][span(60, 61)][0] + 0.1
+    after = span(74, 82 if kept else 76)
+    measured["RL"][after] *= 1.35
+    told = [(f.mode, f.start * DT) for w, _, f in found(measured, asked, body) if w == "RL"]
+    assert FaultMode.STUCK in {mode for mode, _ in told}
+    assert any(start > 73.0 for _, start in told) is kept

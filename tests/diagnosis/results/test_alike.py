@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from diagnosis.results.alike import SHIFTED_SENTENCE, hardly_moves, or_shifted
+from diagnosis.results.alike import SHIFTED_SENTENCE, hardly_moves, is_held, or_shifted
 from diagnosis.results.assessment import Finding
 from diagnosis.results.result import Hypothesis
 from diagnosis.results.vocabulary import Tier
@@ -35,6 +35,21 @@ def test_what_is_far_off_is_not_shifted() -> None:
 
 def test_it_takes_some_readings() -> None:
     assert not hardly_moves(np.full(3, 0.3), np.zeros(3))
+
+
+@pytest.mark.parametrize(
+    ("kind", "held"), [("held", True), ("shifted", False), ("at rest", False), ("always so", False)]
+)
+def test_a_held_channel_shows_no_noise_where_one_that_is_off_goes_on_to(kind: str, held: bool) -> None:
+    x = np.full(2000, 1.0)
+    x[:200], span = 0.0, (1000, 1500)
+    y = x + np.random.default_rng(1).normal(0.0, 0.004, x.size)
+    if kind == "always so":
+        y = np.round(y, 1)
+    if kind == "at rest":
+        x[slice(*span)] = 0.0
+    y[slice(*span)] = y[slice(*span)] - 0.4 if kind == "shifted" else 0.6
+    assert is_held(y, x, span) is held
 
 
 def test_both_are_named() -> None:

@@ -62,7 +62,7 @@ _DEFINITIONS = (
     "mission would have shown such a fault of ten seconds more often than not. Repaired: not found since the repair.",
     "Missions with a report count. A copy of a log, a log that was not read and one that is not audited yet are missions that "
     "do not count in machines, faults and trends.",
-    "A mission judged a part, or judged it long enough: decided, healthy or faulty, for the seconds that the verdict “ready” takes and for four fifths of its driving. Check before it goes out: the missions do not tell that the machine is sound.",
+    "A mission judged a part, or judged it long enough: decided, healthy or faulty, for the seconds that the verdict “ready” takes and for four fifths of its driving; one that found a fault of it counts as one that judged it. Check before it goes out: the missions do not tell that the machine is sound.",
     "Trend: weighted line through the missions' ε̂ over time, each over its whole mission, while a fault's ε̂ is that of the fault's own time; it is fitted by least squares, so that a time counts by the square of the speed, opening or angle in it, and a loss of half of the mission may be more or less than half of it; the spread from mission to mission is estimated with it. "
     "Outliers (×) are excluded. A step or bend (↓ ↑ ∠), such as a repair, starts a new line. "
     "The band is its 90 % interval, the bar on the limit the 90 % interval of the crossing.",
