@@ -25,6 +25,7 @@ _SHARE = 0.03  # of the speed
 _BLAME_BLOCKS = 9  # over which it is asked whose command misfit is the larger
 _LEAST_TOGETHER, _TOGETHER = 3, 0.15  # other wheels, and their median misfit, of the usual speed
 _AGAINST, _AGAINST_BLOCKS = 0.1, 6  # of the top speed; blocks
+_MAKES = 0.5  # of a misfit beside other wheels: as much beside the command makes it
 _DIFFER = 0.3  # of the speed: by as much two wheels that show one speed differ only where one of them is wrong
 _OWN_MISFIT = (
     1.5  # times the usual misfit beside the command: from there on a misfit beside the body's sensor is the wheel's
@@ -144,7 +145,7 @@ def _by_wheels(
     elif all(o in by_body for o in (w, *others)):
         blame = _blame([_off_body(blocks[o], by_body[o]) for o in (w, *others)])
     else:
-        blame = _blame_by_commands(blocks[w], [blocks[o] for o in others])
+        blame = _blame_by_commands(blocks[w], [blocks[o] for o in others], speed)
     rough = np.asarray(np.max([blocks[o].rough for o in others], axis=0))
     noise = _noise(blocks[w], speed)
     alone = not speeds and len(wheels) == 2 and turns_by_wheels(blocks[w].mean, blocks[others[0]].mean)
@@ -179,7 +180,7 @@ def _by_all_others(w: str, wheels: Mapping[str, str], blocks: Mapping[str, Block
         kept = use & (off <= np.quantile(off[use], 0.7))
     if np.median(np.abs(y - speed)[use]) > _TOGETHER * np.median(np.abs(y[use])):
         return None
-    blame = _blame_by_commands(blocks[w], [blocks[o] for o in others])
+    blame = _blame_by_commands(blocks[w], [blocks[o] for o in others], speed)
     rough = np.asarray(np.max([blocks[o].rough for o in others], axis=0))
     made = np.sqrt((parts**2).sum(axis=1))  # wheels may cancel each other, their errors do not
     return Beside(speed, _noise(blocks[w], speed, made), blame, rough, " and ".join(wheels[o] for o in others))
@@ -265,14 +266,30 @@ def _off_body(blocks: Blocks, view: View) -> Array:
     return np.abs(blocks.mean - view.speed) / _noise(blocks, view.speed)
 
 
-def _blame_by_commands(own: Blocks, others: Sequence[Blocks]) -> Array:
-    """Share of a misfit that is the own wheel's: by who is further off its command, or who alone makes nothing of it at all."""
+def _blame_by_commands(own: Blocks, others: Sequence[Blocks], speed: Array) -> Array:
+    """Share of a misfit that is the own wheel's: by who is further off its command, or who alone makes nothing of it at all.
+
+    A wheel that is off its command by a small part of what it differs from `speed`, shape (b,) [m/s], does not make the difference,
+    however exactly it usually follows.
+    """
     mine, theirs = _answers(own), [_answers(o) for o in others]
     if mine and not all(theirs):
         return np.zeros(own.mean.size)
     if not mine and any(theirs):
         return np.ones(own.mean.size)
-    return _blame([_off_command(b) for b in (own, *others)])
+    blame = _blame([_off_command(b) for b in (own, *others)])
+    return blame * _makes(own, speed) if mine else blame
+
+
+def _makes(own: Blocks, speed: Array) -> Array:
+    """How much of a misfit beside other wheels a wheel's misfit beside its command can make, 0…1; shape (b,).
+
+    `speed` of shape (b,): by the others [m/s].
+    """
+    off, apart = own.mean - np.clip(own.mean, own.low, own.high), own.mean - speed
+    kernel = np.ones(_BLAME_BLOCKS)
+    both = [np.convolve(np.nan_to_num(np.abs(x)), kernel, mode="same") for x in (off, apart)]
+    return np.asarray(np.clip(both[0] / np.maximum(_MAKES * both[1], 1e-9), 0.0, 1.0))
 
 
 def _answers(blocks: Blocks) -> bool:
