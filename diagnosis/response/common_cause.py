@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from diagnosis.channels.standstill import not_followed, stood_still
 from diagnosis.response.inputs import FollowerData
 from diagnosis.response.machine import Judged
-from diagnosis.response.nowhere import goes_nowhere
 from diagnosis.response.models import LEAST_P
+from diagnosis.response.nowhere import goes_nowhere
 from diagnosis.response.rivals import jumped
 from diagnosis.response.spells import Spell
 from diagnosis.results.assessment import Finding
