@@ -20,13 +20,14 @@ from diagnosis.response.common_cause import (
     stands_with_all,
     without_consequences,
 )
+from diagnosis.response.disputed import disputed
 from diagnosis.response.drive import by_peers, unanswered
 from diagnosis.response.effort import idle_drives, idle_spans, own_pull, powered, shares_of
 from diagnosis.response.ground import by_drag, by_slip
 from diagnosis.response.gyro import wrong_gyro
 from diagnosis.response.inputs import FollowerData, cell_of, cells
 from diagnosis.response.late import late_neighbour, late_wheels, left_open, smallest_delay
-from diagnosis.response.machine import Judged, lasting_losses, otherwise, standstills, unexplained, unlike
+from diagnosis.response.machine import Judged, lasting_losses, otherwise, paused, standstills, unexplained, unlike
 from diagnosis.response.models import (
     BLOCK_S,
     Beside,
@@ -56,6 +57,10 @@ Flags = NDArray[np.bool_]
 _OWN, _OTHERS = 4, 2  # holds of a channel that may be faults: of the one in question, and of each other
 _LEAST_S = 1.0
 _HIDES = "the speed varies so much beside what its command, or other channels, make likely that half of it would not show for ten seconds"
+_DISPUTED = (
+    "it keeps to its command, but a sensor of the body shows another speed: one of the two is wrong, and a loop around a wrong encoder looks "
+    "like that, too"
+)
 _PAIR = 2  # wheels, of which each moves one side of the machine
 _TURNED = (
     "The sides of the machine go apart as where it turns, of which the log has neither a command nor a measurement: log the commanded yaw "
@@ -121,7 +126,8 @@ def assess_response(
     rollers = any(d.commands.shape[1] > BODY_COMMANDS for d in drives)
     sideways = rollers or goes_sideways(means, geometry, width * dt)
     exchanged = sideways and not rollers and crossed(means, geometry, turned_by)
-    bodies = Bodies(speeds, turned_by, width * dt, sideways)
+    rolls = drives[0].stretch if len(drives) == 1 else None
+    bodies = Bodies(speeds, turned_by, width * dt, sideways, None if rolls is None else cells(rolls, width))
     efforts = {w: cells(j.data.effort, width) for w, j in found.items() if j.data.effort is not None and not sideways}
     mates = {w: tuple(o for o in found if o != w and same_side(w, o, geometry)) for w in found}
     efforts, none = powered(efforts)
@@ -191,18 +197,23 @@ def assess_response(
         doubts = dict.fromkeys(judged, Reason(_EXCHANGED)) | doubts
     for w, why in doubts.items():
         parts[w] = _doubted(parts[w][0], [slice(None)], why), parts[w][1]
+    parts |= {w: (_unproved(parts[w][0], one, _DISPUTED), parts[w][1]) for w, one in _apart(judged, width * dt).items()}
     lasting = lasting_losses(judged)
     for w, (sensor, drive) in parts.items():
         j, about = judged[w], asked[w]
         powers = powers_of(j.wheel.blocks, j.driving, about, width * dt, beside.get(w), limits.clear_at, lasting[w])
-        sensor = _unproved(sensor, np.repeat(unshown(powers, j.driving.size, width * dt), width)[: j.data.y.size])
+        hides = np.repeat(unshown(powers, j.driving.size, width * dt), width)[: j.data.y.size]
+        sensor = _unproved(sensor, hides, _HIDES)
         delay, told = smallest_delay(j, width * dt)
         powers = powers._replace(rows=(*powers.rows, delay))
         parts[w] = replace(sensor, powers=powers, notes=(*sensor.notes, told, *remarks)), drive
     unsettled = {w: [*kept[w], *(s for s in slips[w] if not wrong_yaw_rate(s, j))] for w, j in judged.items()}
     gyro = wrong_gyro(judged, unsettled, turning, width * dt)
     ignored = () if any(j.response.answered for j in judged.values()) else unexplained(drives, limits, dt)
-    return Judgement(parts, (*standstills(idle, dt), *(astray if lasts else ()), *ignored), gyro)
+    stood = standstills(idle, dt) or (
+        paused([f for side in parts.values() for f in side[0].findings], dt) if len(data) == 1 else ()
+    )
+    return Judgement(parts, (*stood, *(astray if lasts else ()), *ignored), gyro)
 
 
 def _turned_by(wheel: str, found: Mapping[str, Judged]) -> bool:
@@ -220,13 +231,24 @@ def _doubted(sensor: Assessment, where: Sequence[slice | Flags], why: Reason | N
     return doubted if why is None else doubted.reasoned(State.NOT_ASSESSED, why)
 
 
-def _unproved(sensor: Assessment, where: Flags) -> Assessment:
-    """A sensor of which nothing healthy is said in steps in which a gross fault would not have shown."""
+def _apart(judged: Mapping[str, Judged], block_s: float) -> dict[str, Flags]:
+    """Steps in which a wheel's speed is disputed, shape (n,), of wheels that have any."""
+    out = {}
+    for w, j in judged.items():
+        width = int(j.wheel.blocks.start[1]) if j.wheel.blocks.start.size > 1 else 1
+        where = np.repeat(disputed(j, block_s), width)[: j.data.y.size]
+        if where.any():
+            out[w] = where
+    return out
+
+
+def _unproved(sensor: Assessment, where: Flags, hides: str) -> Assessment:
+    """A sensor of which nothing healthy is said in some steps, for a reason: a gross fault would not have shown, or a rival says otherwise."""
     if not (where & (sensor.states == CODE[State.HEALTHY])).any():
         return sensor
     doubted = bool((sensor.states == CODE[State.NOT_ASSESSED]).any())
-    more = f"{sensor.reasons[State.NOT_ASSESSED]}; or {_HIDES}"
-    why = Reason(more, sensor.lacks.get(State.NOT_ASSESSED)) if doubted else Reason(_HIDES)
+    more = f"{sensor.reasons.get(State.NOT_ASSESSED, hides)}; or {hides}"
+    why = Reason(more, sensor.lacks.get(State.NOT_ASSESSED)) if doubted else Reason(hides)
     return _doubted(sensor, [where], why)
 
 

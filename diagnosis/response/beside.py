@@ -45,12 +45,15 @@ class Bodies(NamedTuple):
         Length of a block [s].
     sideways : bool
         Whether the machine also moves sideways, so that wheels of one side are not alike.
+    stretch : Array or None, shape (b,)
+        How much faster than the body the only wheel rolls [1]; None where there are several, or it does not steer.
     """
 
     speeds: tuple[BodySpeed, ...] = ()
     yaw: Array | None = None
     block_s: float = 0.25
     sideways: bool = False
+    stretch: Array | None = None
 
 
 def views(
@@ -70,10 +73,11 @@ def views(
         Sensors of the body.
     """
     means = {w: blocks[w].mean for w in wheels}
-    made = [b for b in bodies.speeds if b.name == "odometry" and made_of(b, list(means.values()))]
+    made = [b for b in bodies.speeds if b.name == "odometry" and made_of(b, list(means.values()), bodies.stretch)]
     notes = tuple(f"Body sensor {b.name} left out: it is computed from the wheels' own speeds." for b in made)
     kept = [b for b in bodies.speeds if b not in made]
-    by_body = {w: v for w in wheels if (v := view_of(means[w], kept, means, bodies.yaw, bodies.block_s)) is not None}
+    seen = {w: view_of(means[w], kept, means, bodies.yaw, bodies.block_s, bodies.stretch) for w in wheels}
+    by_body = {w: v for w, v in seen.items() if v is not None}
     out: dict[str, Beside] = {}
     by_motion: dict[str, Beside] = {}
     for w in wheels:

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from diagnosis.channels.liveness import alive
 from diagnosis.evidence import SENSOR, MissionView
+from diagnosis.response.steered import stretch_of, stretched
 
 Array = NDArray[np.float64]
 
@@ -42,6 +43,8 @@ class FollowerData:
         Torque, current or duty of its drive, in any unit; None where that is not logged.
     lost : tuple[tuple[int, int], ...]
         Steps [start, stop) in which nothing came of it, while what is recorded with it went on.
+    stretch : Array or None, shape (n,)
+        How much faster than the body it rolls [1], where it is the only drive and steers.
     """
 
     y: Array
@@ -52,6 +55,7 @@ class FollowerData:
     rolled: Array | None = None
     effort: Array | None = None
     lost: tuple[tuple[int, int], ...] = ()
+    stretch: Array | None = None
 
 
 def cell_of(dt: float) -> int:
@@ -93,13 +97,23 @@ def followers(mission: MissionView) -> dict[str, FollowerData]:
         taken = mission.judged((w, SENSOR)) or mission.logged(f"wheel.{w}.v_true")
         if taken or not mission.logged(name):
             continue
+        stretch = stretch_of(mission, w)
+        asked = stretched(mission.values(name), asked, stretch, machine.limits.driving_speed, timeline.dt)
         own = mission.logged(f"wheel.{w}.v_ref") or body is None
         commands = cells(asked, width)[:, None] if own or body is None else body
         position = f"wheel.{w}.v_position"
         rolled = mission.values(position) if mission.logged(position) else None
         effort = mission.values(f"wheel.{w}.effort") if mission.logged(f"wheel.{w}.effort") else None
         out[w] = FollowerData(
-            mission.values(name), timeline.fresh[name], commands, asked, name, rolled, effort, _lost(mission, name)
+            mission.values(name),
+            timeline.fresh[name],
+            commands,
+            asked,
+            name,
+            rolled,
+            effort,
+            _lost(mission, name),
+            stretch,
         )
     return out
 

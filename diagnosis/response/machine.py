@@ -11,9 +11,11 @@ from numpy.typing import NDArray
 from diagnosis.response.identification import Response
 from diagnosis.response.inputs import FollowerData
 from diagnosis.response.joint import Joint
+from diagnosis.response.models import Beside
 from diagnosis.response.spells import Spell
 from diagnosis.response.wheel import Wheel
-from diagnosis.results.assessment import Lack, Reason
+from diagnosis.results.assessment import Finding, Lack, Reason
+from replay.faults import FaultMode, Side
 from replay.machine.config import Limits
 
 Array = NDArray[np.float64]
@@ -58,6 +60,8 @@ class Judged(NamedTuple):
         Measured yaw rate of the body [rad/s].
     others : tuple[Array, ...], each of shape (n,)
         Readings of all other wheels [m/s].
+    view : Beside or None
+        What other channels say of its speed.
     odd : str
         Why its own answer to its commands cannot be right; empty where it may be.
     """
@@ -77,6 +81,7 @@ class Judged(NamedTuple):
     yaw: Array | None = None
     others: tuple[Array, ...] = ()
     odd: str = ""
+    view: Beside | None = None
 
 
 def standstills(idle: Sequence[tuple[int, int]], dt: float) -> tuple[str, ...]:
@@ -87,6 +92,19 @@ def standstills(idle: Sequence[tuple[int, int]], dt: float) -> tuple[str, ...]:
     return (
         f"For {total:.1f} s all drives stood still together, one that reads wrong perhaps excepted, while they were commanded to move (longest {start * dt:.1f}–{stop * dt:.1f} s): "
         "disabled, stopped by an emergency stop, or driven by another source of commands; no {wheel} is blamed for it.",
+    )
+
+
+def paused(findings: Sequence[Finding], dt: float) -> tuple[str, ...]:
+    """A sentence where the only drive stood still for a time although it was commanded to move, by what was found of it; `dt` in s."""
+    spans = [f for f in findings if f.mode is FaultMode.NO_SIGNAL and f.side is Side.SENSOR_OR_ACTUATOR]
+    if not spans:
+        return ()
+    longest = max(spans, key=lambda f: f.stop - f.start)
+    return (
+        f"For {sum(f.stop - f.start for f in spans) * dt:.1f} s the only drive stood still, or read 0, while it was commanded to move (longest "
+        f"{longest.start * dt:.1f}–{longest.stop * dt:.1f} s): disabled, stopped by an emergency stop, driven by another source of commands, "
+        "or faulty; with a single drive these look the same.",
     )
 
 
