@@ -34,6 +34,7 @@ from diagnosis.response.models import (
     Blocks,
 )
 from diagnosis.response.power import powers_of, unshown
+from diagnosis.response.ramps import only_a_ramp
 from diagnosis.response.rivals import (
     by_each_other,
     held_back_together,
@@ -60,6 +61,10 @@ _HIDES = "the speed varies so much beside what its command, or other channels, m
 _DISPUTED = (
     "it keeps to its command, but a sensor of the body shows another speed: one of the two is wrong, and a loop around a wrong encoder looks "
     "like that, too"
+)
+_UNDIRECTED = (
+    "{name} is never below 0, also where it is told to go backwards: it tells no direction and is read with that of its command, so that a "
+    "{{wheel}} that turns the wrong way would not show."
 )
 _PAIR = 2  # wheels, of which each moves one side of the machine
 _TURNED = (
@@ -128,7 +133,11 @@ def assess_response(
     exchanged = sideways and not rollers and crossed(means, geometry, turned_by)
     rolls = drives[0].stretch if len(drives) == 1 else None
     bodies = Bodies(speeds, turned_by, width * dt, sideways, None if rolls is None else cells(rolls, width))
-    efforts = {w: cells(j.data.effort, width) for w, j in found.items() if j.data.effort is not None and not sideways}
+    efforts = {  # what stands with the machine pulls nothing, and one noise is by chance less than another
+        w: cells(np.where(left_out[w], np.nan, j.data.effort), width)
+        for w, j in found.items()
+        if j.data.effort is not None and not sideways
+    }
     mates = {w: tuple(o for o in found if o != w and same_side(w, o, geometry)) for w in found}
     efforts, none = powered(efforts)
     beside_it = {w: tuple(o for o in mates[w] if o in efforts) or tuple(o for o in found if o != w) for w in found}
@@ -179,6 +188,7 @@ def assess_response(
     weak = {w: without_consequences(found, w, judged, width) for w, found in weak.items()}
     late = late_wheels(judged, width * dt)
     unclear = left_open(late, judged)
+    kept = {w: [x for x in spells if not only_a_ramp(x, unclear[w], judged[w], width)] for w, spells in kept.items()}
     late = {w: [f for f in found if f not in unclear[w]] for w, found in late.items()}
     kept = {w: [x for x in spells if not late_neighbour(x, w, late, width)] for w, spells in kept.items()}
     parts = {
@@ -206,7 +216,8 @@ def assess_response(
         sensor = _unproved(sensor, hides, _HIDES)
         delay, told = smallest_delay(j, width * dt)
         powers = powers._replace(rows=(*powers.rows, delay))
-        parts[w] = replace(sensor, powers=powers, notes=(*sensor.notes, told, *remarks)), drive
+        signless = (_UNDIRECTED.format(name=names[w]),) if j.data.undirected else ()
+        parts[w] = replace(sensor, powers=powers, notes=(*sensor.notes, told, *signless, *remarks)), drive
     unsettled = {w: [*kept[w], *(s for s in slips[w] if not wrong_yaw_rate(s, j))] for w, j in judged.items()}
     gyro = wrong_gyro(judged, unsettled, turning, width * dt)
     ignored = () if any(j.response.answered for j in judged.values()) else unexplained(drives, limits, dt)

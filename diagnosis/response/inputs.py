@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from diagnosis.channels.liveness import alive
 from diagnosis.evidence import SENSOR, MissionView
+from diagnosis.response.direction import directed, without_direction
 from diagnosis.response.steered import stretch_of, stretched
 
 Array = NDArray[np.float64]
@@ -45,6 +46,8 @@ class FollowerData:
         Steps [start, stop) in which nothing came of it, while what is recorded with it went on.
     stretch : Array or None, shape (n,)
         How much faster than the body it rolls [1], where it is the only drive and steers.
+    undirected : bool
+        Whether its channel tells no direction, so that `y` has that of its command.
     """
 
     y: Array
@@ -56,6 +59,7 @@ class FollowerData:
     effort: Array | None = None
     lost: tuple[tuple[int, int], ...] = ()
     stretch: Array | None = None
+    undirected: bool = False
 
 
 def cell_of(dt: float) -> int:
@@ -97,15 +101,17 @@ def followers(mission: MissionView) -> dict[str, FollowerData]:
         taken = mission.judged((w, SENSOR)) or mission.logged(f"wheel.{w}.v_true")
         if taken or not mission.logged(name):
             continue
-        stretch = stretch_of(mission, w)
-        asked = stretched(mission.values(name), asked, stretch, machine.limits.driving_speed, timeline.dt)
+        stretch, y = stretch_of(mission, w), mission.values(name)
+        asked = stretched(y, asked, stretch, machine.limits.driving_speed, timeline.dt)
+        undirected = without_direction(y, asked, machine.limits.driving_speed, timeline.dt)
+        y = directed(y, asked, timeline.dt) if undirected else y
         own = mission.logged(f"wheel.{w}.v_ref") or body is None
         commands = cells(asked, width)[:, None] if own or body is None else body
         position = f"wheel.{w}.v_position"
         rolled = mission.values(position) if mission.logged(position) else None
         effort = mission.values(f"wheel.{w}.effort") if mission.logged(f"wheel.{w}.effort") else None
         out[w] = FollowerData(
-            mission.values(name),
+            y,
             timeline.fresh[name],
             commands,
             asked,
@@ -114,6 +120,7 @@ def followers(mission: MissionView) -> dict[str, FollowerData]:
             effort,
             _lost(mission, name),
             stretch,
+            undirected,
         )
     return out
 
