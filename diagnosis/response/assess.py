@@ -59,8 +59,8 @@ _OWN, _OTHERS = 4, 2  # holds of a channel that may be faults: of the one in que
 _LEAST_S = 1.0
 _HIDES = "the speed varies so much beside what its command, or other channels, make likely that half of it would not show for ten seconds"
 _DISPUTED = (
-    "it keeps to its command, but a sensor of the body shows another speed: one of the two is wrong, and a loop around a wrong encoder looks "
-    "like that, too"
+    "it keeps to its command, but other channels show another speed: one of them is wrong, or tyres slip, and a loop around a wrong encoder "
+    "looks like that, too"
 )
 _UNDIRECTED = (
     "{name} is never below 0, also where it is told to go backwards: it tells no direction and is read with that of its command, so that a "

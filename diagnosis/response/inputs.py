@@ -96,6 +96,7 @@ def followers(mission: MissionView) -> dict[str, FollowerData]:
         sideways = ("cmd.lateral",) if _moved_sideways(mission) else ()
         body = np.column_stack([cells(mission.values(n), width) for n in ("cmd.v", "cmd.omega", *sideways)])
     out: dict[str, FollowerData] = {}
+    rollers = _moved_sideways(mission)  # what is asked of a wheel says nothing of its direction then
     for w in machine.wheels:
         name, asked = f"wheel.{w}.v", mission.command(w)
         taken = mission.judged((w, SENSOR)) or mission.logged(f"wheel.{w}.v_true")
@@ -103,7 +104,7 @@ def followers(mission: MissionView) -> dict[str, FollowerData]:
             continue
         stretch, y = stretch_of(mission, w), mission.values(name)
         asked = stretched(y, asked, stretch, machine.limits.driving_speed, timeline.dt)
-        undirected = without_direction(y, asked, machine.limits.driving_speed, timeline.dt)
+        undirected = not rollers and without_direction(y, asked, machine.limits.driving_speed, timeline.dt)
         y = directed(y, asked, timeline.dt) if undirected else y
         own = mission.logged(f"wheel.{w}.v_ref") or body is None
         commands = cells(asked, width)[:, None] if own or body is None else body

@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 from diagnosis.response.assess import Judgement, assess_response
-from diagnosis.response.beside import _blame_by_commands
+from diagnosis.response.blame import blame_by_commands
 from diagnosis.response.inputs import FollowerData
 from diagnosis.response.models import Blocks
 from diagnosis.response.sideways import crossed, goes_sideways
@@ -86,9 +86,12 @@ def test_a_wheel_that_keeps_to_its_command_is_not_blamed_where_rollers_slip() ->
         for w in WHEELS
     }
     apart = asked + slip
-    assert _blame_by_commands(blocks["RR"], [blocks[w] for w in WHEELS[:2]], apart)[204:212].max() < 0.2
+    blame, nobody = blame_by_commands(blocks["RR"], [blocks[w] for w in WHEELS[:2]], apart)
+    assert blame[204:212].max() < 0.2
+    assert nobody is not None
+    assert nobody[204:212].min() > 0.5
     wrong = blocks["RR"]._replace(mean=np.where(slip > 0.0, 0.6 * asked, asked))
-    assert _blame_by_commands(wrong, [blocks[w] for w in WHEELS[:2]], asked * top)[204:212].min() > 0.9
+    assert blame_by_commands(wrong, [blocks[w] for w in WHEELS[:2]], asked * top)[0][204:212].min() > 0.9
 
 
 def _blocks(mean: Array, asked: Array, noise: float) -> Blocks:
