@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -20,7 +20,7 @@ from diagnosis.response.common_cause import (
     stands_with_all,
     without_consequences,
 )
-from diagnosis.response.disputed import disputed
+from diagnosis.response.disputed import DISPUTED, HIDES, disputed_steps, doubted, unproved
 from diagnosis.response.drive import by_peers, unanswered
 from diagnosis.response.effort import idle_drives, idle_spans, own_pull, powered, shares_of
 from diagnosis.response.ground import by_drag, by_slip
@@ -47,8 +47,8 @@ from diagnosis.response.sideways import crossed, goes_sideways
 from diagnosis.response.spells import until_back, where_asked
 from diagnosis.response.states import judge
 from diagnosis.response.turning import turning_of, turns_other_way, turns_with, unasked_turn, wrong_yaw_rate
-from diagnosis.results.assessment import CODE, Assessment, Finding, Reason
-from replay.faults import State
+from diagnosis.response.witness import denied, witness_of
+from diagnosis.results.assessment import Assessment, Finding, Reason
 from replay.machine.config import Limits
 from replay.machine.geometry import Geometry
 
@@ -57,11 +57,6 @@ Flags = NDArray[np.bool_]
 
 _OWN, _OTHERS = 4, 2  # holds of a channel that may be faults: of the one in question, and of each other
 _LEAST_S = 1.0
-_HIDES = "the speed varies so much beside what its command, or other channels, make likely that half of it would not show for ten seconds"
-_DISPUTED = (
-    "it keeps to its command, but other channels show another speed: one of them is wrong, or tyres slip, and a loop around a wrong encoder "
-    "looks like that, too"
-)
 _UNDIRECTED = (
     "{name} is never below 0, also where it is told to go backwards: it tells no direction and is read with that of its command, so that a "
     "{{wheel}} that turns the wrong way would not show."
@@ -79,11 +74,12 @@ _EXCHANGED = (
 
 @dataclass(frozen=True)
 class Judgement:
-    """Both sides of each wheel that could be judged, and what happened to the machine as a whole, and to its gyro, a sentence each."""
+    """Both sides of each wheel that could be judged, and what happened to the machine as a whole, to its gyro and to all speeds, a sentence each."""
 
     parts: Mapping[str, tuple[Assessment, Assessment]]
     events: tuple[str, ...]
     gyro: tuple[str, ...] = ()
+    unshown: tuple[str, ...] = ()
 
 
 def assess_response(
@@ -118,8 +114,14 @@ def assess_response(
     left_out = standing(data, limits.driving_speed, dt)
     idle = spans_of(np.logical_or.reduce(list(left_out.values())))
     found = wheels_of(data, left_out, geometry, (cell, width), limits, dt)
+    witness = witness_of(speeds, drives, width, limits, dt)
+    seen = [span for span in idle if witness.saw(*span, width)]
+    idle = [span for span in idle if span not in seen]
     if not found:
-        return Judgement({}, standstills(idle, dt) or unexplained(drives, limits, dt))
+        stood = standstills(idle, dt)
+        ignored = () if stood or seen else unexplained(drives, limits, dt)
+        wrong = ignored if witness.mostly else ()
+        return Judgement({}, stood or (() if wrong else ignored), (), denied(witness, seen, drives, wrong, dt))
     rest = {w: samples_of(d.y, d.fresh) for w, d in data.items() if w not in found}
     found = by_each_other(found, width * dt, rest)
     holds = {w: holds_of(j.wheel.samples, MOVES * limits.driving_speed, dt) for w, j in found.items()}
@@ -195,10 +197,10 @@ def assess_response(
         w: sides_of(j, kept[w], (weak[w], late[w]), (left_out[w], together), limits, dt) for w, j in judged.items()
     }
     parts = {
-        w: (_doubted(sensor, [slice(f.start, f.stop) for f in unclear[w]]), drive)
+        w: (doubted(sensor, [slice(f.start, f.stop) for f in unclear[w]]), drive)
         for w, (sensor, drive) in parts.items()
     }
-    astray, lasts = otherwise(judged, width * dt)
+    astray, lasts = otherwise(judged, width * dt, witness.there)
     remarks = (*astray, *left_notes, *((_TURNED,) if any(turned.values()) else ()))
     doubts = {w: Reason(j.odd) for w, j in judged.items() if j.odd and not any(side.findings for side in parts[w])}
     doubts |= {w: j.joint.unlike for w, j in judged.items() if j.joint is not None and j.joint.unlike}
@@ -206,14 +208,16 @@ def assess_response(
     if exchanged or turns_other_way(judged, geometry, turning):
         doubts = dict.fromkeys(judged, Reason(_EXCHANGED)) | doubts
     for w, why in doubts.items():
-        parts[w] = _doubted(parts[w][0], [slice(None)], why), parts[w][1]
-    parts |= {w: (_unproved(parts[w][0], one, _DISPUTED), parts[w][1]) for w, one in _apart(judged, width * dt).items()}
+        parts[w] = doubted(parts[w][0], [slice(None)], why), parts[w][1]
+    parts |= {
+        w: (unproved(parts[w][0], one, DISPUTED), parts[w][1]) for w, one in disputed_steps(judged, width * dt).items()
+    }
     lasting = lasting_losses(judged)
     for w, (sensor, drive) in parts.items():
         j, about = judged[w], asked[w]
         powers = powers_of(j.wheel.blocks, j.driving, about, width * dt, beside.get(w), limits.clear_at, lasting[w])
         hides = np.repeat(unshown(powers, j.driving.size, width * dt), width)[: j.data.y.size]
-        sensor = _unproved(sensor, hides, _HIDES)
+        sensor = unproved(sensor, hides, HIDES)
         delay, told = smallest_delay(j, width * dt)
         powers = powers._replace(rows=(*powers.rows, delay))
         signless = (_UNDIRECTED.format(name=names[w]),) if j.data.undirected else ()
@@ -224,43 +228,15 @@ def assess_response(
     stood = standstills(idle, dt) or (
         paused([f for side in parts.values() for f in side[0].findings], dt) if len(data) == 1 else ()
     )
-    return Judgement(parts, (*stood, *(astray if lasts else ()), *ignored), gyro)
+    wrong = ignored if witness.mostly else ()
+    events = (*stood, *(astray if lasts else ()), *(() if wrong else ignored))
+    return Judgement(parts, events, gyro, denied(witness, seen, drives, wrong, dt))
 
 
 def _turned_by(wheel: str, found: Mapping[str, Judged]) -> bool:
     """Whether a wheel and one of the others turn the machine by what they differ."""
     means = {w: j.wheel.blocks.mean for w, j in found.items()}
     return any(turns_by_wheels(means[wheel], means[o]) for o in means if o != wheel)
-
-
-def _doubted(sensor: Assessment, where: Sequence[slice | Flags], why: Reason | None = None) -> Assessment:
-    """A sensor of which nothing healthy can be said in some steps, and why, where that is another reason than before."""
-    states = sensor.states.copy()
-    for part in where:
-        states[part] = np.where(states[part] == CODE[State.HEALTHY], CODE[State.NOT_ASSESSED], states[part])
-    doubted = replace(sensor, states=states)
-    return doubted if why is None else doubted.reasoned(State.NOT_ASSESSED, why)
-
-
-def _apart(judged: Mapping[str, Judged], block_s: float) -> dict[str, Flags]:
-    """Steps in which a wheel's speed is disputed, shape (n,), of wheels that have any."""
-    out = {}
-    for w, j in judged.items():
-        width = int(j.wheel.blocks.start[1]) if j.wheel.blocks.start.size > 1 else 1
-        where = np.repeat(disputed(j, block_s), width)[: j.data.y.size]
-        if where.any():
-            out[w] = where
-    return out
-
-
-def _unproved(sensor: Assessment, where: Flags, hides: str) -> Assessment:
-    """A sensor of which nothing healthy is said in some steps, for a reason: a gross fault would not have shown, or a rival says otherwise."""
-    if not (where & (sensor.states == CODE[State.HEALTHY])).any():
-        return sensor
-    doubted = bool((sensor.states == CODE[State.NOT_ASSESSED]).any())
-    more = f"{sensor.reasons.get(State.NOT_ASSESSED, hides)}; or {hides}"
-    why = Reason(more, sensor.lacks.get(State.NOT_ASSESSED)) if doubted else Reason(hides)
-    return _doubted(sensor, [where], why)
 
 
 def _drives(

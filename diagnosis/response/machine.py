@@ -136,10 +136,11 @@ def unexplained(drives: Sequence[FollowerData], limits: Limits, dt: float) -> tu
     )
 
 
-def otherwise(judged: Mapping[str, Judged], block_s: float) -> tuple[tuple[str, ...], bool]:
+def otherwise(judged: Mapping[str, Judged], block_s: float, followed: Flags) -> tuple[tuple[str, ...], bool]:
     """A sentence where all drives together did something else than their commands, and whether so long that it is the machine's state.
 
-    No wheel is blamed for it. `block_s` is the length of a block [s].
+    No wheel is blamed for it. `block_s` is the length of a block [s]; `followed`, shape (b,), are those in which a receiver shows that
+    the machine went as it was told.
     """
     off = []
     for j in judged.values():
@@ -147,7 +148,7 @@ def otherwise(judged: Mapping[str, Judged], block_s: float) -> tuple[tuple[str, 
             return (), False
         b = j.wheel.blocks
         off.append(np.abs(b.mean - np.clip(b.mean, b.low, b.high)) > _ELSEWHERE * np.nanquantile(np.abs(b.mean), 0.99))
-    edge = np.flatnonzero(np.diff(np.r_[False, np.logical_and.reduce(off), False].astype(np.int8)))
+    edge = np.flatnonzero(np.diff(np.r_[False, np.logical_and.reduce(off) & ~followed, False].astype(np.int8)))
     spans = [(a, b) for a, b in zip(edge[::2] * block_s, edge[1::2] * block_s, strict=True) if b - a >= _ELSEWHERE_S]
     if len(judged) < 2 or not spans:
         return (), False
