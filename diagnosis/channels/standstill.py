@@ -42,8 +42,14 @@ def not_followed(speeds: Sequence[Array], commands: Sequence[Array], driving_spe
     dt : float
         Step [s].
     """
-    if len(speeds) < 2:
-        return []
+    return stood_still(speeds, commands, driving_speed, dt) if len(speeds) > 1 else []
+
+
+def stood_still(speeds: Sequence[Array], commands: Sequence[Array], driving_speed: float, dt: float) -> list[Span]:
+    """Steps [start, stop) in which some drives, or a single one, stand still although each was commanded; parameters of `not_followed`.
+
+    `speeds`, `commands` of shape (n,) each [m/s]; `driving_speed` in m/s, `dt` in s.
+    """
     still = np.logical_and.reduce([np.abs(np.nan_to_num(y, nan=np.inf)) <= STILL * driving_speed for y in speeds])
     asked = [np.abs(np.nan_to_num(c)) > _ASKED * driving_speed for c in commands]
     edge = np.flatnonzero(np.diff(np.r_[False, still, False].astype(np.int8)))

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from diagnosis.channels.standstill import STILL
 from diagnosis.response.channel import Samples, samples_of, without_holds
 from diagnosis.response.drive import as_a_peer
 from diagnosis.response.identification import Response, identify_response, without_command
@@ -24,6 +25,7 @@ Flags = NDArray[np.bool_]
 
 MOVES = 0.4  # of the driving speed: enough to see whether a channel lives
 _TURNS_S = 5.0
+_MOSTLY = 0.5  # of that time
 _LEAST_OTHERS = 2  # wheels that answer, beside one that does not
 BODY_COMMANDS = 2  # speed and yaw rate
 
@@ -66,7 +68,8 @@ def wheels_of(
     several = len(answers) >= _LEAST_OTHERS
     for w, d in data.items():
         y, samples, found = d.y, channels[w][0], answers.get(w)
-        if found is None and not several:  # of two wheels the other one shows what a command makes
+        # of two wheels the other one shows what a command makes; so do several of one that stands nearly always, as nothing else then does
+        if found is None and (not several or _silent(d, limits, dt)):
             found = as_a_peer(w, d.commands, answers, geometry, cell * dt)
         # wheels of one body, that is: joints which are each commanded by themselves have nothing to do with each other
         ignored = not answers and len(data) > 1 and d.commands.shape[1] >= BODY_COMMANDS and _turns(y, limits, dt)
@@ -120,6 +123,15 @@ def in_blocks(
     wheel = Wheel(data.name, samples, blocks, jumps, dt, "")
     start = np.zeros((0, STATES))
     return Judged(data, response, wheel, driving, start, [], None, calm, alone=not others, others=others)
+
+
+def _silent(data: FollowerData, limits: Limits, dt: float) -> bool:
+    """Whether a wheel reads nothing in most of the time in which it is told to go."""
+    asked = np.isfinite(data.y) & (np.abs(np.nan_to_num(data.asked)) > limits.driving_speed)
+    return bool(
+        np.count_nonzero(asked) * dt >= _TURNS_S
+        and np.mean(np.abs(data.y[asked]) <= STILL * limits.driving_speed) > _MOSTLY
+    )
 
 
 def _turns(y: Array, limits: Limits, dt: float) -> bool:

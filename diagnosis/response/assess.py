@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -21,19 +21,21 @@ from diagnosis.response.common_cause import (
     unwinds,
     without_consequences,
 )
+from diagnosis.response.disputed import DISPUTED, HIDES, disputed_steps, doubted, unproved
 from diagnosis.response.drive import by_peers, unanswered
 from diagnosis.response.effort import idle_drives, idle_spans, own_pull, powered, shares_of
 from diagnosis.response.ground import by_drag, by_slip
 from diagnosis.response.gyro import wrong_gyro
 from diagnosis.response.inputs import FollowerData, cell_of, cells
 from diagnosis.response.late import late_neighbour, late_wheels, left_open, smallest_delay
-from diagnosis.response.machine import Judged, lasting_losses, otherwise, standstills, unexplained, unlike
+from diagnosis.response.machine import Judged, lasting_losses, otherwise, paused, standstills, unexplained, unlike
 from diagnosis.response.models import (
     BLOCK_S,
     Beside,
     Blocks,
 )
 from diagnosis.response.power import powers_of, unshown
+from diagnosis.response.ramps import only_a_ramp
 from diagnosis.response.rivals import (
     by_each_other,
     held_back_together,
@@ -46,8 +48,8 @@ from diagnosis.response.sideways import crossed, goes_sideways
 from diagnosis.response.spells import until_back, where_asked
 from diagnosis.response.states import judge
 from diagnosis.response.turning import turning_of, turns_other_way, turns_with, unasked_turn, wrong_yaw_rate
-from diagnosis.results.assessment import CODE, Assessment, Finding, Reason
-from replay.faults import State
+from diagnosis.response.witness import denied, witness_of
+from diagnosis.results.assessment import Assessment, Finding, Reason
 from replay.machine.config import Limits
 from replay.machine.geometry import Geometry
 
@@ -56,7 +58,10 @@ Flags = NDArray[np.bool_]
 
 _OWN, _OTHERS = 4, 2  # holds of a channel that may be faults: of the one in question, and of each other
 _LEAST_S = 1.0
-_HIDES = "the speed varies so much beside what its command, or other channels, make likely that half of it would not show for ten seconds"
+_UNDIRECTED = (
+    "{name} is never below 0, also where it is told to go backwards: it tells no direction and is read with that of its command, so that a "
+    "{{wheel}} that turns the wrong way would not show."
+)
 _PAIR = 2  # wheels, of which each moves one side of the machine
 _TURNED = (
     "The sides of the machine go apart as where it turns, of which the log has neither a command nor a measurement: log the commanded yaw "
@@ -70,11 +75,12 @@ _EXCHANGED = (
 
 @dataclass(frozen=True)
 class Judgement:
-    """Both sides of each wheel that could be judged, and what happened to the machine as a whole, and to its gyro, a sentence each."""
+    """Both sides of each wheel that could be judged, and what happened to the machine as a whole, to its gyro and to all speeds, a sentence each."""
 
     parts: Mapping[str, tuple[Assessment, Assessment]]
     events: tuple[str, ...]
     gyro: tuple[str, ...] = ()
+    unshown: tuple[str, ...] = ()
 
 
 def assess_response(
@@ -109,8 +115,14 @@ def assess_response(
     left_out = standing(data, limits.driving_speed, dt)
     idle = spans_of(np.logical_or.reduce(list(left_out.values())))
     found = wheels_of(data, left_out, geometry, (cell, width), limits, dt)
+    witness = witness_of(speeds, drives, width, limits, dt)
+    seen = [span for span in idle if witness.saw(*span, width)]
+    idle = [span for span in idle if span not in seen]
     if not found:
-        return Judgement({}, standstills(idle, dt) or unexplained(drives, limits, dt))
+        stood = standstills(idle, dt)
+        ignored = () if stood or seen else unexplained(drives, limits, dt)
+        wrong = ignored if witness.mostly else ()
+        return Judgement({}, stood or (() if wrong else ignored), (), denied(witness, seen, drives, wrong, dt))
     rest = {w: samples_of(d.y, d.fresh) for w, d in data.items() if w not in found}
     found = by_each_other(found, width * dt, rest)
     holds = {w: holds_of(j.wheel.samples, MOVES * limits.driving_speed, dt) for w, j in found.items()}
@@ -122,8 +134,13 @@ def assess_response(
     rollers = any(d.commands.shape[1] > BODY_COMMANDS for d in drives)
     sideways = rollers or goes_sideways(means, geometry, width * dt)
     exchanged = sideways and not rollers and crossed(means, geometry, turned_by)
-    bodies = Bodies(speeds, turned_by, width * dt, sideways)
-    efforts = {w: cells(j.data.effort, width) for w, j in found.items() if j.data.effort is not None and not sideways}
+    rolls = drives[0].stretch if len(drives) == 1 else None
+    bodies = Bodies(speeds, turned_by, width * dt, sideways, None if rolls is None else cells(rolls, width))
+    efforts = {  # what stands with the machine pulls nothing, and one noise is by chance less than another
+        w: cells(np.where(left_out[w], np.nan, j.data.effort), width)
+        for w, j in found.items()
+        if j.data.effort is not None and not sideways
+    }
     mates = {w: tuple(o for o in found if o != w and same_side(w, o, geometry)) for w in found}
     efforts, none = powered(efforts)
     beside_it = {w: tuple(o for o in mates[w] if o in efforts) or tuple(o for o in found if o != w) for w in found}
@@ -175,16 +192,17 @@ def assess_response(
     weak = {w: without_consequences(found, w, judged, width) for w, found in weak.items()}
     late = late_wheels(judged, width * dt)
     unclear = left_open(late, judged)
+    kept = {w: [x for x in spells if not only_a_ramp(x, unclear[w], judged[w], width)] for w, spells in kept.items()}
     late = {w: [f for f in found if f not in unclear[w]] for w, found in late.items()}
     kept = {w: [x for x in spells if not late_neighbour(x, w, late, width)] for w, spells in kept.items()}
     parts = {
         w: sides_of(j, kept[w], (weak[w], late[w]), (left_out[w], together), limits, dt) for w, j in judged.items()
     }
     parts = {
-        w: (_doubted(sensor, [slice(f.start, f.stop) for f in unclear[w]]), drive)
+        w: (doubted(sensor, [slice(f.start, f.stop) for f in unclear[w]]), drive)
         for w, (sensor, drive) in parts.items()
     }
-    astray, lasts = otherwise(judged, width * dt)
+    astray, lasts = otherwise(judged, width * dt, witness.there)
     remarks = (*astray, *left_notes, *((_TURNED,) if any(turned.values()) else ()))
     doubts = {w: Reason(j.odd) for w, j in judged.items() if j.odd and not any(side.findings for side in parts[w])}
     doubts |= {w: j.joint.unlike for w, j in judged.items() if j.joint is not None and j.joint.unlike}
@@ -192,44 +210,35 @@ def assess_response(
     if exchanged or turns_other_way(judged, geometry, turning):
         doubts = dict.fromkeys(judged, Reason(_EXCHANGED)) | doubts
     for w, why in doubts.items():
-        parts[w] = _doubted(parts[w][0], [slice(None)], why), parts[w][1]
+        parts[w] = doubted(parts[w][0], [slice(None)], why), parts[w][1]
+    parts |= {
+        w: (unproved(parts[w][0], one, DISPUTED), parts[w][1]) for w, one in disputed_steps(judged, width * dt).items()
+    }
     lasting = lasting_losses(judged)
     for w, (sensor, drive) in parts.items():
         j, about = judged[w], asked[w]
         powers = powers_of(j.wheel.blocks, j.driving, about, width * dt, beside.get(w), limits.clear_at, lasting[w])
-        sensor = _unproved(sensor, np.repeat(unshown(powers, j.driving.size, width * dt), width)[: j.data.y.size])
+        hides = np.repeat(unshown(powers, j.driving.size, width * dt), width)[: j.data.y.size]
+        sensor = unproved(sensor, hides, HIDES)
         delay, told = smallest_delay(j, width * dt)
         powers = powers._replace(rows=(*powers.rows, delay))
-        parts[w] = replace(sensor, powers=powers, notes=(*sensor.notes, told, *remarks)), drive
+        signless = (_UNDIRECTED.format(name=names[w]),) if j.data.undirected else ()
+        parts[w] = replace(sensor, powers=powers, notes=(*sensor.notes, told, *signless, *remarks)), drive
     unsettled = {w: [*kept[w], *(s for s in slips[w] if not wrong_yaw_rate(s, j))] for w, j in judged.items()}
     gyro = wrong_gyro(judged, unsettled, turning, width * dt)
     ignored = () if any(j.response.answered for j in judged.values()) else unexplained(drives, limits, dt)
-    return Judgement(parts, (*standstills(idle, dt), *(astray if lasts else ()), *ignored), gyro)
+    stood = standstills(idle, dt) or (
+        paused([f for side in parts.values() for f in side[0].findings], dt) if len(data) == 1 else ()
+    )
+    wrong = ignored if witness.mostly else ()
+    events = (*stood, *(astray if lasts else ()), *(() if wrong else ignored))
+    return Judgement(parts, events, gyro, denied(witness, seen, drives, wrong, dt))
 
 
 def _turned_by(wheel: str, found: Mapping[str, Judged]) -> bool:
     """Whether a wheel and one of the others turn the machine by what they differ."""
     means = {w: j.wheel.blocks.mean for w, j in found.items()}
     return any(turns_by_wheels(means[wheel], means[o]) for o in means if o != wheel)
-
-
-def _doubted(sensor: Assessment, where: Sequence[slice | Flags], why: Reason | None = None) -> Assessment:
-    """A sensor of which nothing healthy can be said in some steps, and why, where that is another reason than before."""
-    states = sensor.states.copy()
-    for part in where:
-        states[part] = np.where(states[part] == CODE[State.HEALTHY], CODE[State.NOT_ASSESSED], states[part])
-    doubted = replace(sensor, states=states)
-    return doubted if why is None else doubted.reasoned(State.NOT_ASSESSED, why)
-
-
-def _unproved(sensor: Assessment, where: Flags) -> Assessment:
-    """A sensor of which nothing healthy is said in steps in which a gross fault would not have shown."""
-    if not (where & (sensor.states == CODE[State.HEALTHY])).any():
-        return sensor
-    doubted = bool((sensor.states == CODE[State.NOT_ASSESSED]).any())
-    more = f"{sensor.reasons[State.NOT_ASSESSED]}; or {_HIDES}"
-    why = Reason(more, sensor.lacks.get(State.NOT_ASSESSED)) if doubted else Reason(_HIDES)
-    return _doubted(sensor, [where], why)
 
 
 def _drives(

@@ -7,12 +7,13 @@ Wheels with rollers go sideways: each of them is what the three others make it b
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from diagnosis.response.blame import blame_by_commands, blame_of, off_command
 from diagnosis.response.body import BodySpeed, View, made_of, view_of
 from diagnosis.response.models import Beside, Blocks
 from replay.machine.geometry import Geometry
@@ -22,7 +23,6 @@ Array = NDArray[np.float64]
 _LEAST_BLOCKS = 80
 _ALIKE = 0.4  # median misfit, of the usual speed, beyond which two wheels do not move together
 _SHARE = 0.03  # of the speed
-_BLAME_BLOCKS = 9  # over which it is asked whose command misfit is the larger
 _LEAST_TOGETHER, _TOGETHER = 3, 0.15  # other wheels, and their median misfit, of the usual speed
 _AGAINST, _AGAINST_BLOCKS = 0.1, 6  # of the top speed; blocks
 _DIFFER = 0.3  # of the speed: by as much two wheels that show one speed differ only where one of them is wrong
@@ -44,12 +44,15 @@ class Bodies(NamedTuple):
         Length of a block [s].
     sideways : bool
         Whether the machine also moves sideways, so that wheels of one side are not alike.
+    stretch : Array or None, shape (b,)
+        How much faster than the body the only wheel rolls [1]; None where there are several, or it does not steer.
     """
 
     speeds: tuple[BodySpeed, ...] = ()
     yaw: Array | None = None
     block_s: float = 0.25
     sideways: bool = False
+    stretch: Array | None = None
 
 
 def views(
@@ -69,10 +72,11 @@ def views(
         Sensors of the body.
     """
     means = {w: blocks[w].mean for w in wheels}
-    made = [b for b in bodies.speeds if b.name == "odometry" and made_of(b, list(means.values()))]
+    made = [b for b in bodies.speeds if b.name == "odometry" and made_of(b, list(means.values()), bodies.stretch)]
     notes = tuple(f"Body sensor {b.name} left out: it is computed from the wheels' own speeds." for b in made)
     kept = [b for b in bodies.speeds if b not in made]
-    by_body = {w: v for w in wheels if (v := view_of(means[w], kept, means, bodies.yaw, bodies.block_s)) is not None}
+    seen = {w: view_of(means[w], kept, means, bodies.yaw, bodies.block_s, bodies.stretch) for w in wheels}
+    by_body = {w: v for w, v in seen.items() if v is not None}
     out: dict[str, Beside] = {}
     by_motion: dict[str, Beside] = {}
     for w in wheels:
@@ -139,16 +143,18 @@ def _by_wheels(
         speed = _turned(blocks[w].mean, across, yaw)
     if speed is None:
         return None
+    nobody: Array | None = None
     if len(speeds) > 1:
         blame = np.ones(speed.size)
     elif all(o in by_body for o in (w, *others)):
-        blame = _blame([_off_body(blocks[o], by_body[o]) for o in (w, *others)])
+        blame = blame_of([_off_body(blocks[o], by_body[o]) for o in (w, *others)])
     else:
-        blame = _blame_by_commands(blocks[w], [blocks[o] for o in others])
+        blame, nobody = blame_by_commands(blocks[w], [blocks[o] for o in others], speed)
     rough = np.asarray(np.max([blocks[o].rough for o in others], axis=0))
     noise = _noise(blocks[w], speed)
     alone = not speeds and len(wheels) == 2 and turns_by_wheels(blocks[w].mean, blocks[others[0]].mean)
-    return Beside(speed, noise, blame, rough, " and ".join(wheels[o] for o in others), alone, across)
+    compared = " and ".join(wheels[o] for o in others)
+    return Beside(speed, noise, blame, rough, compared, alone, across, nobody)
 
 
 def turns_by_wheels(y: Array, x: Array) -> bool:
@@ -179,10 +185,11 @@ def _by_all_others(w: str, wheels: Mapping[str, str], blocks: Mapping[str, Block
         kept = use & (off <= np.quantile(off[use], 0.7))
     if np.median(np.abs(y - speed)[use]) > _TOGETHER * np.median(np.abs(y[use])):
         return None
-    blame = _blame_by_commands(blocks[w], [blocks[o] for o in others])
+    blame, nobody = blame_by_commands(blocks[w], [blocks[o] for o in others], speed)
     rough = np.asarray(np.max([blocks[o].rough for o in others], axis=0))
     made = np.sqrt((parts**2).sum(axis=1))  # wheels may cancel each other, their errors do not
-    return Beside(speed, _noise(blocks[w], speed, made), blame, rough, " and ".join(wheels[o] for o in others))
+    compared = " and ".join(wheels[o] for o in others)
+    return Beside(speed, _noise(blocks[w], speed, made), blame, rough, compared, nobody=nobody)
 
 
 def _by_body(
@@ -194,9 +201,9 @@ def _by_body(
     view, own = by_body[w], blocks[w]
     rivals = [o for o in wheels if o != w and o in by_body]
     if np.isfinite(own.low).any():
-        blame = _blame([_off_command(own), np.full(own.mean.size, _OWN_MISFIT)])
+        blame = blame_of([off_command(own), np.full(own.mean.size, _OWN_MISFIT)])
     elif rivals:
-        blame = _blame([_off_body(blocks[o], by_body[o]) for o in (w, *rivals)])
+        blame = blame_of([_off_body(blocks[o], by_body[o]) for o in (w, *rivals)])
     else:
         return None
     noise = _noise(own, view.speed) * np.sqrt(view.reach)
@@ -255,33 +262,6 @@ def _noise(blocks: Blocks, speed: Array, made: Array | None = None) -> Array:
     )
 
 
-def _off_command(blocks: Blocks) -> Array:
-    """Misfit beside the command, in usual ones."""
-    return np.abs(blocks.mean - np.clip(blocks.mean, blocks.low, blocks.high)) / blocks.noise
-
-
 def _off_body(blocks: Blocks, view: View) -> Array:
     """Misfit beside a sensor of the body, in usual ones."""
     return np.abs(blocks.mean - view.speed) / _noise(blocks, view.speed)
-
-
-def _blame_by_commands(own: Blocks, others: Sequence[Blocks]) -> Array:
-    """Share of a misfit that is the own wheel's: by who is further off its command, or who alone makes nothing of it at all."""
-    mine, theirs = _answers(own), [_answers(o) for o in others]
-    if mine and not all(theirs):
-        return np.zeros(own.mean.size)
-    if not mine and any(theirs):
-        return np.ones(own.mean.size)
-    return _blame([_off_command(b) for b in (own, *others)])
-
-
-def _answers(blocks: Blocks) -> bool:
-    """Whether a command says what a wheel's speed is to be."""
-    return bool(np.isfinite(blocks.low).any())
-
-
-def _blame(away: Sequence[Array]) -> Array:
-    """Share of a misfit that is the first one's own, by which of them is further off what it should be."""
-    kernel = np.ones(_BLAME_BLOCKS) / _BLAME_BLOCKS
-    smooth = [np.convolve(np.nan_to_num(np.minimum(a, 8.0)), kernel, mode="same") for a in away]
-    return np.asarray(1.0 / (1.0 + np.exp(-4.0 * (smooth[0] - np.max(smooth[1:], axis=0)))))

@@ -137,7 +137,7 @@ def _slopes(fixes: Positions, middle: Array, window: float, most_gap: float) -> 
     return np.where((count >= 3) & (spread > 0.0) & wide, np.abs(slope), np.nan)
 
 
-def made_of(body: BodySpeed, wheels: Sequence[Array]) -> bool:
+def made_of(body: BodySpeed, wheels: Sequence[Array], stretch: Array | None = None) -> bool:
     """Whether a speed of the body is put together from the wheels' own speeds, now and up to half a second before.
 
     Parameters
@@ -146,7 +146,11 @@ def made_of(body: BodySpeed, wheels: Sequence[Array]) -> bool:
         The sensor.
     wheels : Sequence[Array], each of shape (b,)
         Measured speeds [m/s].
+    stretch : Array or None, shape (b,)
+        How much faster than the body the only wheel rolls [1]: then it may be made of its speed along the body, too.
     """
+    if stretch is not None and made_of(body, [y / stretch for y in wheels]):
+        return True
     kernel = np.ones(body.reach) / body.reach
     columns = []
     for y in wheels:
@@ -170,7 +174,12 @@ def made_of(body: BodySpeed, wheels: Sequence[Array]) -> bool:
 
 
 def view_of(
-    y: Array, bodies: Sequence[BodySpeed], wheels: Mapping[str, Array], yaw: Array | None, block_s: float
+    y: Array,
+    bodies: Sequence[BodySpeed],
+    wheels: Mapping[str, Array],
+    yaw: Array | None,
+    block_s: float,
+    stretch: Array | None = None,
 ) -> View | None:
     """The sharpest view of a wheel by a sensor of the body; None where none moves with it.
 
@@ -187,6 +196,8 @@ def view_of(
         curves.
     block_s : float
         Length of a block [s].
+    stretch : Array or None, shape (b,)
+        How much faster than the body the only wheel rolls [1].
     """
     if yaw is None and len(wheels) > 1:
         return None
@@ -195,9 +206,10 @@ def view_of(
         signed = _with_sign(body, list(wheels.values()))
         for late in range(round(_MOST_DELAY_S / block_s) + 1):
             speed = np.r_[signed[late:], np.full(late, np.nan)]
-            found = _fitted(y, speed, yaw)
-            if found is not None and (best is None or found[0] < best[0]):
-                best = found[0], View(body.name, found[1], body.reach)
+            for along in (speed,) if stretch is None else (speed, speed * stretch):
+                found = _fitted(y, along, yaw)
+                if found is not None and (best is None or found[0] < best[0]):
+                    best = found[0], View(body.name, found[1], body.reach)
     return None if best is None else best[1]
 
 

@@ -51,7 +51,7 @@ def beside_the_body(data: FollowerData, speeds: Sequence[BodySpeed], dt: float) 
     """
     width = max(1, round(BLOCK_S / dt))
     y = cells(data.y, width)
-    view = view_of(y, speeds, {"": y}, None, width * dt)
+    view = view_of(y, speeds, {"": y}, None, width * dt, None if data.stretch is None else cells(data.stretch, width))
     if view is None:
         return ()
     x, off = view.speed, np.abs(y - view.speed)

@@ -11,10 +11,11 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnosis.channels.standstill import not_followed
+from diagnosis.channels.standstill import not_followed, stood_still
 from diagnosis.response.inputs import FollowerData
 from diagnosis.response.machine import Judged
 from diagnosis.response.models import LEAST_P
+from diagnosis.response.nowhere import goes_nowhere
 from diagnosis.response.rivals import jumped
 from diagnosis.response.spells import Spell
 from diagnosis.results.assessment import Finding
@@ -51,6 +52,11 @@ def standing(data: Mapping[str, FollowerData], driving_speed: float, dt: float) 
         for start, stop in not_followed(speeds, asked, driving_speed, dt):
             for w in group:
                 out[w][start:stop] = True
+    if len(data) == _LEAST_TOGETHER:  # the other one has to show itself that it stands, whatever it reads
+        for w, other in (tuple(data), tuple(data)[::-1]):
+            for start, stop in stood_still([data[w].y], [data[w].asked], driving_speed, dt):
+                if goes_nowhere(data[other], slice(start, stop), driving_speed, dt):
+                    out[w][start:stop] = out[other][start:stop] = True
     return out
 
 

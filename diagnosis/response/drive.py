@@ -29,6 +29,7 @@ Flags = NDArray[np.bool_]
 
 _LEAST_OUTSIDE, _MOST, _SHOWN = 40, 0.75, 0.08  # blocks; of them; of the top speed
 _ASTRAY, _ASTRAY_S, _NEAR_S = 0.2, 1.0, 10.0  # of the top speed: all drives that far off, for so long, around a finding
+_ASTRAY_SHARE = 0.1  # of a finding: less is what its own beginning and end do to the others
 _MOVES = 0.05  # of the top speed
 _BODY_COMMANDS = 2  # speed and yaw rate
 _NOISIER = 3.0  # times the usual misfit of the other drives: more is no habit of one
@@ -150,7 +151,8 @@ def unanswered(
     least = _MUCH_S[one.alone]
     found = []
     for start, stop in _spans(there, round(_GAP_S / block_s)):
-        if np.count_nonzero(all_off[max(0, start - reach) : stop + reach]) * block_s >= _ASTRAY_S:
+        astray = np.count_nonzero(all_off[max(0, start - reach) : stop + reach])
+        if astray * block_s >= _ASTRAY_S and astray > _ASTRAY_SHARE * (stop - start):
             continue
         much = float(np.sum(off[start:stop][there[start:stop]])) * block_s / top
         held = dragged(slice(start, stop), wheel, judged, 0.0)

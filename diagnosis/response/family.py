@@ -15,7 +15,7 @@ from diagnosis.response.models import BLOCK_S
 from diagnosis.response.sides import without_doubles
 from diagnosis.response.tracking import assess_channel, assess_tracking
 from diagnosis.results.assessment import Assessment
-from diagnosis.results.machine_event import not_following, other_yaw_rate
+from diagnosis.results.machine_event import not_following, not_shown, other_yaw_rate
 from diagnosis.results.vocabulary import Tier
 
 
@@ -37,7 +37,11 @@ class ResponseEvidence:
         for wheel in mission.wheels:
             if wheel in judged.parts:
                 parts[wheel, SENSOR], parts[wheel, ACTUATOR] = judged.parts[wheel]
-        events = (*map(not_following, judged.events), *map(other_yaw_rate, judged.gyro))
+        events = (
+            *map(not_following, judged.events),
+            *map(not_shown, judged.unshown),
+            *map(other_yaw_rate, judged.gyro),
+        )
         return Contribution(parts, events=events)
 
 

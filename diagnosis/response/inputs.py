@@ -9,6 +9,8 @@ from numpy.typing import NDArray
 
 from diagnosis.channels.liveness import alive
 from diagnosis.evidence import SENSOR, MissionView
+from diagnosis.response.direction import directed, without_direction
+from diagnosis.response.steered import stretch_of, stretched
 
 Array = NDArray[np.float64]
 
@@ -42,6 +44,10 @@ class FollowerData:
         Torque, current or duty of its drive, in any unit; None where that is not logged.
     lost : tuple[tuple[int, int], ...]
         Steps [start, stop) in which nothing came of it, while what is recorded with it went on.
+    stretch : Array or None, shape (n,)
+        How much faster than the body it rolls [1], where it is the only drive and steers.
+    undirected : bool
+        Whether its channel tells no direction, so that `y` has that of its command.
     """
 
     y: Array
@@ -52,6 +58,8 @@ class FollowerData:
     rolled: Array | None = None
     effort: Array | None = None
     lost: tuple[tuple[int, int], ...] = ()
+    stretch: Array | None = None
+    undirected: bool = False
 
 
 def cell_of(dt: float) -> int:
@@ -88,18 +96,32 @@ def followers(mission: MissionView) -> dict[str, FollowerData]:
         sideways = ("cmd.lateral",) if _moved_sideways(mission) else ()
         body = np.column_stack([cells(mission.values(n), width) for n in ("cmd.v", "cmd.omega", *sideways)])
     out: dict[str, FollowerData] = {}
+    rollers = _moved_sideways(mission)  # what is asked of a wheel says nothing of its direction then
     for w in machine.wheels:
         name, asked = f"wheel.{w}.v", mission.command(w)
         taken = mission.judged((w, SENSOR)) or mission.logged(f"wheel.{w}.v_true")
         if taken or not mission.logged(name):
             continue
+        stretch, y = stretch_of(mission, w), mission.values(name)
+        asked = stretched(y, asked, stretch, machine.limits.driving_speed, timeline.dt)
+        undirected = not rollers and without_direction(y, asked, machine.limits.driving_speed, timeline.dt)
+        y = directed(y, asked, timeline.dt) if undirected else y
         own = mission.logged(f"wheel.{w}.v_ref") or body is None
         commands = cells(asked, width)[:, None] if own or body is None else body
         position = f"wheel.{w}.v_position"
         rolled = mission.values(position) if mission.logged(position) else None
         effort = mission.values(f"wheel.{w}.effort") if mission.logged(f"wheel.{w}.effort") else None
         out[w] = FollowerData(
-            mission.values(name), timeline.fresh[name], commands, asked, name, rolled, effort, _lost(mission, name)
+            y,
+            timeline.fresh[name],
+            commands,
+            asked,
+            name,
+            rolled,
+            effort,
+            _lost(mission, name),
+            stretch,
+            undirected,
         )
     return out
 

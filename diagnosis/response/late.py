@@ -16,6 +16,7 @@ from diagnosis.response.common_cause import evident, overlaps
 from diagnosis.response.ground import dragged
 from diagnosis.response.kernel import posterior
 from diagnosis.response.machine import Judged
+from diagnosis.response.ramps import at_its_limit
 from diagnosis.response.spells import Spell
 from diagnosis.results.assessment import Finding
 from diagnosis.results.detectability import Deviation, Power
@@ -203,7 +204,8 @@ def left_open(late: Mapping[str, Sequence[Finding]], judged: Mapping[str, Judged
         All wheels.
     """
     return {
-        w: [f for f in found if _by_ground(f, w, judged) or not _explained(f, judged[w])] for w, found in late.items()
+        w: [f for f in found if _by_ground(f, w, judged) or not _explained(f, judged[w]) or at_its_limit(f, judged[w])]
+        for w, found in late.items()
     }
 
 

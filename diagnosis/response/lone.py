@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from diagnosis.response.answering import MOVES, in_blocks
 from diagnosis.response.by_channel import LEAST_SPIKES, SPIKE_GAP_S, broken_off, lost_of
+from diagnosis.response.by_share import shares_at_once
 from diagnosis.response.channel import Samples, holds_of, samples_of
 from diagnosis.response.identification import without_command
 from diagnosis.response.inputs import FollowerData, cell_of
@@ -66,6 +67,7 @@ def by_its_channel(data: FollowerData, yaw: Array | None, limits: Limits, dt: fl
     found = [_as_sure(f, samples, data.asked, steady, limits) for f in sensor.findings]
     asked = np.abs(np.nan_to_num(data.asked)) > limits.driving_speed
     found += [by_itself(f) for f in broken_off(one.wheel, (), limits.driving_speed, data.asked)]
+    found += shares_at_once(data, samples, limits.driving_speed, dt)
     return tuple(without_doubles([*(f for f in found if f is not None), *lost_of(wheel, data.lost, asked)]))
 
 

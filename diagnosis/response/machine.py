@@ -11,9 +11,11 @@ from numpy.typing import NDArray
 from diagnosis.response.identification import Response
 from diagnosis.response.inputs import FollowerData
 from diagnosis.response.joint import Joint
+from diagnosis.response.models import Beside
 from diagnosis.response.spells import Spell
 from diagnosis.response.wheel import Wheel
-from diagnosis.results.assessment import Lack, Reason
+from diagnosis.results.assessment import Finding, Lack, Reason
+from replay.faults import FaultMode, Side
 from replay.machine.config import Limits
 
 Array = NDArray[np.float64]
@@ -58,6 +60,8 @@ class Judged(NamedTuple):
         Measured yaw rate of the body [rad/s].
     others : tuple[Array, ...], each of shape (n,)
         Readings of all other wheels [m/s].
+    view : Beside or None
+        What other channels say of its speed.
     odd : str
         Why its own answer to its commands cannot be right; empty where it may be.
     """
@@ -77,6 +81,7 @@ class Judged(NamedTuple):
     yaw: Array | None = None
     others: tuple[Array, ...] = ()
     odd: str = ""
+    view: Beside | None = None
 
 
 def standstills(idle: Sequence[tuple[int, int]], dt: float) -> tuple[str, ...]:
@@ -87,6 +92,19 @@ def standstills(idle: Sequence[tuple[int, int]], dt: float) -> tuple[str, ...]:
     return (
         f"For {total:.1f} s all drives stood still together, one that reads wrong perhaps excepted, while they were commanded to move (longest {start * dt:.1f}–{stop * dt:.1f} s): "
         "disabled, stopped by an emergency stop, or driven by another source of commands; no {wheel} is blamed for it.",
+    )
+
+
+def paused(findings: Sequence[Finding], dt: float) -> tuple[str, ...]:
+    """A sentence where the only drive stood still for a time although it was commanded to move, by what was found of it; `dt` in s."""
+    spans = [f for f in findings if f.mode is FaultMode.NO_SIGNAL and f.side is Side.SENSOR_OR_ACTUATOR]
+    if not spans:
+        return ()
+    longest = max(spans, key=lambda f: f.stop - f.start)
+    return (
+        f"For {sum(f.stop - f.start for f in spans) * dt:.1f} s the only drive stood still, or read 0, while it was commanded to move (longest "
+        f"{longest.start * dt:.1f}–{longest.stop * dt:.1f} s): disabled, stopped by an emergency stop, driven by another source of commands, "
+        "or faulty; with a single drive these look the same.",
     )
 
 
@@ -118,10 +136,11 @@ def unexplained(drives: Sequence[FollowerData], limits: Limits, dt: float) -> tu
     )
 
 
-def otherwise(judged: Mapping[str, Judged], block_s: float) -> tuple[tuple[str, ...], bool]:
+def otherwise(judged: Mapping[str, Judged], block_s: float, followed: Flags) -> tuple[tuple[str, ...], bool]:
     """A sentence where all drives together did something else than their commands, and whether so long that it is the machine's state.
 
-    No wheel is blamed for it. `block_s` is the length of a block [s].
+    No wheel is blamed for it. `block_s` is the length of a block [s]; `followed`, shape (b,), are those in which a receiver shows that
+    the machine went as it was told.
     """
     off = []
     for j in judged.values():
@@ -129,7 +148,7 @@ def otherwise(judged: Mapping[str, Judged], block_s: float) -> tuple[tuple[str, 
             return (), False
         b = j.wheel.blocks
         off.append(np.abs(b.mean - np.clip(b.mean, b.low, b.high)) > _ELSEWHERE * np.nanquantile(np.abs(b.mean), 0.99))
-    edge = np.flatnonzero(np.diff(np.r_[False, np.logical_and.reduce(off), False].astype(np.int8)))
+    edge = np.flatnonzero(np.diff(np.r_[False, np.logical_and.reduce(off) & ~followed, False].astype(np.int8)))
     spans = [(a, b) for a, b in zip(edge[::2] * block_s, edge[1::2] * block_s, strict=True) if b - a >= _ELSEWHERE_S]
     if len(judged) < 2 or not spans:
         return (), False

@@ -108,6 +108,8 @@ class Beside(NamedTuple):
         Whether it shows how this wheel itself turns, rather than how it should.
     across : Array or None, shape (b,)
         Speed of the other side [m/s], to which the view adds a share of the yaw rate; None where it takes no yaw rate.
+    nobody : Array or None, shape (b,)
+        How much of a misfit neither this wheel nor another one makes by what it is off its command, 0…1; None where that is not asked.
     """
 
     speed: Array
@@ -117,6 +119,7 @@ class Beside(NamedTuple):
     compared: str = ""
     own: bool = False
     across: Array | None = None
+    nobody: Array | None = None
 
 
 def blocks_of(samples: Samples, response: Response, cell: int, width: int, size: int) -> Blocks:

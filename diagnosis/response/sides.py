@@ -30,6 +30,7 @@ _LEAST_S = 1.0
 _STANDS_P = (
     0.7  # that an only drive, or its sensor, is at fault rather than the machine stopped, or its commands ignored
 )
+_PAUSES_P, _BACK_S = 0.5, 1.0  # the same where it goes on again by itself, and for how long it then moves
 _ROLLS_P = 0.92  # that a wheel without a drive which reads nothing is read wrong, rather than held by a brake
 _DOUBT_S = 0.5  # around a spell that is judged no fault
 _AT_ONCE_S = 5e-3
@@ -83,7 +84,8 @@ def sides_of(
         long = (spell.stop - spell.start) * width * dt >= _LEAST_S
         found = finding_of(spell, *_shown_by(one, spell)) if long and spell.p >= LEAST_P else None
         if found is not None:
-            findings.append(by_itself(found) if one.alone else _undriven(found) if one.rolls else shaken(found, one))
+            alone = by_itself(found, back=_goes_on(one, found, limits, dt)) if one.alone else found
+            findings.append(alone if one.alone else _undriven(found) if one.rolls else shaken(found, one))
         elif one.posterior[spell.start : spell.stop].argmax(axis=1).min() > NOISY and _entered_calmly(
             one, spell, width, dt
         ):
@@ -118,12 +120,21 @@ def _uncommanded(one: Judged, cell: int, size: int) -> Flags:
     return np.repeat(~np.isfinite(one.data.commands).all(axis=1), cell)[:size]
 
 
-def by_itself(found: Finding) -> Finding:
-    """A finding on the only drive, less sure where its command alone contradicts it: a machine may be stopped, or driven otherwise."""
+def _goes_on(one: Judged, found: Finding, limits: Limits, dt: float) -> bool:
+    """Whether a drive that stood moves again after it."""
+    after = np.abs(np.nan_to_num(one.data.y[found.stop :])) > limits.driving_speed
+    return found.mode is FaultMode.NO_SIGNAL and bool(np.count_nonzero(after) * dt >= _BACK_S)
+
+
+def by_itself(found: Finding, *, back: bool = False) -> Finding:
+    """A finding on the only drive, less sure where its command alone contradicts it: a machine may be stopped, or driven otherwise.
+
+    `back`: it stood and moves again, as after an emergency stop, and as a drive that fails seldom does.
+    """
     if found.side is not Side.SENSOR_OR_ACTUATOR:
         return found
     first = found.hypotheses[0]
-    p = _STANDS_P * found.probability
+    p = (_PAUSES_P if back else _STANDS_P) * found.probability
     rest = Hypothesis("none", State.HEALTHY.value, 1.0 - p)
     text = "With a single drive, an emergency stop, a machine that is disabled, or commands that are ignored look the same."
     return replace(found, probability=p, hypotheses=(replace(first, p=p), rest), evidence=(*found.evidence, text))

@@ -45,6 +45,7 @@ def judge(one: Judged, beside: Beside | None, dt: float, width: int) -> Judged:
         speed=None if beside is None else beside.speed,
         across=None if beside is None else beside.across,
         joint=joint,
+        view=beside,
         wheel=one.wheel._replace(
             blocks=blocks, compared="" if beside is None else beside.compared, own=beside is not None and beside.own
         ),

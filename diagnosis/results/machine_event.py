@@ -49,6 +49,14 @@ def not_following(text: str) -> MachineEvent:
     return MachineEvent(title, text, doubt, "enable the drives, release the emergency stop, and record a mission again")
 
 
+def not_shown(text: str) -> MachineEvent:
+    """The machine went as it was told, by a receiver, and its speeds do not show it."""
+    title = "The speeds do not show how the machine went"
+    doubt = "the speeds did not show how the machine went for a time"
+    act = "check unit, mapping and supply of the speed channels, and record a mission again"
+    return MachineEvent(title, text, doubt, act)
+
+
 def swinging(text: str) -> MachineEvent:
     """All wheels swing about their expected speeds together."""
     doubt = "the {wheels} swing together for a time"

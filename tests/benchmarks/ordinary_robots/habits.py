@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 Rows = list[tuple[float, str, str, Any]]
 
-HABITS = ("usual", "jittery", "steps", "positions", "changes", "bare")
+HABITS = ("usual", "jittery", "steps", "positions", "changes", "bare", "unsigned")
 _PACKET_S = 0.25
 _REPEATED_S = 1.0  # after which a command that has not changed is sent again
 
@@ -40,6 +40,11 @@ class Habits:
     def velocities(self) -> bool:
         """Whether joints have speeds."""
         return self.name != "positions"
+
+    @property
+    def signed(self) -> bool:
+        """Whether speeds of joints tell the direction."""
+        return self.name != "unsigned"
 
     def clocked(self, t: Array, arrives: Array) -> tuple[Array, Array]:
         """Times of joint states and of their arrival [s]."""

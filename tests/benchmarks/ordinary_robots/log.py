@@ -103,12 +103,12 @@ def _joints(
     rows: list[tuple[float, str, str, Any]] = []
     for k in range(t.size):
         torque = np.r_[effort[k], np.zeros(len(turned))] if robot.efforts else _NONE
-        position, velocity = sign * angle[k], sign * speed[k]
+        position, velocity = sign * angle[k], sign * speed[k] if habits.signed else np.abs(speed[k])
         position, velocity = np.r_[position, np.full(len(turned), steering[k])], np.r_[velocity, np.zeros(len(turned))]
         message = made(
             _header(t[k]),
             [*names, *turned],
-            position if robot.positions or turned or not habits.velocities else _NONE,
+            position if (robot.positions and habits.signed) or turned or not habits.velocities else _NONE,
             velocity if habits.velocities else _NONE,
             torque,
         )

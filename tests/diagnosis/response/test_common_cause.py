@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -9,6 +11,7 @@ from numpy.typing import NDArray
 from diagnosis.response.assess import assess_response
 from diagnosis.response.beside import _turned
 from diagnosis.response.channel import samples_of, without_holds
+from diagnosis.response.nowhere import goes_nowhere
 from diagnosis.results.assessment import Finding
 from replay.faults import FaultMode, Side
 from replay.machine.config import Limits
@@ -56,6 +59,53 @@ def test_of_two_wheels_the_one_that_stands_with_the_machine_is_not_blamed_for_a_
     yaw = (measured["FR"] - measured["FL"]) / TRACK + np.random.default_rng(seed).normal(0.0, 0.01, body.shape[0])
     measured["FL"][fault] += 0.2
     assert {w for w, _, f in found(measured, asked, body, yaw) if f.mode is FaultMode.NO_SIGNAL} == set()
+
+
+@pytest.mark.parametrize("kind", ["noise", "spikes", "stuck"])
+def test_of_two_wheels_the_one_that_stands_is_not_blamed_where_the_other_one_makes_no_way_either(kind: str) -> None:
+    """An emergency stop while the other encoder is noisy, wild, or held (its position tells)."""
+    measured, asked, body = speeds(27, ("FR", "FL"))
+    fault, stop = span(60, 85), span(66, 78)
+    for w, c in asked.items():
+        body[stop], c[stop] = (0.7, 0.0), 0.7
+        measured[w][stop] = 0.0
+    rolled = {w: y.copy() for w, y in measured.items()}
+    rng, y = np.random.default_rng(4), measured["FL"]
+    inside = np.arange(fault.start, fault.stop)
+    if kind == "noise":
+        y[inside] += rng.normal(0.0, 0.15, inside.size)
+    elif kind == "spikes":
+        y[rng.choice(inside, 25)] += 6.0
+    else:
+        y[inside] = y[fault.start - 1]
+    positions = kind == "stuck"
+    data = {
+        w: replace(d, rolled=rolled[w] if positions else None) for w, d in followers_of(measured, asked, body).items()
+    }
+    parts = assess_response(data, geometry(("FR", "FL")), None, LIMITS, DT).parts
+    assert {f.mode for a in parts["FR"] for f in a.findings} == set()
+    assert {f.mode for f in parts["FL"][0].findings} <= {FaultMode.NOISY, FaultMode.STUCK}
+
+
+def test_of_two_wheels_a_dead_one_is_told_beside_a_noisy_one_that_goes_on() -> None:
+    measured, asked, body = speeds(27, ("FR", "FL"))
+    rng = np.random.default_rng(4)
+    measured["FL"][span(60, 85)] += rng.normal(0.0, 0.15, 500)
+    measured["FR"][span(66, 78)] = 0.0
+    assert ("FR", FaultMode.NO_SIGNAL) in {(w, f.mode) for w, _, f in found(measured, asked, body)}
+
+
+def test_a_share_of_the_speed_is_no_standstill_and_a_position_that_never_moves_tells_none() -> None:
+    rng, part = np.random.default_rng(5), slice(400, 800)
+    y, asked = 0.5 + rng.normal(0.0, 0.005, 1200), np.full(1200, 0.5)
+    one = followers_of({"FR": y}, {"FR": asked}, np.full((1200, 1), 0.5))["FR"]
+    for share, noise, stands in ((0.1, 0.0, False), (0.0, 0.2, True), (0.6, 0.2, False), (1.0, 0.0, False)):
+        z = y.copy()
+        z[part] = share * y[part] + rng.normal(0.0, noise, 400)
+        assert goes_nowhere(replace(one, y=z), part, 0.05, DT) == stands
+    assert not goes_nowhere(replace(one, rolled=np.zeros(1200)), part, 0.05, DT)
+    still = np.where(np.arange(1200) // 400 == 1, 0.0, y)
+    assert goes_nowhere(replace(one, rolled=still), part, 0.05, DT)
 
 
 def test_wheels_that_a_runaway_neighbour_holds_back_are_no_faults_of_their_own() -> None:

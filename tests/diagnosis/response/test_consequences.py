@@ -122,3 +122,18 @@ def test_no_delay_is_told_beside_a_wheel_that_is_evidently_wrong() -> None:
     told = found(followers_of(measured, asked, body))
     assert {f.mode for f in told["FL"]} == {FaultMode.NOISY}
     assert [f for f in told["RL"] if f.mode is FaultMode.OUTSIDE_TABLE] == []
+
+
+def test_efforts_of_a_machine_that_stands_though_it_is_commanded_accuse_no_drive() -> None:
+    """Nothing is pulled then: the noise of one effort is by chance less than that of the others."""
+    measured, asked, body = speeds(9)
+    stop, rng = slice(round(60 / DT), round(85 / DT)), np.random.default_rng(9)
+    changes = np.where(np.arange(stop.stop - stop.start) // 60 % 2, 0.4, 0.9)
+    data = {}
+    for w, one in followers_of(measured, asked, body).items():
+        effort = np.sign(measured[w]) + 0.5 * measured[w] + rng.normal(0.0, 1.0, measured[w].size)
+        effort[stop] = rng.normal(0.0, 0.02 if w == "RL" else 1.0, changes.size)
+        y, told, commands = one.y.copy(), one.asked.copy(), one.commands.copy()
+        y[stop], told[stop], commands[stop] = 0.0, 0.8, np.column_stack([changes, np.zeros(changes.size)])
+        data[w] = replace(one, y=y, asked=told, commands=commands, effort=effort)
+    assert not any(found(data).values())

@@ -103,3 +103,31 @@ def test_a_reading_that_falls_dead_is_open_though_the_body_of_a_machine_with_mor
     data = followers_of(measured, asked, body)
     found = told(dict(assess_response(data, geometry(WHEELS), yaw_of(measured, 3), LIMITS, DT).parts))
     assert {(w, f.side) for w, f in found} == {("RL", Side.SENSOR_OR_ACTUATOR)}
+
+
+def test_a_wheel_that_reads_nothing_for_most_of_the_mission_is_told_beside_others_that_answer() -> None:
+    measured, asked, body = speeds(14)
+    part = slice(round(30 / DT), measured["RL"].size)
+    measured["RL"][part] *= np.exp(-np.arange(part.stop - part.start) * DT / 0.1)  # a smoothed speed never reads 0
+    parts = assess_response(followers_of(measured, asked, body), geometry(), None, LIMITS, DT).parts
+    told = {(w, f.mode) for w, sides in parts.items() for a in sides for f in a.findings}
+    assert told == {("RL", FaultMode.NO_SIGNAL)}
+
+
+def test_what_the_beginning_and_end_of_a_jam_do_to_the_other_wheel_hides_it_not() -> None:
+    """Both are off their commands for a moment then, as where commands are ignored."""
+    measured, asked, body = speeds(15, ("FR", "FL"))
+    jam = slice(round(60 / DT), round(76 / DT))
+    body[jam], measured["FL"][jam], measured["FR"][jam] = (0.8, 0.0), 0.0, 0.8
+    measured["FR"][jam] += np.random.default_rng(6).normal(0.0, 0.01, jam.stop - jam.start)
+    for c in asked.values():
+        c[jam] = 0.8
+    swing = np.sin(np.linspace(0.0, np.pi, round(1.8 / DT)))
+    for at in (jam.start, jam.stop):
+        measured["FR"][at : at + swing.size] -= 0.45 * swing
+    measured["FL"][jam.stop : jam.stop + swing.size] += 0.35 * swing
+    yaw = (measured["FR"] - measured["FL"]) / TRACK + np.random.default_rng(5).normal(0.0, 0.01, body.shape[0])
+    data = followers_of(measured, asked, body)
+    parts = assess_response(data, geometry(("FR", "FL")), yaw, LIMITS, DT).parts
+    told = {(w, f.side) for w, sides in parts.items() for a in sides for f in a.findings}
+    assert told == {("FL", Side.ACTUATOR)}

@@ -102,6 +102,39 @@ def test_silence_is_the_sensors() -> None:
     assert stated(y, lost=((PART.start, PART.stop),)) == [(Side.SENSOR, FaultMode.NO_SIGNAL)]
 
 
+@pytest.mark.parametrize("share", [0.5, 1.8])
+@pytest.mark.parametrize("known", [True, False])
+def test_a_share_that_comes_and_goes_at_once_is_the_sensors(share: float, *, known: bool) -> None:
+    y = speed(5)
+    y[PART] *= share
+    asked = RESTS if known else np.full(N, np.nan)
+    (found,) = by_its_channel(drive(y, asked), None, LIMITS, DT)
+    assert (found.side, found.start, found.stop) == (Side.SENSOR, PART.start, PART.stop)
+    assert found.mode is (FaultMode.INEFFICIENT if share < 1.0 else FaultMode.OUTSIDE_TABLE)
+    assert found.epsilon is not None
+    assert found.epsilon.value == pytest.approx(1.0 - share, abs=0.05)
+
+
+@pytest.mark.parametrize("kind", ["asked", "slow", "once", "other", "always"])
+def test_a_drive_that_slows_down_by_itself_or_as_told_is_no_sensor(kind: str) -> None:
+    """It is told to; it takes half a second; it stays so; it comes back to another speed; it always jumps so."""
+    y, asked = speed(5), RESTS.copy()
+    y[PART] *= 0.5
+    if kind == "asked":
+        asked[PART] *= 0.5
+    elif kind == "slow":
+        for at, way in ((PART.start, (1.0, 0.5)), (PART.stop, (0.5, 1.0))):
+            y[at : at + 10] = 0.5 * np.linspace(*way, 10)
+    elif kind == "once":
+        y[PART.stop :] *= 0.5
+    elif kind == "other":
+        y[PART.stop :] *= 1.6
+    else:
+        asked = np.full(N, np.nan)
+        y = np.where(np.arange(N) % 80 < 40, 0.5, 0.25) + 0.01 * np.random.default_rng(4).normal(size=N)
+    assert stated(y, asked) == []
+
+
 @pytest.mark.parametrize("at_once", [True, False])
 def test_a_fall_to_nothing_is_told_where_it_comes_and_goes_at_once(*, at_once: bool) -> None:
     y = speed(3)

@@ -9,7 +9,9 @@ import pytest
 from numpy.typing import NDArray
 
 from diagnosis.response.assess import Judgement, assess_response
+from diagnosis.response.blame import blame_by_commands
 from diagnosis.response.inputs import FollowerData
+from diagnosis.response.models import Blocks
 from diagnosis.response.sideways import crossed, goes_sideways
 from replay.faults import FaultMode
 from replay.machine.config import Limits
@@ -71,3 +73,28 @@ def test_wheels_of_one_axle_that_are_exchanged_follow_the_turns_and_those_on_rol
     assert not crossed(measured, geometry(), None)
     turned = rollers(6)
     assert not crossed(turned, geometry(), turned["FR"] + turned["RR"] - turned["FL"] - turned["RL"])
+
+
+def test_a_wheel_that_keeps_to_its_command_is_not_blamed_where_rollers_slip() -> None:
+    """The others slip as they are set going; what this exact one misses of its command is far less than what it differs from them."""
+    number, top = 400, 1.0
+    asked = np.repeat(np.random.default_rng(2).choice([-0.8, -0.3, 0.4, 0.9], number // 10), 10)
+    slip = np.zeros(number)
+    slip[200:216] = 0.3
+    blocks = {
+        w: _blocks(asked + (0.02 if w == "RR" else -0.03) * (slip > 0.0), asked, 0.001 if w == "RR" else 0.01)
+        for w in WHEELS
+    }
+    apart = asked + slip
+    blame, nobody = blame_by_commands(blocks["RR"], [blocks[w] for w in WHEELS[:2]], apart)
+    assert blame[204:212].max() < 0.2
+    assert nobody is not None
+    assert nobody[204:212].min() > 0.5
+    wrong = blocks["RR"]._replace(mean=np.where(slip > 0.0, 0.6 * asked, asked))
+    assert blame_by_commands(wrong, [blocks[w] for w in WHEELS[:2]], asked * top)[0][204:212].min() > 0.9
+
+
+def _blocks(mean: Array, asked: Array, noise: float) -> Blocks:
+    flat, none = np.full(mean.size, noise), np.zeros(mean.size)
+    readings = np.full(mean.size, 25.0)
+    return Blocks(np.arange(mean.size) * 25, mean, asked, asked, flat, readings, none, none, flat, flat)
