@@ -19,6 +19,8 @@ class About(StrEnum):
     SHARE = "share"
     #: The saturation term.
     SAT = "sat"
+    #: What the shape of a fault's onset says of the side.
+    ONSET = "onset"
 
 
 class Sentence(str):

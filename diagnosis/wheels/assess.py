@@ -32,6 +32,7 @@ from diagnosis.wheels.quick_noise import with_shaken
 from diagnosis.wheels.readings import with_readings
 from diagnosis.wheels.run_kernel import evidence_of_runs
 from diagnosis.wheels.shared_swings import without_shared
+from diagnosis.wheels.standing import or_standing
 from diagnosis.wheels.states import states_of, unexplained_s, with_reasons
 from diagnosis.wheels.tracks import Segment, Track, runs_between, segments_of, track_of
 from replay.faults import Side
@@ -80,15 +81,15 @@ def assess_wheels(data: WheelsData, limits: Limits, *, gains: bool) -> WheelsJud
     found = {i: with_open_side(path, findings_of(path, limits)) for i, path in paths.items()}
     swings = without_shared(paths, with_shaken(paths, found))
     doubted = without_many_weak(with_frozen(data, swings.found))
+    measured = {i: bool(data.measured[i]) for i in paths}
+    told = or_standing(doubted.found, {i: path.y for i, path in paths.items()}, measured, data.dt)
     out = {}
     for i, path in paths.items():
-        claimed = as_claimed(
-            doubted.found[i], limits.clear_at, measured=bool(data.measured[i]), swings=bool(swings.spans)
-        )
+        claimed = as_claimed(told[i], limits.clear_at, measured=measured[i], swings=bool(swings.spans))
         expected: Array = np.asarray(per_sample(path.expected, path.width, path.y.size), dtype=np.float64)
         claimed = or_off(claimed, path.y, expected)
         sensor, actuator = _assessments(data, i, path, claimed, gains=gains)
-        out[i] = sensor, actuator if data.measured[i] else replace(actuator, loss=losses[i])
+        out[i] = sensor, actuator if measured[i] else replace(actuator, loss=losses[i])
     events = ((swinging(swings.sentence),) if swings.spans else ()) + (
         (foreign(doubted.sentence),) if doubted.wheels else ()
     )

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from diagnosis.estimation.viterbi import first_lasting
 from diagnosis.results.assessment import Finding
 from diagnosis.results.limited import limited
+from diagnosis.results.sentence import About, Sentence
 from diagnosis.wheels.alive import lives
 from diagnosis.wheels.blocks import per_sample
 from diagnosis.wheels.isolation import Run, judge
@@ -214,5 +215,7 @@ def _detected(path: WheelPath, segment: Segment, finding: Finding) -> Finding:
     hold = path.width * path.dt
     causal = first_lasting(path.raised, segment.start, segment.stop, 2, max(1, round(_HOLD_S / hold)))
     seen = None if causal is None else max(finding.start, min(causal * path.width, finding.stop - 1))
-    shape = onset_sentence(finding.start, path.y, path.model, path.dt, path.names[0], finding.side)
+    shape = Sentence(
+        About.ONSET, onset_sentence(finding.start, path.y, path.model, path.dt, path.names[0], finding.side)
+    )
     return replace(finding, detected=seen, evidence=(*finding.evidence, shape))
