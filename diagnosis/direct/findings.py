@@ -13,7 +13,7 @@ from diagnosis.direct.identification import IdentifiedPair
 from diagnosis.direct.isolation import Isolated, estimate_run, isolate
 from diagnosis.direct.onset import refine
 from diagnosis.direct.same_share import as_beside, as_excess_beside
-from diagnosis.direct.sentences import END_SENTENCE, alike_sentence, sentences
+from diagnosis.direct.sentences import END_SENTENCE, RANGE_SENTENCE, alike_sentence, sentences
 from diagnosis.direct.stated_mode import least_constant, mode_of
 from diagnosis.direct.timing import timing_explains
 from diagnosis.estimation.by_itself import told_by_itself
@@ -25,7 +25,7 @@ from diagnosis.estimation.simple_causes import Measured
 from diagnosis.estimation.spells import in_spells
 from diagnosis.estimation.spikes import with_spikes
 from diagnosis.estimation.viterbi import ModePath
-from diagnosis.results.alike import hardly_moves, or_shifted
+from diagnosis.results.alike import hardly_moves, or_at_its_end, or_shifted
 from diagnosis.results.assessment import Finding
 from diagnosis.results.fault_rows import ROWS, codes_of
 from diagnosis.results.result import Epsilon, Hypothesis
@@ -41,6 +41,7 @@ _CLEAR = 3.0  # times the noise
 _WITHIN_P = 0.7  # of noise whose root mean square stays below that
 _MOST_SHIFTED = 0.4  # of the span: no channel that lives is off by more
 _END, _SAME_WAY = 0.97, 0.3  # of the span: where a valve stands, and at least what it is told, the same way
+_LARGEST, _BEYOND = 0.999, 0.9  # of the largest reading; of the time
 _HYSTERESIS, _RESTS_S = 0.025, 10.0  # of the span, off a healthy valve's command, for no longer than this
 _MIDDLE, _MOSTLY = 0.04, 0.98  # of the span: about its middle a valve opens nothing; of the time
 _OPEN_S, _DOUBT, _FAR_OFF = 0.5, 0.05, 0.2  # s; probability that counts for nothing; of the span
@@ -202,6 +203,8 @@ def finding_of(run: Run, found: IdentifiedPair, limits: Limits) -> Finding | Non
         return told
     if _at_its_end(isolated, found):
         return or_shifted(told, END_SENTENCE)
+    if _beyond_its_range(isolated, found):
+        return or_at_its_end(told, RANGE_SENTENCE)
     seen = isolated.seen
     stays = hardly_moves(seen.y[seen.use], seen.x[seen.use], _MOST_SHIFTED * pair.span)
     return or_shifted(told) if share is None and stays else told
@@ -231,6 +234,17 @@ def _at_its_end(isolated: Isolated, found: IdentifiedPair) -> bool:
         return False
     y, x = float(np.mean(seen.y[seen.use])), seen.x[seen.use] / span
     return abs(y) >= _END * span and bool(np.min(np.sign(y) * x) >= _SAME_WAY)
+
+
+def _beyond_its_range(isolated: Isolated, found: IdentifiedPair) -> bool:
+    """Whether a sensor stays at the largest reading that it ever shows while its reference is beyond that, the same way."""
+    seen = isolated.seen
+    if found.pair.side is not Side.SENSOR or not seen.use.any():
+        return False
+    y, x = seen.y[seen.use], seen.x[seen.use]
+    most, sign = float(np.nanmax(np.abs(found.pair.y))), float(np.sign(np.median(y)))
+    ends = float(np.mean(np.abs(y) >= _LARGEST * most)) > _BEYOND
+    return ends and sign != 0.0 and float(np.mean(sign * x > np.abs(y) - _CLEAR * seen.noise)) > _BEYOND
 
 
 def _left_share(isolated: Isolated) -> float | None:

@@ -18,6 +18,8 @@ END_SENTENCE = (
     "It stands at its end while its command asks for less, the same way: a {valve} that opens too far does so as well."
 )
 
+RANGE_SENTENCE = "It stays at the largest reading that it ever shows while its reference goes beyond that: it can show no more, or is clipped on the way."
+
 
 def sentences(isolated: Isolated, found: IdentifiedPair, mode: FaultMode, epsilon: Epsilon | None) -> tuple[str, ...]:
     """Evidence of one finding.

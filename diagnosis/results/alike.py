@@ -15,6 +15,7 @@ Array = NDArray[np.float64]
 
 _MOVES = 0.15  # of what it is off by: a reference that moves over less tells a constant channel from no shifted one
 _SHIFTED = 0.4  # of such a channel that seems stuck: that it is off by a constant
+_ENDS = 0.85  # of a sensor that stays at its largest reading while its reference goes beyond: that it can show no more
 _FEW = 5
 _MOVING = 0.1  # of the usual reference: from here on a channel that lives shows its own noise
 _HELD, _LONGER = 0.9, 5.0  # of the time, and times as long as it ever stays elsewhere
@@ -80,3 +81,22 @@ def or_shifted(finding: Finding, why: str = SHIFTED_SENTENCE) -> Finding:
     p |= {own: p.get(own, 0.0) - moved, other: p.get(other, 0.0) + moved}
     named = sorted((Hypothesis(*row, share) for row, share in p.items()), key=lambda h: -h.p)
     return replace(finding, probability=p[own], hypotheses=tuple(named), evidence=(*finding.evidence, why))
+
+
+def or_at_its_end(finding: Finding, why: str) -> Finding:
+    """A stuck sensor as one that cannot show more than it does, with the sentence that says why: it is in no row, and hardly stuck."""
+    own, other = (finding.side.value, FaultMode.STUCK.value), (finding.side.value, FaultMode.OUTSIDE_TABLE.value)
+    p = {(h.side, h.mode): h.p for h in finding.hypotheses}
+    share = (finding.side.value, FaultMode.INEFFICIENT.value)  # of a reference that stays: the same
+    both = p.get(own, 0.0) + p.pop(share, 0.0) + p.get(other, 0.0)
+    p |= {own: (1.0 - _ENDS) * both, other: _ENDS * both}
+    named = sorted((Hypothesis(*row, share) for row, share in p.items()), key=lambda h: -h.p)
+    return replace(
+        finding,
+        mode=FaultMode.OUTSIDE_TABLE,
+        probability=p[other],
+        hypotheses=tuple(named),
+        epsilon=None,
+        sat=None,
+        evidence=(why, *finding.evidence),
+    )

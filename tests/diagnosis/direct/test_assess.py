@@ -406,3 +406,14 @@ def test_a_gain_within_the_limits_is_not_joined_to_a_loss_that_follows_it() -> N
     found = single(assess_pair(pair(Side.SENSOR, y, true + 0.001 * rng.normal(size=N)), LIMITS))
     assert found.mode is FaultMode.INEFFICIENT
     assert abs(found.start - 7000) < 100
+
+
+def test_a_sensor_at_the_end_of_its_range_is_hardly_stuck() -> None:
+    """It stays at its largest reading wherever its reference is beyond that, and shows everything below."""
+    rng = np.random.default_rng(8)
+    y, x = measured(drive(), Side.SENSOR, rng)
+    clipped = assess_pair(pair(Side.SENSOR, np.clip(y, -0.18, 0.18), x), LIMITS).findings
+    assert clipped
+    assert {f.mode for f in clipped} == {FaultMode.OUTSIDE_TABLE}
+    stuck = judged(Side.SENSOR, lambda true, _: np.full(N, true[START]), 3).findings
+    assert [f.mode for f in stuck] == [FaultMode.STUCK]
