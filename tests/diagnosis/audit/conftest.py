@@ -10,7 +10,7 @@ import pytest
 
 from diagnosis.audit.discovery.missions import MissionSource
 from diagnosis.audit.isolation.forks import ForkServer
-from diagnosis.audit.isolation.run import Isolation
+from diagnosis.audit.isolation.run import Isolation, isolation
 from diagnosis.audit.store.keys import Key, config_hash, log_hash
 from replay.export.mission import write_mission
 from replay.simulation.options import SimulationOptions
@@ -21,6 +21,8 @@ from replay.simulation.run import simulate_mission
 def _importable() -> Iterator[None]:
     patch = pytest.MonkeyPatch()
     patch.syspath_prepend(Path(__file__).parent)
+    for kind in ("fork", "fork-cold"):  # a server of an earlier test does not find it
+        isolation(kind).close()
     yield
     patch.undo()
 
