@@ -34,12 +34,13 @@ _ALONE, _CHANGED_ALONE = 3.0, 2.2
 OTHERS = 2
 #: Limits of speed per opening below and above the other wheels', in windows and over the mission, as multiples of the loss
 #: that counts, by whether opening and speed are measured twice. What measurements judge need not be judged by its likeness to
-#: others as strictly; what reads too much is in no row of the tables, so that nothing else would tell it.
+#: others as strictly, but what lies behind a drive neither of them judges; what reads too much is in no row of the tables, so that
+#: nothing else would tell it.
 RESPONSE = {
     (False, False): ((0.75, 0.65), (0.9, 0.7)),
     (True, False): ((1.4, 1.15), (1.25, 0.95)),
     (False, True): ((1.15, 1.0), (1.4, 1.2)),
-    (True, True): ((2.0, 1.4), (2.0, 1.4)),
+    (True, True): ((1.4, 1.15), (2.0, 1.4)),
 }
 
 

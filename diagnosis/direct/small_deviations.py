@@ -17,7 +17,7 @@ from diagnosis.direct.low_speed import left_open
 from diagnosis.results.assessment import Assessment, Finding
 from replay.faults import FaultMode
 
-_SMALL = 0.08  # of the span, root mean square: a larger deviation is none of a healthy valve, whatever the others do
+_SMALL = 0.1  # of the span, root mean square: a larger deviation is none of a healthy valve, whatever the others do
 _SHARE, _SHARE_OTHERS = 0.2, 0.3  # of its command, likewise: by habit, and while others are off as well
 _WINDOW_S, _WINDOWS = 2.0, 4  # s; fewer show nothing
 _USUAL, _BEYOND = 0.9, 1.8  # quantile of the windows, and times it

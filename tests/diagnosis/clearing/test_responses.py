@@ -107,3 +107,10 @@ def test_a_loss_over_the_mission_of_one_wheel_alone_counts_although_it_is_measur
     alike = of._replace(usual=[Usual(0.2), Usual(0.1), Usual(0.15), Usual(0.0)])
     assert response_limits(of, [TWICE] * 4, CLEAR_AT)[0].lasting_below == pytest.approx(0.13)
     assert response_limits(alike, [TWICE] * 4, CLEAR_AT)[0].lasting_below == usual_limits(TWICE, CLEAR_AT).lasting_below
+
+
+def test_a_second_speed_makes_no_limit_of_what_lies_behind_a_drive_wider() -> None:
+    both, valve = (usual_limits(twice, CLEAR_AT) for twice in (TWICE, (True, False)))
+    assert both.below <= valve.below
+    assert both.changed <= valve.changed
+    assert both.lasting_below <= valve.lasting_below
