@@ -7,8 +7,7 @@ misfit by Cauchy's loss of scale s, mean ln(1 + (misfit/s)²), where the referen
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -16,6 +15,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from diagnosis.channels.noise import shifted
+from diagnosis.channels.scale import scale_of
 from replay.arrays.numeric import bridged
 
 Array = NDArray[np.float64]
@@ -29,13 +29,9 @@ _LONG_LAGS_S = (0.1, 0.14, 0.2, 0.28)  # of large pilot stages: tried where the 
 _PLAYS = (0.006, 0.012, 0.02, 0.03, 0.045, 0.065)  # of the span
 _BETTER = 0.03  # of the loss, by which a lag or play is believed
 _ROUNDS, _FINE = 5, (0.8, 0.9, 0.95, 1.05, 1.1, 1.25)
-_USUAL, _LARGE = 0.35, 3.0
-#: Quantile of the smallest misfits, and times that: of noise it is a little more than the usual one.
-_FEW, _OF_FEW = 0.1, 4.0
-_MOSTLY, _REPEATS = 0.5, 10  # of the places; of an estimate of the scale
+_USUAL = 0.35
 _SIBLINGS, _ALIKE, _SCALES = 3, 0.6, 0.01  # channels of one kind; steps, and share, by which they may differ
 _UNLIKE = 1.6  # times the usual play or lag of valves of one kind
-_LARGEST_SCALE = 0.02  # what differs by more is a loss of effectiveness
 
 
 class Relation(NamedTuple):
@@ -186,7 +182,7 @@ def relation_of(
         if misfit >= least:
             break
         best, least = found, misfit
-    return best._replace(gain=_gain(places, best, dt))
+    return best._replace(gain=scale_of(_at(places, best, dt), places.y))
 
 
 def _trials(near: Relation, delays: tuple[int, int], span: float, dt: float) -> Iterable[Relation]:
@@ -294,49 +290,3 @@ def _least(places: _Places, trials: Iterable[Relation], dt: float, scale: float)
         if misfit < least:
             best, least = trial, misfit
     return best, least
-
-
-def _gain(places: _Places, relation: Relation, dt: float) -> float:
-    """Scale by least squares over places that a healthy channel explains; 1 where it is no mere error of scale.
-
-    A fault may last for most of a mission: then large values count alone, for a loss of small ones is as small as noise.
-    """
-    x, y = _at(places, relation, dt), places.y
-    large = np.abs(x) >= np.nanmedian(np.abs(x))
-    white = _white(y - x)
-    gain, near = _scale_of(x[large], y[large], lambda misfit: _usual_of_few(misfit, white))
-    if np.mean(np.abs(y - gain * x) <= near) >= _MOSTLY:
-        gain, _ = _scale_of(x, y, lambda misfit: float(np.nanquantile(misfit, _USUAL)))
-    return gain if abs(gain - 1.0) < 0.99 * _LARGEST_SCALE else 1.0
-
-
-def _scale_of(x: Array, y: Array, usual: Callable[[Array], float]) -> tuple[float, float]:
-    """Scale of y against x, of the places that it explains, and by how much these may be off it."""
-    gain, near = 1.0, 0.0
-    for _ in range(_REPEATS):
-        misfit = np.abs(y - gain * x)
-        near = _LARGE * usual(misfit)
-        good = misfit <= near
-        power = float(x[good] @ x[good])
-        if power <= 0.0:
-            return 1.0, near
-        gain = float(np.clip((x[good] @ y[good]) / power, 1.0 - _LARGEST_SCALE, 1.0 + _LARGEST_SCALE))
-    return gain, near
-
-
-def _usual_of_few(misfit: Array, white: float) -> float:
-    """Usual size of a misfit (n,) by its smallest ones: a fault of most places leaves those alone.
-
-    Of these, what differs from place to place by itself is enough, `white` [unit of the misfit].
-    """
-    few = misfit[misfit > 0.0]
-    usual = float(np.nanquantile(misfit, _USUAL))
-    if not few.size:
-        return usual
-    least = float(np.nanquantile(few, _FEW))
-    return min(usual, _OF_FEW * least, max(least, white))
-
-
-def _white(misfit: Array) -> float:
-    """Usual size, as a median, of what a misfit (n,) has from place to place: a fault that lasts moves two neighbours alike."""
-    return float(np.nanmedian(np.abs(np.diff(misfit)))) / math.sqrt(2.0) if misfit.size > 1 else 0.0
