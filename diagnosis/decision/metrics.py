@@ -29,6 +29,7 @@ PAPER_TABLE = (
     ("Sun", 0.035, 0.135, 12),
 )
 _DECIDED = np.array([s in DECIDED for s in STATES])
+_AS_WELL = 0.5  # probability of a healthy part, from which on a finding decides nothing
 _RESTS = STATES.index(State.NOT_EXCITED)
 _EARTH_RADIUS = 6_371_008.8
 
@@ -102,7 +103,7 @@ def coverage(
 ) -> tuple[list[CoverageRow], dict[tuple[str, str], float]]:
     """Seconds of each state per component and side, and seconds of driving that were decided.
 
-    A drive whose command and opening are measured drives while either is beyond rest.
+    A finding that leaves it as probable that the part is healthy decides nothing. A drive whose command and opening are measured drives while either is beyond rest.
 
     `moving` of shape (n, wheels), `dt` in s.
     """
@@ -114,7 +115,11 @@ def coverage(
         drives = moving[:, machine.wheels.index(component)] if component in machine.wheels else anything
         if side == Side.ACTUATOR and assessment.tier is Tier.DIRECT:  # a motor that coasts is not asked for anything
             drives = drives & (assessment.states != _RESTS)
-        seconds = float(np.count_nonzero(_DECIDED[assessment.states] & drives)) * dt
+        decides = _DECIDED[assessment.states] & drives
+        for f in assessment.findings:
+            if sum(h.p for h in f.hypotheses if h.mode == State.HEALTHY) >= _AS_WELL:
+                decides[f.start : f.stop] = False
+        seconds = float(np.count_nonzero(decides)) * dt
         decided[component, side] = seconds
         rows.append(
             {

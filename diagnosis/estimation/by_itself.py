@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.estimation.one_cause import cause_of, joined
-from diagnosis.estimation.simple_causes import Cause, Measured
+from diagnosis.estimation.simple_causes import Cause, Measured, below_limit
 from diagnosis.results.assessment import Finding
 from replay.faults import FaultMode
 
@@ -68,7 +68,7 @@ def causes_where_off(finding: Finding, measured: Measured, least: float = 0.0) -
         cause = _cause(piece, measured)
         if cause is not None:
             power += float(np.sum(inside**2))
-            if not _small(cause, measured):
+            if not below_limit(cause, measured):
                 found.append(joined([piece], cause))
     return found, power / max(whole, 1e-30)
 
@@ -90,8 +90,3 @@ def _cause(piece: Finding, measured: Measured) -> Cause | None:
     cause = cause_of([piece], measured) or cause_of([inner], measured)
     stays = cause is not None and cause.epsilon is not None and cause.epsilon.value > _NOTHING_LEFT
     return None if cause is None or stays else replace(cause, start=None, stop=None)
-
-
-def _small(cause: Cause, measured: Measured) -> bool:
-    """Whether a cause may be a steady loss or gain below the limit."""
-    return cause.epsilon is not None and not cause.changes and abs(cause.epsilon.value) < measured.least_loss

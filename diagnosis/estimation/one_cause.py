@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnosis.estimation.simple_causes import Cause, Measured, causes, every_power, power
+from diagnosis.estimation.simple_causes import Cause, Measured, below_limit, causes, every_power, power
 from diagnosis.results.assessment import Finding
 from diagnosis.results.result import Hypothesis
 from diagnosis.results.sentence import About, is_about
@@ -74,7 +74,8 @@ def with_one_cause(findings: Sequence[Finding], measured: Measured) -> list[Find
         if offset is not None and offset.alone and offset.epsilon is None and not offset.changes:
             near, cause = wide, offset  # what a loss, say, explains of a part is an offset's by the rest
         told = cause is None or (cause.alone and all(f.mode == cause.mode for f in near))
-        out += near if told or cause is None else [joined(near, cause)]
+        small = cause is not None and below_limit(cause, measured) and all(f.mode.varying for f in near)
+        out += near if told or small or cause is None else [joined(near, cause)]
     return out
 
 

@@ -210,6 +210,11 @@ def _loss(gains: tuple[float, float], measured: Measured) -> Cause:
     )
 
 
+def below_limit(cause: Cause, measured: Measured) -> bool:
+    """Whether a cause may be a steady loss or gain below the limit."""
+    return cause.epsilon is not None and not cause.changes and abs(cause.epsilon.value) < measured.least_loss
+
+
 def power(off: Array, measured: Measured) -> float:
     """Mean square of a deviation, shape (k,), beyond what healthy noise has, but for its largest, which the timing of a move makes [unit²]."""
     squared = off**2

@@ -47,6 +47,8 @@ def as_shown(data: WheelsData, i: int, f: Finding, told: Sequence[Finding]) -> F
     """
     if f.side is not Side.SENSOR or not f.mode.total:
         return f
+    if not np.isfinite(data.y[f.start : f.stop, i]).any():
+        return f  # it gives no readings, whatever its wheel does
     f = _may_creep(data, i, _alive(f, data.y[:, i]))
     return _with_company(data, i, _off_before(data, i, f, told))
 

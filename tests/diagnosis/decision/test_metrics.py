@@ -9,10 +9,11 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from diagnosis.decision.metrics import body_motion, coverage, driving, loop_metrics, open_states, path_of, phases
-from diagnosis.results.assessment import CODE, Assessment
+from diagnosis.results.assessment import CODE, Assessment, Finding
+from diagnosis.results.result import Hypothesis
 from diagnosis.results.vocabulary import Tier
 from replay.control.loop import Replay, replay_loop
-from replay.faults import State
+from replay.faults import FaultMode, Side, State
 from replay.machine.config import Machine
 from replay.signals.timeline import Timeline
 
@@ -101,6 +102,21 @@ def test_coverage_counts_every_sample() -> None:
     assert rows[1]["driving_s"] == pytest.approx(0.75)
     assert decided["front", "sensor"] == pytest.approx(0.5)
     assert rows[1]["decided_driving_s"] == decided["front", "sensor"]
+
+
+def test_a_finding_that_leaves_a_part_as_probably_healthy_decides_nothing() -> None:
+    """A state is stated all the same; but nobody may take a doubtful dead sensor for time in which it was judged."""
+    states = np.repeat([CODE[s] for s in (State.HEALTHY, State.NO_SIGNAL)], [60, 40]).astype(np.int8)
+    moving = np.ones((100, 2), dtype=bool)
+
+    def decided(healthy: float) -> float:
+        rows = (Hypothesis("none", "healthy", healthy), Hypothesis("sensor", "no_signal", 1.0 - healthy))
+        finding = Finding(60, 100, Side.SENSOR, FaultMode.NO_SIGNAL, 1.0 - healthy, rows, None, None, (), Tier.MODEL)
+        one = Assessment(states, findings=(finding,), tier=Tier.MODEL)
+        return coverage({("A", "sensor"): one}, moving, MACHINE, 0.01)[1]["A", "sensor"]
+
+    assert decided(0.54) == pytest.approx(0.6)
+    assert decided(0.1) == pytest.approx(1.0)
 
 
 def test_the_commonest_open_state_counts_while_driving_alone() -> None:

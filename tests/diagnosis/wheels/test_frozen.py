@@ -112,11 +112,14 @@ def test_gaps_and_nothing() -> None:
     assert frozen_of(np.zeros(0), SPAN, DT) == []
 
 
-@pytest.mark.parametrize(("opening", "sure"), [(0.03, False), (0.3, True)])
-def test_a_wheel_that_may_creep_below_what_its_sensor_reads_has_no_surely_dead_one(opening: float, sure: bool) -> None:
+@pytest.mark.parametrize(("opening", "reading", "sure"), [(0.03, 0.0, False), (0.3, 0.0, True), (0.03, np.nan, True)])
+def test_a_wheel_that_may_creep_below_what_its_sensor_reads_has_no_surely_dead_one(
+    opening: float, reading: float, sure: bool
+) -> None:
+    """But one that gives no readings at all is dead, whatever its wheel does."""
     y = np.where(np.abs(moving := speeds() - 0.9) < 0.05, 0.0, moving)
     u = 0.3 * y
-    y[2000:2600, 0], u[2000:2600, 0] = 0.0, opening
+    y[2000:2600, 0], u[2000:2600, 0] = reading, opening
     rows = (Hypothesis("sensor", FaultMode.NO_SIGNAL, 0.95), Hypothesis("none", "healthy", 0.05))
     dead = Finding(2000, 2600, Side.SENSOR, FaultMode.NO_SIGNAL, 0.95, rows, None, None, (), Tier.MODEL)
     told = with_frozen(data(y, u), {0: WheelFindings(findings=[dead])})[0].findings
