@@ -35,7 +35,7 @@ from diagnosis.wheels.shared_swings import without_shared
 from diagnosis.wheels.standing import or_standing
 from diagnosis.wheels.states import states_of, unexplained_s, with_reasons
 from diagnosis.wheels.tracks import Segment, Track, runs_between, segments_of, track_of
-from replay.faults import Side
+from replay.faults import Side, State
 from replay.machine.config import Limits
 
 Array = NDArray[np.float64]
@@ -169,7 +169,10 @@ def _assessments(
     out = []
     for side in (Side.SENSOR, Side.ACTUATOR):
         faults, codes = found.of(side), states.codes[side]
-        doubted: Array = np.asarray(per_sample(1.0 - path.healthy[side], path.width, path.y.size), np.float64)
+        doubted: Array = np.array(per_sample(1.0 - path.healthy[side], path.width, path.y.size), np.float64)
+        for f in faults:  # what other evidence says counts in it, too
+            doubts = 1.0 - sum(h.p for h in f.hypotheses if h.mode == State.HEALTHY)
+            np.maximum(doubted[f.start : f.stop], doubts, out=doubted[f.start : f.stop])
         pictured = shared | Pictured.of(step, [("probability", doubted)])
         judged = Assessment(
             states=codes,
