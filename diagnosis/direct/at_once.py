@@ -48,7 +48,9 @@ def without_shared_moments(
     own, lasting = {}, {}
     for w, one in found.items():
         findings = assessments[w].findings if w in assessments else ()
-        own[w] = in_lasting([f for f in findings if _by_itself(f, off[w], steady[w])], off[w].size, one.pair.dt)
+        fast = np.abs(np.nan_to_num(one.samples.x)) > _SLOW * top
+        alone = [f for f in findings if _by_itself(f, off[w], steady[w], fast)]
+        own[w] = in_lasting(alone, off[w].size, one.pair.dt)
         lasting[w] = in_lasting(findings, off[w].size, one.pair.dt) & ~own[w]
     habit = {w: np.where(own[w], 0.0, x) for w, x in off.items()}
     out = {}
@@ -59,10 +61,15 @@ def without_shared_moments(
     return out
 
 
-def _by_itself(finding: Finding, off: Array, steady: NDArray[np.bool_]) -> bool:
-    """Whether a finding is a fault whatever the speed does: nothing is left of the signal, or it is as far off at steady speed."""
+def _by_itself(finding: Finding, off: Array, steady: NDArray[np.bool_], fast: NDArray[np.bool_]) -> bool:
+    """Whether a finding is a fault whatever the speed does: nothing is left of the signal at speed, or it is as far off where that is steady.
+
+    At low speed alone, all sensors of a machine may read nothing.
+    """
     part = slice(finding.start, finding.stop)
-    return finding.mode.total or (float(np.mean(steady[part])) >= _LEAST and not _unsteady(off[part], steady[part]))
+    if finding.mode.total and float(np.mean(fast[part])) >= _LEAST:
+        return True
+    return float(np.mean(steady[part])) >= _LEAST and not _unsteady(off[part], steady[part])
 
 
 def _unsteady(off: Array, steady: NDArray[np.bool_]) -> bool:

@@ -42,6 +42,7 @@ _WITHIN_P = 0.7  # of noise whose root mean square stays below that
 _MOST_SHIFTED = 0.4  # of the span: no channel that lives is off by more
 _END, _SAME_WAY = 0.97, 0.3  # of the span: where a valve stands, and at least what it is told, the same way
 _LARGEST, _BEYOND = 0.999, 0.9  # of the largest reading; of the time
+_LESS, _SHOWN = 0.9, 0.1  # of the largest reading, and of all: as many are less, of a sensor that lives
 _HYSTERESIS, _RESTS_S = 0.025, 10.0  # of the span, off a healthy valve's command, for no longer than this
 _MIDDLE, _MOSTLY = 0.04, 0.98  # of the span: about its middle a valve opens nothing; of the time
 _OPEN_S, _DOUBT, _FAR_OFF = 0.5, 0.05, 0.2  # s; probability that counts for nothing; of the span
@@ -237,12 +238,18 @@ def _at_its_end(isolated: Isolated, found: IdentifiedPair) -> bool:
 
 
 def _beyond_its_range(isolated: Isolated, found: IdentifiedPair) -> bool:
-    """Whether a sensor stays at the largest reading that it ever shows while its reference is beyond that, the same way."""
+    """Whether a sensor stays at the largest reading that it ever shows while its reference is beyond that, the same way.
+
+    It shows less elsewhere: one that is stuck for the whole mission has no other reading.
+    """
     seen = isolated.seen
     if found.pair.side is not Side.SENSOR or not seen.use.any():
         return False
     y, x = seen.y[seen.use], seen.x[seen.use]
     most, sign = float(np.nanmax(np.abs(found.pair.y))), float(np.sign(np.median(y)))
+    every = found.pair.y[np.isfinite(found.pair.y)]
+    if float(np.mean(np.abs(every) < _LESS * most)) < _SHOWN:
+        return False
     ends = float(np.mean(np.abs(y) >= _LARGEST * most)) > _BEYOND
     return ends and sign != 0.0 and float(np.mean(sign * x > np.abs(y) - _CLEAR * seen.noise)) > _BEYOND
 

@@ -417,3 +417,11 @@ def test_a_sensor_at_the_end_of_its_range_is_hardly_stuck() -> None:
     assert {f.mode for f in clipped} == {FaultMode.OUTSIDE_TABLE}
     stuck = judged(Side.SENSOR, lambda true, _: np.full(N, true[START]), 3).findings
     assert [f.mode for f in stuck] == [FaultMode.STUCK]
+
+
+def test_a_sensor_that_is_stuck_all_the_time_is_at_no_end_of_its_range() -> None:
+    """Driven one way, its reference is beyond its only reading nearly always."""
+    _, x = measured(0.3 + drive(), Side.SENSOR, np.random.default_rng(8))
+    found = assess_pair(pair(Side.SENSOR, np.full(N, 0.1), np.maximum(x, 0.02)), LIMITS).findings
+    assert found
+    assert {f.mode for f in found} == {FaultMode.STUCK}

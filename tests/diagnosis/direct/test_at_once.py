@@ -29,11 +29,11 @@ def sensor(*, late_s: float = 0.0, offset: float = 0.0) -> IdentifiedPair:
     return cast(IdentifiedPair, SimpleNamespace(samples=samples, pair=SimpleNamespace(dt=DT)))
 
 
-def assessment(start: int, stop: int) -> Assessment:
+def assessment(start: int, stop: int, mode: FaultMode = FaultMode.NOISY) -> Assessment:
     """One fault of a sensor."""
     states = np.full(SIZE, CODE[State.HEALTHY])
-    states[start:stop] = CODE[State.NOISY]
-    finding = Finding(start, stop, Side.SENSOR, FaultMode.NOISY, 0.99, (), None, None, (), Tier.DIRECT)
+    states[start:stop] = CODE[State(mode.value)]
+    finding = Finding(start, stop, Side.SENSOR, mode, 0.99, (), None, None, (), Tier.DIRECT)
     return Assessment(states, findings=(finding,), tier=Tier.DIRECT)
 
 
@@ -88,4 +88,16 @@ def test_lasting_faults_of_two_other_sensors_are_no_habit_where_they_show_at_ste
 def test_what_three_sensors_do_when_the_speed_changes_alone_is_a_habit_however_long() -> None:
     pairs = {w: sensor(late_s=0.1 if w != "FL" else 0.0) for w in WHEELS}
     told = without_shared_moments(pairs, {w: assessment(600, 1400) for w in ("FR", "RL", "RR")})
+    assert not any(a.findings for a in told.values())
+
+
+def test_what_all_sensors_read_while_the_machine_creeps_is_a_habit_however_total_and_long() -> None:
+    """They read 0 below their least speed, for longer than any passage."""
+    creeps = slice(2000, 2800)
+    pairs = {w: sensor() for w in WHEELS}
+    for pair in pairs.values():
+        pair.samples.x = SPEED.copy()
+        pair.samples.x[creeps] = 0.06
+        pair.samples.y[creeps] = 0.0
+    told = without_shared_moments(pairs, {w: assessment(2000, 2800, FaultMode.NO_SIGNAL) for w in WHEELS})
     assert not any(a.findings for a in told.values())
