@@ -222,7 +222,8 @@ def _explanation(y: Array, x: Array, at: NDArray[np.intp], measured: Measured) -
     stuck = max(power(y - np.mean(y), measured) / max(power(y - x, measured), 1e-30), rests - best.moves)
     if best.left <= _NOTHING and not best.changes and others <= _NOTHING:
         losses = [c for c in found if c.mode is FaultMode.INEFFICIENT and not c.changes and c.left <= _NOTHING]
-        return replace(losses[0], alone=False) if losses else None
+        noisy = _restless(y - _steadily(y, x), measured)
+        return replace(losses[0], alone=False) if losses and not noisy else None
     steady_offset = not best.changes and best.epsilon is None
     if best.left > _LEFT or not _far(min(others, stuck), best, _NEAR if steady_offset else _RIVAL_LEFT):
         return _fading(y, x, found, stuck, measured)
@@ -231,7 +232,7 @@ def _explanation(y: Array, x: Array, at: NDArray[np.intp], measured: Measured) -
     rest = _biased(y, x, measured)
     if best.changes:
         return best if _far(rest, best, _RIVAL_LEFT) else _fading(y, x, found, stuck, measured)
-    if best.mode is FaultMode.INEFFICIENT and _restless(y, x, measured):
+    if best.mode is FaultMode.INEFFICIENT and _restless(y - float(x @ y) / float(x @ x) * x, measured):
         return None
     return best if best.left < max(_NOTHING, _RIVAL * rest) else None
 
@@ -256,9 +257,14 @@ def _fading(y: Array, x: Array, found: Sequence[Cause], stuck: float, measured: 
     return replace(fades, alone=False, clear=far)
 
 
-def _restless(y: Array, x: Array, measured: Measured) -> bool:
-    """Whether a reading is most of the time off its share of the reference by more than noise."""
-    rest = y - float(x @ y) / float(x @ x) * x
+def _steadily(y: Array, x: Array) -> Array:
+    """What a gain and an offset together make of a reference [unit], shape (k,)."""
+    line = np.column_stack([x, np.ones(x.size)])
+    return np.asarray(line @ np.linalg.lstsq(line, y, rcond=None)[0])
+
+
+def _restless(rest: Array, measured: Measured) -> bool:
+    """Whether a reading is most of the time off what explains it by more than noise; `rest` [unit], shape (k,), is what that leaves."""
     usual = 1.4826 * float(np.median(np.abs(rest)))
     even = float(np.std(rest)) < _EVEN * usual
     return usual > (_STEADILY if even else _RESTLESS) * measured.noise
