@@ -37,6 +37,7 @@ _BRIEF_S = 0.5  # a shorter deviation may be of timing, or of a wheel that stops
 _OF_LAG = 0.4  # of what a lag does: as far off is its model
 _FEW_READINGS, _SETTLED_LAGS = 3, 3.0  # in which a valve answers; and of its lags
 _READING, _LATE = 1, 0.3  # readings to either side; of a deviation, that lies beyond them all
+_OF_SHARE = 0.1  # of a deviation, that a share of the reference leaves of it
 _FLIPS = 25  # samples in a row on one side of a command that switches to and fro between samples
 
 
@@ -71,7 +72,8 @@ def timing_explains(found: IdentifiedPair, run: Run, mode: FaultMode) -> bool:
         return True
     jumps = _sudden(found, pair.x, run)
     jumpy = deviation < 2 * jumps and jumps > _JUMPY * float(np.sqrt(np.nanmean(ref**2)))
-    if not mode.total and jumpy and (found.coarse or _read_late(found, run, deviation, _settled(found))):
+    late = jumpy and not mode.total
+    if late and (found.coarse or (_read_late(found, run, deviation, _settled(found)) and not _is_share(y, ref, deviation))):
         return True
     if not found.coarse:
         return False
@@ -133,6 +135,16 @@ def _read_late(found: IdentifiedPair, run: Run, deviation: float, reach: int) ->
     low, high = smallest_within(x, reach, reach), largest_within(x, reach, reach)
     beyond = np.maximum(y - high, low - y).clip(0.0)
     return bool(np.isfinite(beyond).any() and float(np.sqrt(np.nanmean(beyond**2))) <= _LATE * deviation)
+
+
+def _is_share(y: Array, x: Array, deviation: float) -> bool:
+    """Whether a share of what is expected leaves hardly anything of a deviation, root mean square [unit]: at other moments none does."""
+    known = np.isfinite(y) & np.isfinite(x)
+    y, x = y[known], x[known]
+    power = float(x @ x)
+    if power <= 0.0:
+        return False
+    return float(np.sqrt(np.mean((y - float(x @ y) / power * x) ** 2))) <= _OF_SHARE * deviation
 
 
 def _sudden(found: IdentifiedPair, x: Array, run: Run) -> float:

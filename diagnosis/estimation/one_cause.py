@@ -245,7 +245,7 @@ def _biased(y: Array, x: Array, measured: Measured) -> float:
 
 
 def _fading(y: Array, x: Array, found: Sequence[Cause], stuck: float, measured: Measured) -> Cause | None:
-    """A gain that fades and leaves nothing, whatever else may leave as little; None where that is not so."""
+    """A gain that fades and leaves nothing, whatever else may leave as little; None where that is not so, or noise is left beside its rivals."""
     fades = next((c for c in found if c.changes and c.epsilon is not None), None)
     steadily = next((c.left for c in found if c.epsilon is not None and not c.changes), None)
     if fades is None or steadily is None:  # a gain that is the same at both ends changes nothing
@@ -254,6 +254,8 @@ def _fading(y: Array, x: Array, found: Sequence[Cause], stuck: float, measured: 
         return None
     steady = (c.left for c in found if c.mode is not fades.mode and (c.late or not c.changes))
     far = min(*steady, stuck) > _RIVAL_LEFT and _far(_biased(y, x, measured), fades, _RIVAL_LEFT)
+    if not far and _restless(fades.rest, measured):
+        return None
     return replace(fades, alone=False, clear=far)
 
 
