@@ -39,6 +39,7 @@ import geared_circuit
 import hydrostatic
 import numpy as np
 import sprayer
+import telehandler
 from accuracy import EVIDENCE
 from campaign import Outcome, Task, judged
 from foreign_machine import NAME as FOREIGN
@@ -70,6 +71,7 @@ OTHERS = {
         forwarder,
         dumper,
         sprayer,
+        telehandler,
     )
 }
 _DRIVEN, _STEERED = 0.06, 0.02  # m/s, rad/s
@@ -257,7 +259,7 @@ def main() -> None:
         "--machine",
         nargs="+",
         default=None,
-        help="default, structures, foreign, hydrostatic, electrohydraulic, electric, flow_sharing, closed_circuit, geared_circuit, forwarder, dumper, sprayer",
+        help="default, structures, foreign, hydrostatic, electrohydraulic, electric, flow_sharing, closed_circuit, geared_circuit, forwarder, dumper, sprayer, telehandler",
     )
     parser.add_argument("--duration", type=float, default=75.0, help="length of a mission [s]")
     parser.add_argument("--every", type=int, default=1, help="one of so many kinds of trouble")
