@@ -38,6 +38,7 @@ import forwarder
 import geared_circuit
 import hydrostatic
 import numpy as np
+import paver
 import sprayer
 import telehandler
 from accuracy import EVIDENCE
@@ -72,6 +73,7 @@ OTHERS = {
         dumper,
         sprayer,
         telehandler,
+        paver,
     )
 }
 _DRIVEN, _STEERED = 0.06, 0.02  # m/s, rad/s
@@ -259,7 +261,7 @@ def main() -> None:
         "--machine",
         nargs="+",
         default=None,
-        help="default, structures, foreign, hydrostatic, electrohydraulic, electric, flow_sharing, closed_circuit, geared_circuit, forwarder, dumper, sprayer, telehandler",
+        help="default, structures, foreign, hydrostatic, electrohydraulic, electric, flow_sharing, closed_circuit, geared_circuit, forwarder, dumper, sprayer, telehandler, paver",
     )
     parser.add_argument("--duration", type=float, default=75.0, help="length of a mission [s]")
     parser.add_argument("--every", type=int, default=1, help="one of so many kinds of trouble")
