@@ -74,6 +74,18 @@ def test_a_speed_sensor_that_fails_reads_what_its_fault_says_and_the_wheel_turns
     assert np.abs(true[_SPAN, 1]).max() > 0.1
 
 
+def test_a_radar_that_looks_at_the_ground_sees_a_locked_wheel_dragged(machine: ModuleType) -> None:
+    dead = (fault("FR", Side.ACTUATOR, FaultMode.NO_SIGNAL),)
+    tread, ground = (
+        machine.signals(4, dead, LENGTH, "direct", ground=g).items["wheel.FR.v_true"] for g in (False, True)
+    )
+    late = [
+        one.values[slice(*np.searchsorted(one.stamps, machine._START_NS + np.array([15, 34]) * 10**9))]
+        for one in (tread, ground)
+    ]
+    assert np.abs(late[0]).mean() < 0.02 < np.abs(late[1]).mean()
+
+
 def test_a_recorder_has_what_its_level_of_evidence_says(machine: ModuleType) -> None:
     base, spool, direct = (machine.signals(1, (), LENGTH, tier).items for tier in ("base", "spool", "direct"))
     assert not any(name.endswith(("u_applied", "_true")) for name in base)

@@ -3,8 +3,8 @@
 Its law has no feedback, or little, and trims by wheel; from 20 to 70 °C a valve's gain changes by some 15 %, of which the law knows a
 part; counterbalance valves lock wheels that nothing feeds and brake those that are pushed; commands are slewed over their overlap; a
 screed drags and turns it, trucks fill its hopper, grades last; steering valves are proportional, or on and off. Speeds are in tenths of
-m/min, renewed every 1 to 100 ms, and recorded at 200 Hz beside topics of 20 Hz; second speeds are those of the ground under a wheel by
-radar, of a scale of their own, some 10 ms early or late, with dropouts, and those of angles have gains. Each seed is another individual
+m/min, renewed every 1 to 100 ms, and recorded at 200 Hz beside topics of 20 Hz; second speeds come from radars that look at
+treads, of a scale of their own, some 10 ms early or late, with dropouts, and those of angles have gains. Each seed is another individual
 on another drive. For measuring only.
 """
 
@@ -51,7 +51,7 @@ def build(seed: int) -> tuple[Build, Array]:
     made = Build(
         top=top, mass=empty, height=u(0.8, 1.1), cg=u(-0.08, 0.06), radius=radius, lateral=float(rng.choice([0.0, 0.1])), base=u(2.2, 3.4),
         track=u(1.7, 2.3), inertia=u(0.01, 0.03) * empty * radius**2, motor=motor, flow=flow, pressure=pressure, sag=u(0.03, 0.15),
-        margin=u(8.0, 16.0) * 1e5, lock=u(0.4, 0.7) * pressure, pilot=u(15.0, 40.0) * 1e5, opens=u(0.03, 0.08), shuts=u(0.06, 0.2),
+        margin=u(8.0, 16.0) * 1e5, lock=u(0.9, 1.3) * pressure, pilot=u(15.0, 40.0) * 1e5, opens=u(0.03, 0.08), shuts=u(0.06, 0.2),
         leakage=u(0.004, 0.012) * flow / pressure, thin=u(0.015, 0.03), friction=u(0.01, 0.03) * motor * pressure, stiction=u(0.3, 0.9),
         cold=cold, hot=u(60.0, 72.0), warming=u(20.0, 50.0), drift=float(rng.choice([-1.0, 1.0])) * u(0.1, 0.18), knows=u(0.0, 0.6),
         spool=u(35.0, 80.0), damping=u(0.6, 0.95), dead=dead, known=u(0.85, 1.02), forward=u(0.95, 1.05),
@@ -156,10 +156,10 @@ def _rows(rng: np.random.Generator, n: int, rate: float) -> tuple[np.ndarray, np
     return at, _START_NS + np.maximum.accumulate(np.round(come * 1e6).astype(np.int64)) + 1000 * np.arange(at.size)
 
 
-def radar(rng: np.random.Generator, ground: Array, top: float) -> tuple[np.ndarray, np.ndarray, Array]:
-    """Rows, stamps [ns] and speeds [m/s] of the ground under a wheel, as a radar has it that corrects for a latency it does not quite know."""
-    at, stamps = _rows(rng, ground.size, 20.0)
-    seen = ground[np.maximum(at - 60, 0)] * rng.uniform(0.98, 1.02)
+def radar(rng: np.random.Generator, speed: Array, top: float) -> tuple[np.ndarray, np.ndarray, Array]:
+    """Rows, stamps [ns] and speeds [m/s] of a tread, or of the ground, as a radar has it that corrects for a latency it does not quite know."""
+    at, stamps = _rows(rng, speed.size, 20.0)
+    seen = speed[np.maximum(at - 60, 0)] * rng.uniform(0.98, 1.02)
     seen = seen + rng.standard_normal(at.size) * (0.004 * top + 0.015 * np.abs(seen))
     seen = np.where(np.abs(seen) < 0.02, 0.0, np.round(seen, 3))
     keep = np.ones(at.size, dtype=bool)
@@ -169,8 +169,11 @@ def radar(rng: np.random.Generator, ground: Array, top: float) -> tuple[np.ndarr
     return at[keep], stamps[keep], seen[keep]
 
 
-def signals(seed: int, faults: Sequence[FaultSpec], duration: float, tier: str) -> Signals:
-    """A mission as a recorder has it; with ``spool`` spools as well, with ``direct`` second speeds and angles too."""
+def signals(seed: int, faults: Sequence[FaultSpec], duration: float, tier: str, ground: bool = False) -> Signals:
+    """A mission as a recorder has it; with ``spool`` spools as well, with ``direct`` second speeds and angles too.
+
+    `ground`: with radars that look at the ground beside the wheels, which is no second speed of a wheel that slips or is dragged.
+    """
     made, has = build(seed)[0], commands_of(seed)
     rng, noise = np.random.default_rng(205_000 + seed), np.random.default_rng(206_000 + seed)
     ref, true, read, given, done, body, source, under = driven(seed, tuple(faults), duration)
@@ -211,7 +214,7 @@ def signals(seed: int, faults: Sequence[FaultSpec], duration: float, tier: str) 
     series = {name: (group, *rows[group], values[rows[group][0]]) for name, (group, values) in columns.items()}
     if tier == "direct":
         for i, w in enumerate(WHEELS):
-            series[f"wheel.{w}.v_true"] = f"radar_{w}", *radar(noise, under[:, i], made.top)
+            series[f"wheel.{w}.v_true"] = f"radar_{w}", *radar(noise, (under if ground else true)[:, i], made.top)
     items = {}
     for name, (group, _, stamps, values) in series.items():
         origin = SignalSource(topic=f"/{group}", field=name)
