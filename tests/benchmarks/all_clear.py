@@ -38,7 +38,9 @@ import forwarder
 import geared_circuit
 import hydrostatic
 import numpy as np
+import paver
 import sprayer
+import telehandler
 from accuracy import EVIDENCE
 from campaign import Outcome, Task, judged
 from foreign_machine import NAME as FOREIGN
@@ -70,6 +72,8 @@ OTHERS = {
         forwarder,
         dumper,
         sprayer,
+        telehandler,
+        paver,
     )
 }
 _DRIVEN, _STEERED = 0.06, 0.02  # m/s, rad/s
@@ -257,7 +261,7 @@ def main() -> None:
         "--machine",
         nargs="+",
         default=None,
-        help="default, structures, foreign, hydrostatic, electrohydraulic, electric, flow_sharing, closed_circuit, geared_circuit, forwarder, dumper, sprayer",
+        help="default, structures, foreign, hydrostatic, electrohydraulic, electric, flow_sharing, closed_circuit, geared_circuit, forwarder, dumper, sprayer, telehandler, paver",
     )
     parser.add_argument("--duration", type=float, default=75.0, help="length of a mission [s]")
     parser.add_argument("--every", type=int, default=1, help="one of so many kinds of trouble")
