@@ -14,6 +14,7 @@ from diagnosis.direct.at_once import without_shared_moments
 from diagnosis.direct.identification import IdentifiedPair, identify, usual_spread
 from diagnosis.direct.inputs import Pair, make_pair
 from diagnosis.direct.low_speed import without_low_speed_habit
+from diagnosis.direct.second_is_off import without_second_speeds_own
 from diagnosis.direct.small_deviations import without_small_deviations
 from diagnosis.direct.uncertainty import most_noise_of_kind, usual_of_kind
 from diagnosis.estimation.lag import low_passed
@@ -60,6 +61,7 @@ class DirectEvidence:
         sensors = {wheel: found for (wheel, side), found in identified.items() if side == SENSOR}
         told = without_low_speed_habit(sensors, {wheel: parts[wheel, SENSOR] for wheel in sensors})
         told = without_shared_moments(sensors, told)
+        told = without_second_speeds_own(sensors, told, _openings(mission))
         valves = {wheel: found for (wheel, side), found in identified.items() if side == ACTUATOR}
         small = without_small_deviations(valves, {wheel: parts[wheel, ACTUATOR] for wheel in valves})
         parts |= {(wheel, SENSOR): a for wheel, a in told.items()} | {
@@ -93,6 +95,15 @@ def _identified(pairs: dict[Part, Pair], limits: Limits, mission: MissionView) -
         spread = usual_spread([found[part].own_spread for part in kind])
         found |= {part: replace(found[part], kind_spread=spread) for part in kind}
     return found
+
+
+def _openings(mission: MissionView) -> dict[str, Array]:
+    """What is measured of the drives' openings, or commanded, by wheel."""
+    best = {
+        w: next((n for leaf in ("u_applied", "u") if mission.logged(n := f"wheel.{w}.{leaf}")), None)
+        for w in mission.wheels
+    }
+    return {w: mission.values(name) for w, name in best.items() if name is not None}
 
 
 def _habits(mission: MissionView) -> dict[str, Habit]:

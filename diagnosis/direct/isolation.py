@@ -96,6 +96,8 @@ class Isolated:
         Probability of each row.
     gain : float
         Log-evidence of the row against healthy.
+    restless : bool
+        Whether it is a sensor's whose readings keep changing.
     """
 
     run: Run
@@ -103,6 +105,7 @@ class Isolated:
     estimate: Estimate
     p: Array
     gain: float
+    restless: bool = False
 
 
 def run_samples(run: Run, found: IdentifiedPair, min_sat: float = 0.0) -> RunSamples:
@@ -226,7 +229,7 @@ def isolate(run: Run, found: IdentifiedPair, min_sat: float) -> Isolated | None:
         if other is None:
             return None
         estimate = other
-    return Isolated(run, seen, estimate, p, gain)
+    return Isolated(run, seen, estimate, p, gain, restless)
 
 
 def _wild(seen: RunSamples, dt: float) -> bool:

@@ -13,6 +13,7 @@ from diagnosis.results.fault_rows import ROWS
 from replay.faults import FaultMode, Side
 from replay.machine.config import Limits
 
+Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 _CLEAR = 3.0  # times the noise
@@ -20,6 +21,10 @@ _LEFT_S = (
     0.03  # for which a command must leave the opening of a valve that is said to be stuck there, beside the valve's lag
 )
 _AS_TRUE = 0.03  # of what a sensor measures: as far off may a healthy one be
+_ALIVE, _SLOW_S = (
+    0.05,
+    1.0,
+)  # of what a sensor measures: a living one that is off by less in the mean of a second is not stuck
 _LOST = 0.03  # of the span: as far from its command a healthy valve rests within its dead band
 _TRAVEL, _STANDS = (
     0.08,
@@ -57,10 +62,21 @@ def mode_of(isolated: Isolated, found: IdentifiedPair, limits: Limits) -> FaultM
     if np.isfinite(seen.y).any() and lasts < min(_LEFT_S, 0.5 * isolated.run.size * found.pair.dt):
         return None
     known = seen.x[seen.use]
-    if seen.deviation < _AS_TRUE * (float(np.sqrt(np.mean(known**2))) if known.size else 0.0):
+    size = float(np.sqrt(np.mean(known**2))) if known.size else 0.0
+    if seen.deviation < _AS_TRUE * size:
         return None
+    if isolated.restless and slowly_off(seen.y[seen.use], known, found.pair.dt) < _ALIVE * size:
+        return None  # it lives, at a speed that stays: the noise is its reference's
     at_rest = known.size and max(seen.deviation, float(np.max(np.abs(known)))) < limits.min_sat / 2
     return None if at_rest else mode  # it repeats what it had, which is true
+
+
+def slowly_off(y: Array, x: Array, dt: float) -> float:
+    """Root mean square of what a channel is off its reference, both of shape (n,) and finite, in the mean of a second [unit]."""
+    count = max(1, round(_SLOW_S / dt))
+    starts = np.arange(0, max(1, y.size - count // 2), count)
+    means = np.add.reduceat(y - x, starts) / np.diff(np.r_[starts, y.size])
+    return float(np.sqrt(np.mean(means**2)))
 
 
 def _least_off(noise: float, found: IdentifiedPair, limits: Limits) -> float:

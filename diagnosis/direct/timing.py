@@ -37,7 +37,10 @@ _BRIEF_S = 0.5  # a shorter deviation may be of timing, or of a wheel that stops
 _OF_LAG = 0.4  # of what a lag does: as far off is its model
 _FEW_READINGS, _SETTLED_LAGS = 3, 3.0  # in which a valve answers; and of its lags
 _READING, _LATE = 1, 0.3  # readings to either side; of a deviation, that lies beyond them all
-_OF_SHARE = 0.1  # of a deviation, that a share of the reference leaves of it
+_OF_SHARE, _HOLDS_OFTEN = (
+    0.1,
+    0.2,
+)  # of a deviation, that a share leaves of it; of the readings, that follow one of their sign
 _FLIPS = 25  # samples in a row on one side of a command that switches to and fro between samples
 
 
@@ -73,7 +76,9 @@ def timing_explains(found: IdentifiedPair, run: Run, mode: FaultMode) -> bool:
     jumps = _sudden(found, pair.x, run)
     jumpy = deviation < 2 * jumps and jumps > _JUMPY * float(np.sqrt(np.nanmean(ref**2)))
     late = jumpy and not mode.total
-    if late and (found.coarse or (_read_late(found, run, deviation, _settled(found)) and not _is_share(y, ref, deviation))):
+    if late and (
+        found.coarse or (_read_late(found, run, deviation, _settled(found)) and not _is_share(y, ref, deviation))
+    ):
         return True
     if not found.coarse:
         return False
@@ -138,13 +143,18 @@ def _read_late(found: IdentifiedPair, run: Run, deviation: float, reach: int) ->
 
 
 def _is_share(y: Array, x: Array, deviation: float) -> bool:
-    """Whether a share of what is expected leaves hardly anything of a deviation, root mean square [unit]: at other moments none does."""
+    """Whether a share of what is expected leaves hardly anything of a deviation, root mean square [unit]: at other moments none does.
+
+    Beside a command that flips at every sample, a lag leaves a share as well.
+    """
     known = np.isfinite(y) & np.isfinite(x)
     y, x = y[known], x[known]
     power = float(x @ x)
     if power <= 0.0:
         return False
-    return float(np.sqrt(np.mean((y - float(x @ y) / power * x) ** 2))) <= _OF_SHARE * deviation
+    holds = np.mean(np.abs(np.diff(x)) < np.abs(x[1:]))
+    left = float(np.sqrt(np.mean((y - float(x @ y) / power * x) ** 2)))
+    return bool(holds > _HOLDS_OFTEN) and left <= _OF_SHARE * deviation
 
 
 def _sudden(found: IdentifiedPair, x: Array, run: Run) -> float:

@@ -85,6 +85,15 @@ def test_lagging_answer_to_a_command_of_jumps_alone_is_no_fault(mode: FaultMode,
     assert explained(pair(Side.ACTUATOR, y, x), mode, stop=A + 600) is expected
 
 
+@pytest.mark.parametrize(("share", "expected"), [(0.7, False), (1.0, True)])
+def test_a_share_of_a_command_that_flips_between_its_ends_is_no_timing(share: float, expected: bool) -> None:
+    """Whatever a reading sooner or later has lies between both ends; a share leaves nothing, which no other moment does."""
+    x = np.where(np.random.default_rng(8).random(N) < 0.5, 0.9, -0.9)
+    late = 0.5 * (x + np.r_[0.0, x[:-1]]) if expected else x
+    y = share * late + 0.003 * np.random.default_rng(9).normal(size=N)
+    assert explained(pair(Side.ACTUATOR, y, x), FaultMode.INEFFICIENT, stop=A + 3000) is expected
+
+
 def test_disturbance_beside_a_command_of_jumps_alone_is_a_fault() -> None:
     x = 0.012 * np.random.default_rng(7).normal(size=N)
     assert not explained(pair(Side.ACTUATOR, x + 0.05, x), FaultMode.NOISY, stop=A + 600)
@@ -154,5 +163,5 @@ def test_an_opening_read_a_reading_late_is_of_timing() -> None:
 
 
 def test_a_valve_that_never_rests_between_flips_is_not_told_by_its_lag() -> None:
-    x = np.where(np.random.default_rng(4).random(N) < 0.5, 0.8, -0.8)
+    x = np.where(np.arange(N) % 2, 0.8, -0.8)
     assert explained(pair(Side.ACTUATOR, 0.6 * x, x), FaultMode.INEFFICIENT, 2000, 12_000)

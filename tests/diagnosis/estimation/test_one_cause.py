@@ -213,6 +213,15 @@ def test_a_gain_that_does_not_change_does_not_fade() -> None:
     assert _fading(seen.y, seen.x, [steady, steady], 1.0, seen) is None
 
 
+@pytest.mark.parametrize("disturbed", [False, True])
+def test_a_share_of_what_stays_is_one_cause_unless_noise_is_left(disturbed: bool) -> None:
+    x = 0.9 + 0.01 * np.sin(0.9 * T)
+    y = 0.65 * x + (5.0 if disturbed else 1.0) * NOISE * RNG.standard_normal(SIZE)
+    seen = Measured(y, x, np.ones(SIZE, np.bool_), DT, ("a", "b"), "m/s", NOISE, 0.02)
+    (found,) = with_one_cause(pieces([(1000, 2400, FaultMode.NOISY)]), seen)
+    assert found.mode is (FaultMode.NOISY if disturbed else FaultMode.INEFFICIENT)
+
+
 def test_an_offset_behind_a_rest_is_no_loss() -> None:
     x = np.where(T < 14.0, 0.0, 0.8 + 0.05 * np.sin(0.9 * T))
     y = x - 0.12 * (T >= 14.0) + NOISE * RNG.standard_normal(SIZE)
