@@ -27,6 +27,7 @@ from diagnosis.results.assessment import CODE
 from diagnosis.results.clearing import Checked, clearing_rows
 from diagnosis.results.detectability import Detectability, detectability_table
 from diagnosis.results.document import SCHEMA, CoverageRow, FileRow, LogRow, MachineRow, ReportDocument, WheelPlace
+from diagnosis.results.left_out import is_left_out
 from diagnosis.results.loss import loss_rows
 from diagnosis.results.machine_words import machine_words
 from diagnosis.results.result import FaultInterval, to_json
@@ -266,7 +267,7 @@ def _log(mission: Mission, moving: NDArray[np.bool_], machine: Machine) -> LogRo
 
 
 def _file(file: MissionFile) -> FileRow:
-    return {
+    row: FileRow = {
         "path": file.path.name,
         "sha256": file.sha256,
         "bytes": file.bytes,
@@ -275,6 +276,9 @@ def _file(file: MissionFile) -> FileRow:
         "notes": list(file.summary.notes),
         "clock": quality.clock_row(file.clock),
     }
+    if left_out := [str(text) for text in file.summary.damage if is_left_out(text)]:
+        row["left_out"] = left_out
+    return row
 
 
 def _distance(timeline: Timeline, machine: Machine) -> float | None:

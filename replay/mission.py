@@ -14,6 +14,7 @@ from replay.clocks.align import align_clocks
 from replay.clocks.source_clock import SourceClock
 from replay.errors import ConfigError, LogError
 from replay.log.joined_tables import joined_tables
+from replay.log.left_out import FileLeftOut
 from replay.log.open_loop import is_open_loop, is_open_loop_table
 from replay.log.raw_log import LogSummary, RawLog
 from replay.log.source_options import SourceOptions
@@ -241,7 +242,8 @@ def _on_one_clock(files: tuple[MissionFile, ...], signals: Signals) -> tuple[tup
 
 def _left_out(file: MissionFile) -> MissionFile:
     assert file.clock is not None
-    text = f"{file.path.name} was left out: {file.clock.sentence.removeprefix(f'{file.path.name}: ')}"
+    why = file.clock.sentence.removeprefix(f"{file.path.name}: ")
+    text = FileLeftOut(f"{file.path.name} was left out: {why}", clock=True)
     return replace(file, summary=replace(file.summary, damage=(*file.summary.damage, text)), left_out=True)
 
 

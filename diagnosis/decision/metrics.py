@@ -148,7 +148,7 @@ def open_states(
         counts = np.bincount(assessment.states[drives], minlength=len(STATES))
         counts[[s in DECIDED or s not in assessment.reasons for s in STATES]] = 0
         for f in _undecided(assessment):
-            counts[STATES.index(State(f.mode.value))] += np.count_nonzero(drives[f.start : f.stop])
+            counts[STATES.index(State(f.mode.value))] += np.count_nonzero(np.asarray(drives)[f.start : f.stop])
         if counts.any():
             out[component, side] = STATES[int(np.argmax(counts))]
     return out
