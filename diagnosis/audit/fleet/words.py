@@ -52,8 +52,8 @@ def missions_words(all_missions: int, counted: int) -> str:
 
 
 def open_words(is_open: bool, clean: int, needed: int) -> str:
-    """How far an open fault is refuted: ``, not found by 3 of the 10 missions that close it``; empty where it is not, or just found."""
-    return f", not found by {clean} of the {needed} missions that close it" if is_open and clean else ""
+    """How far an open fault is refuted: ``, clean in 3 of the 10 missions that it takes to close it``; empty where it is not, or just found."""
+    return f", clean in {clean} of the {needed} missions that it takes to close it" if is_open and clean else ""
 
 
 def repair_command(label: str, component: str, side: str) -> str:
