@@ -21,7 +21,7 @@ Part = tuple[str, str]
 
 _SAID_S = 0.05  # of judged driving: less is nothing
 #: Why a part was not judged where a finding leaves it as probable that it is healthy.
-AS_WELL_HEALTHY = "what was found there may as well be no fault of it"
+AS_WELL_HEALTHY = "what was found there may as well be no fault"
 _WITH_COMMAND = "record again, with wheel.{c}.u (the {valve} command) in the log all the time"
 
 
