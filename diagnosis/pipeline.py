@@ -25,7 +25,8 @@ from diagnosis.clearing.standing_out import what_stands_out, with_findings, with
 from diagnosis.decision import metrics, quality
 from diagnosis.decision.episodes import with_episodes
 from diagnosis.decision.second_onsets import with_second_onsets
-from diagnosis.report_document import Judged, machine_row, report_of_mission
+from diagnosis.recording_rows import machine_row
+from diagnosis.report_document import Judged, report_of_mission
 from diagnosis.results.assessment import Assessment
 from diagnosis.results.closeups import closeups_of
 from diagnosis.results.document import MachineRow, ReportDocument

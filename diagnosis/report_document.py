@@ -7,7 +7,6 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from diagnosis.assess import ComponentResult
 from diagnosis.clearing.cells import Cells
@@ -15,30 +14,26 @@ from diagnosis.clearing.checks import cells_of, checks_of
 from diagnosis.clearing.detectable import detectable
 from diagnosis.clearing.mapping import Hint, mapping_hints
 from diagnosis.decision import metrics, quality
-from diagnosis.decision.assumed import assumed_words
 from diagnosis.decision.caveats import more_caveats
 from diagnosis.decision.decide import Decision, decide
 from diagnosis.decision.intervals import intervals_of, spans_of
 from diagnosis.decision.missing import is_commanded
 from diagnosis.decision.scale import Scale, scale_of
 from diagnosis.decision.wording import join_words
+from diagnosis.recording_rows import log_row
 from diagnosis.results.assessed import Cut, CutKind
 from diagnosis.results.assessment import CODE
 from diagnosis.results.clearing import Checked, clearing_rows
 from diagnosis.results.detectability import Detectability, detectability_table
-from diagnosis.results.document import SCHEMA, CoverageRow, FileRow, LogRow, MachineRow, ReportDocument, WheelPlace
+from diagnosis.results.document import SCHEMA, CoverageRow, MachineRow, ReportDocument
 from diagnosis.results.loss import loss_rows
-from diagnosis.results.machine_words import machine_words
 from diagnosis.results.result import FaultInterval, to_json
 from diagnosis.results.vocabulary import Tier
-from replay.arrays.envelope import bucket_of
 from replay.control.loop import Replay
 from replay.faults import State
 from replay.machine.config import Machine
-from replay.mission import Mission, MissionFile
-from replay.readers.machine_identity import stated_machine
+from replay.mission import Mission
 from replay.setup.places import place_doubts
-from replay.signals.timeline import Timeline
 from replay.version import __version__
 
 _CUT_S = 0.5  # of a log, not judged
@@ -138,7 +133,7 @@ def report_of_mission(judged: Judged, identity: MachineRow) -> ReportDocument:
     report: ReportDocument = {
         "schema": SCHEMA,
         "tool": {"name": "mfhca-replay", "version": __version__},
-        "log": _log(mission, moving, machine),
+        "log": log_row(mission, moving, machine),
         "machine": identity,
         "readings": to_json(replay.readings),
         "verdict": _decision(judged, coverage, decided_s, metrics.open_states(found.assessments, moving, machine)).row(
@@ -247,75 +242,3 @@ def _without_data(found: ComponentResult, component: str) -> int:
     none = {part: a.states == CODE[State.NO_DATA] for part, a in found.assessments.items() if a.tier is not Tier.NONE}
     gap = np.logical_and.reduce([x for (who, _), x in none.items() if who != component] or [np.zeros(1, np.bool_)])
     return max((int(np.count_nonzero(x & ~gap)) for (who, _), x in none.items() if who == component), default=0)
-
-
-def _log(mission: Mission, moving: NDArray[np.bool_], machine: Machine) -> LogRow:
-    timeline = mission.timeline
-    row: LogRow = {
-        "files": [_file(f) for f in mission.files],
-        "start_ns": timeline.start_ns,
-        "open_loop": mission.open_loop,
-        "duration_s": timeline.size * timeline.dt,
-        "rate_hz": 1e9 / timeline.step_ns,
-        "distance_m": _distance(timeline, machine),
-        "driving_s": float(np.count_nonzero(moving.any(axis=1))) * timeline.dt,
-    }
-    if (bucket := bucket_of(timeline.size)) > 1:
-        row["samples_per_bucket"] = bucket
-    return row
-
-
-def _file(file: MissionFile) -> FileRow:
-    return {
-        "path": file.path.name,
-        "sha256": file.sha256,
-        "bytes": file.bytes,
-        "format": file.format,
-        "damage": list(file.summary.damage),
-        "notes": list(file.summary.notes),
-        "clock": quality.clock_row(file.clock),
-    }
-
-
-def _distance(timeline: Timeline, machine: Machine) -> float | None:
-    """Distance by the mean of the wheels' speeds [m]; None where no wheel speed is logged."""
-    speeds = [timeline.signals[n] for w in machine.wheels if (n := f"wheel.{w}.v") in timeline.signals]
-    if not speeds:
-        return None
-    distance = 0.0
-    for part in timeline.blocks():
-        near = [v[part] for v in speeds]
-        mean = np.nansum(np.abs(near), axis=0) / np.maximum(np.isfinite(near).sum(axis=0), 1)
-        distance += float(mean.sum()) * timeline.dt
-    return distance
-
-
-def machine_row(machine: Machine, mission: Mission, source: str, machine_id: str | None) -> MachineRow:
-    """The machine, with the identity that was given, else the one that the logs state, else the machine file's.
-
-    Parameters
-    ----------
-    machine : Machine
-        The machine.
-    mission : Mission
-        Its mission.
-    source : str
-        Where the machine's settings come from.
-    machine_id : str or None
-        Identity that was given.
-    """
-    geometry: dict[str, WheelPlace] | None = None
-    if machine.geometry is not None:
-        geometry = {
-            w: {"x": g.x, "y": g.y, "offset": g.offset, "axle": g.axle} for w, g in machine.geometry.wheels.items()
-        }
-    return {
-        "name": machine.name,
-        "id": machine_id or stated_machine(f.summary.metadata for f in mission.files) or machine.id,
-        "wheels": list(machine.wheels),
-        "axles": list(machine.axles),
-        "geometry": geometry,
-        "source": source,
-        "assumed": assumed_words(machine),
-        "words": machine_words(machine, mission.signals.items).row(),
-    }

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import hashlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fnmatch import fnmatch
 from itertools import compress
@@ -13,7 +12,9 @@ from replay.arrays.column_store import ColumnStore
 from replay.clocks.align import align_clocks
 from replay.clocks.source_clock import SourceClock
 from replay.errors import ConfigError, LogError
+from replay.log.content_hash import content_hash
 from replay.log.joined_tables import joined_tables
+from replay.log.left_out import FileLeftOut
 from replay.log.open_loop import is_open_loop, is_open_loop_table
 from replay.log.raw_log import LogSummary, RawLog
 from replay.log.source_options import SourceOptions
@@ -28,9 +29,6 @@ from replay.signals.rules import candidates
 from replay.signals.signal import Signals
 from replay.signals.timeline import Timeline, align, check_overlap
 from replay.unused_files import require_use
-
-_BLOCK = 1 << 22
-
 
 _JOINED = "it goes on where another file's table ends, and was read as a part of that"
 _UNUSED = "none of its channels is a signal of this machine; it is not used"
@@ -93,41 +91,6 @@ def source_options(path: Path, machine: Machine) -> SourceOptions:
         if fnmatch(path.name, pattern):
             return options
     return SourceOptions()
-
-
-def content_hash(path: Path) -> tuple[str, int]:
-    """SHA-256 and size of a file, or of a folder's relative file names, sizes and contents in order of name.
-
-    Raises
-    ------
-    LogError
-        Where it cannot be read.
-    """
-    digest = hashlib.sha256()
-    try:
-        if not path.is_dir():
-            size = _feed(digest, path)
-            return digest.hexdigest(), size
-        total = 0
-        for name, file in sorted(_files_below(path)):
-            digest.update(name.encode("utf-8", "surrogateescape") + b"\0" + file.stat().st_size.to_bytes(8, "big"))
-            total += _feed(digest, file)
-        return digest.hexdigest(), total
-    except OSError as error:
-        raise LogError(f"{path} cannot be read: {error.strerror or error}") from error
-
-
-def _files_below(folder: Path) -> Iterator[tuple[str, Path]]:
-    return ((p.relative_to(folder).as_posix(), p) for p in folder.rglob("*") if p.is_file())
-
-
-def _feed(digest: hashlib._Hash, path: Path) -> int:
-    size = 0
-    with path.open("rb") as file:
-        while block := file.read(_BLOCK):
-            digest.update(block)
-            size += len(block)
-    return size
 
 
 def read_signals(
@@ -241,7 +204,8 @@ def _on_one_clock(files: tuple[MissionFile, ...], signals: Signals) -> tuple[tup
 
 def _left_out(file: MissionFile) -> MissionFile:
     assert file.clock is not None
-    text = f"{file.path.name} was left out: {file.clock.sentence.removeprefix(f'{file.path.name}: ')}"
+    why = file.clock.sentence.removeprefix(f"{file.path.name}: ")
+    text = FileLeftOut(f"{file.path.name} was left out: {why}", clock=True)
     return replace(file, summary=replace(file.summary, damage=(*file.summary.damage, text)), left_out=True)
 
 

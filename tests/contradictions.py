@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cli.tables.verdict import verdict_parts
+from diagnosis.decision.short import AS_WELL_HEALTHY
 from diagnosis.pages.labels import fault_title
 from diagnosis.results.candidates import candidates_of, label_of
 from diagnosis.results.machine_words import HYDRAULIC
@@ -148,6 +149,12 @@ def _open(report: Mapping[str, Any]) -> Iterator[str]:
         if not any(abs(r["driving_s"] - r["decided_driving_s"] - seconds) <= _SPARE_S + 0.01 for r in rows):
             yield f"{component} is not open for {seconds} s of driving: {text!r}"
         spans = [s for s in report["states"] if s["component"] == component and s["reason"] == reason]
+        if reason == AS_WELL_HEALTHY:
+            spans = [
+                f
+                for f in report["intervals"]
+                if f["component"] == component and sum(h["p"] for h in f["hypotheses"] if h["mode"] == "healthy") >= 0.5
+            ]
         length = sum(s["stop_s"] - s["start_s"] for s in spans)
         if reason and length < 0.3 * seconds:
             yield f"its reason holds for {length:.1f} s: {text!r}"

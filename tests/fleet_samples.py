@@ -41,7 +41,7 @@ class Fault:
 
 @dataclass(frozen=True)
 class Sample:
-    """A mission with its result; `epsilon` by part, parts in `blind` are not assessed. `state` None: not audited yet.
+    """A mission with its result; `left_out`: its log lacks nothing but whole files; `epsilon` by part, parts in `blind` are not assessed. `state` None: not audited yet.
 
     Without a machine, one that was not judged has its folder's name, as an audit gives it.
     """
@@ -61,6 +61,7 @@ class Sample:
     copies: Sequence[str] = ()
     gone: bool = False
     relative: bool = False
+    left_out: bool = False
 
 
 def write_store(path: Path, samples: Iterable[Sample]) -> Path:
@@ -82,7 +83,7 @@ def _write(c: Any, k: int, s: Sample) -> None:
         folder = f"logs/{s.name}".split("/")[-2] if not judged or s.verdict == "not_assessed" else ""
         start = None if s.day is None or not judged else int(START_NS + s.day * DAY_NS)
         c.execute(
-            "INSERT INTO result VALUES (?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?)",
+            "INSERT INTO result VALUES (?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?)",
             (k, f"{k:064x}", "c" * 64, "1.0", s.state, s.reason or ("" if s.state == "ok" else "It ends too early."), 1)
             + (
                 s.machine or folder,
@@ -92,9 +93,9 @@ def _write(c: Any, k: int, s: Sample) -> None:
                 start,
             )
             + (
-                (s.driving_s * 1.4, s.driving_s, s.driving_s * 0.8, s.driving_s * 0.3, 0)
+                (s.driving_s * 1.4, s.driving_s, s.driving_s * 0.8, s.driving_s * 0.3, 0, int(s.left_out))
                 if judged
-                else (None,) * 4 + (0,)
+                else (None,) * 4 + (0, 0)
             )
             + (f"missions/{s.name}" if judged else None,),
         )

@@ -91,7 +91,7 @@ def of_standings(report: Mapping[str, Any]) -> Iterator[str]:
         not cleared - len(remarked) <= (int(told.group(1)) if told else 0) <= cleared
     ):  # what has a remark has a lane of its own
         yield f"{found.group(0)!r}, and the timeline: {lanes.summary!r}"
-    of_lanes = [lane.state for lane in lanes.quiet].count("healthy")
+    of_lanes = [lane.state for lane in (*lanes.lanes, *lanes.quiet)].count("healthy")
     if of_lanes > cleared:
         yield f"{found.group(0)!r}, and {of_lanes} lanes of the timeline have the symbol of health"
     healthy = machine_picture(report).count(">Healthy<")  # type: ignore[arg-type]

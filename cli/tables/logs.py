@@ -10,7 +10,6 @@ from rich.text import Text
 from cli.tables.layout import bullets, section, text
 from cli.terminal.dates import shown_moment
 from diagnosis.results.document import ClockRow, FileRow, ReportDocument
-from diagnosis.results.left_out import is_left_out
 from replay.signals.unsure_names import NOT_USED
 
 
@@ -27,8 +26,8 @@ def log_parts(report: ReportDocument) -> list[RenderableType]:
 
 
 def _line(file: FileRow, files: Sequence[FileRow]) -> Text:
-    gone = next((damage for damage in file["damage"] if is_left_out(damage)), "")
-    damaged = any(not is_left_out(damage) for damage in file["damage"])
+    gone = file.get("left_out", [])
+    damaged = any(damage not in gone for damage in file["damage"])
     words = [f"({file['format']}{', damaged' if damaged else ''})"]
     unused = next((note for note in file["notes"] if note.startswith("none of its channels")), "")
     if unused:

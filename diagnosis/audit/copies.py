@@ -12,7 +12,7 @@ from diagnosis.audit.plan import Planned, known_hashes
 from diagnosis.audit.store.store import Store
 from diagnosis.audit.task import key_of
 from replay.errors import LogError
-from replay.mission import content_hash
+from replay.log.content_hash import content_hash
 
 _END_BYTES = 1 << 16
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-from diagnosis.audit.discovery.missions import MissionSource
+from diagnosis.audit.discovery.mission_source import MissionSource
 from diagnosis.audit.plan import Planned
 from diagnosis.audit.runner import absolute
 from diagnosis.audit.store.folders import holds_report, write_whole

@@ -9,7 +9,7 @@ from functools import cache
 from pathlib import Path
 
 from diagnosis.audit.discovery.identity import fallback_id, given_id, stated_id
-from diagnosis.audit.discovery.missions import MissionSource
+from diagnosis.audit.discovery.mission_source import MissionSource
 from diagnosis.audit.discovery.staging import machine_at
 from diagnosis.audit.isolation.limits import Limits
 from diagnosis.audit.store.folders import holds_report

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from diagnosis.audit.discovery.identity import fallback_id
-from diagnosis.audit.discovery.missions import MissionSource
+from diagnosis.audit.discovery.mission_source import MissionSource
 from diagnosis.audit.discovery.staging import Late, Staged, stage
 from diagnosis.audit.isolation import child
 from diagnosis.audit.isolation.child import Work

@@ -114,7 +114,11 @@ def by_model(assessments: Mapping[Part, Assessment], shown: Sequence[Detectable]
         ]
         said += [_from_size(name, [r.size for r in rows])] if rows else []
         sizes_known |= any(r.size for r in rows)
-    sizes = f"A loss of ten seconds shows, in 95 of 100 places where it may begin, {'; '.join(said)}. " if said else ""
+    sizes = (
+        f"Of losses that last ten seconds these show, in 95 of 100 places where they may begin: {'; '.join(said)}. "
+        if said
+        else ""
+    )
     if said and not sizes_known:
         sizes = "A loss in one of them that lasts only ten seconds need not show, however large. "
     return (
@@ -130,12 +134,14 @@ def _from_size(name: str, sizes: Sequence[float | None]) -> str:
     """From which size on a loss shows of parts of one kind."""
     known = sorted(x for x in sizes if x)
     if not known:
-        return f"on no {name}, however large"
+        return f"on no {name} any"
     span = dict.fromkeys(f"{100 * x:.0f}" for x in (known[0], known[-1]))
-    size = f"from {' to '.join(span)} % on{' (by part)' if len(span) > 1 else ''}"
+    size = f"those of {' to '.join(span)} % or more{' (by part)' if len(span) > 1 else ''}"
     if len(known) == len(sizes):
         return f"on every {name} {size}"
-    return f"on {len(known)} of {len(sizes)} {name}s {size}, on the other{'s' if len(sizes) - len(known) > 1 else ''} at no size"
+    return (
+        f"on {len(known)} of {len(sizes)} {name}s {size}, on the other{'s' if len(sizes) - len(known) > 1 else ''} none"
+    )
 
 
 def doubt_of(watch: Sequence[FaultInterval], against: Reservations) -> str:

@@ -1,7 +1,8 @@
 """Findings of one part that are one fault: the same row, as large, and nothing healthy seen between them.
 
 A constant loss that shows only while the wheel is driven hard is found in pieces. Between them nothing can be judged; where the part
-was seen to be healthy for longer, the pieces are faults of their own. Losses that touch are one that grows or fades. A shorter piece
+was seen to be healthy for longer, the pieces are faults of their own. A share lost of little is little: what is called healthy while the
+reference hardly moves counts by how far the loss would show there. Losses that touch are one that grows or fades. A shorter piece
 beside a fault, of which no row is probable enough to give it a name and that may be of the row of that fault, is the end or the
 beginning of it.
 """
@@ -20,12 +21,15 @@ from diagnosis.results.candidates import candidates
 from diagnosis.results.result import Epsilon
 from diagnosis.results.sentence import About, stated_anew
 from diagnosis.results.vocabulary import Tier
+from replay.arrays.envelope import bucket_of, step_of
 from replay.faults import TOTAL, FaultMode, State
 
 #: Healthy time between two findings that makes two faults of them [s]: second measurements see it at once, a model needs longer.
 _SEEN_HEALTHY_S = {Tier.DIRECT: 0.05}
 _SEEN_BY_MODELS_S = 0.5
-_SEEN_SCALED_S = 0.3  # what loses a share looks healthy while its reference passes zero
+_SEEN_SCALED_S = (
+    0.3  # what loses a share looks healthy while its reference passes zero; seconds in which the loss would show
+)
 _SPARE = 0.1  # of ε̂: by which two bounds may miss each other
 _NAMED = 6
 _TOUCHES_S = 0.1
@@ -44,8 +48,8 @@ def with_episodes(assessments: Mapping[Part, Assessment], dt: float) -> dict[Par
     """
     out: dict[Part, Assessment] = {}
     for part, a in assessments.items():
-        states = {side: b.states for (component, side), b in assessments.items() if component == part[0]}
-        findings = a.findings if len(a.findings) < 2 else joined(a.findings, states, dt)
+        both = {side: b for (component, side), b in assessments.items() if component == part[0]}
+        findings = a.findings if len(a.findings) < 2 else joined(a.findings, both, dt)
         told = tuple(_with_its_chance(f) for f in findings)
         out[part] = a if told == a.findings else replace(a, findings=told)
     return out
@@ -57,22 +61,22 @@ def _with_its_chance(finding: Finding) -> Finding:
     return replace(finding, evidence=tuple(stated_anew(text, About.CASES, said) for text in finding.evidence))
 
 
-def joined(findings: Sequence[Finding], states: Mapping[str, NDArray[np.int8]], dt: float) -> tuple[Finding, ...]:
+def joined(findings: Sequence[Finding], sides: Mapping[str, Assessment], dt: float) -> tuple[Finding, ...]:
     """Findings in order of time, those that are one fault as one.
 
     Parameters
     ----------
     findings : Sequence[Finding]
         Of one side of a part.
-    states : Mapping[str, NDArray[np.int8]], each of shape (n,)
-        States of both sides of the component, by side: a finding that may be either's counts in both lists.
+    sides : Mapping[str, Assessment]
+        Both sides of the component: a finding that may be either's counts in both lists.
     dt : float
         Step [s].
     """
     findings = _with_edges(findings, dt)
     groups: list[list[Finding]] = []
     for f in sorted(findings, key=lambda f: f.start):
-        if groups and _continues(groups[-1][-1], f, states, dt):
+        if groups and _continues(groups[-1][-1], f, sides, dt):
             groups[-1].append(f)
         else:
             groups.append([f])
@@ -123,25 +127,46 @@ def _chance(finding: Finding, mode: FaultMode) -> float:
     return sum(h.p for h in finding.hypotheses if h.mode == mode)
 
 
-def _continues(a: Finding, b: Finding, states: Mapping[str, NDArray[np.int8]], dt: float) -> bool:
+def _continues(a: Finding, b: Finding, sides: Mapping[str, Assessment], dt: float) -> bool:
     """Whether b goes on with the fault that a is."""
     if (a.side, a.mode, a.tier) != (b.side, b.mode, b.tier) or b.start < a.stop:
         return False
     usual = _SEEN_HEALTHY_S.get(a.tier, _SEEN_BY_MODELS_S)
-    seen = _healthy_steps(a, b, states) * dt >= (max(usual, _SEEN_SCALED_S) if a.mode.scaled else usual)
+    seen = _healthy_steps(a, b, sides) * dt >= (max(usual, _SEEN_SCALED_S) if a.mode.scaled else usual)
     changes = a.mode is FaultMode.INEFFICIENT and (b.start - a.stop) * dt <= _TOUCHES_S  # a loss that grows or fades
     return not seen and (changes or _alike(a.epsilon, b.epsilon)) and _same_value(a, b)
 
 
-def _healthy_steps(a: Finding, b: Finding, states: Mapping[str, NDArray[np.int8]]) -> int:
+def _healthy_steps(a: Finding, b: Finding, sides: Mapping[str, Assessment]) -> float:
     """Steps between two findings in which what they may be of is seen to be healthy, or gives no data.
 
-    A side of which nothing healthy is ever said, as of a drive without effort, does not speak against a sensor that reads right.
+    A side of which nothing healthy is ever said, as of a drive without effort, does not speak against a sensor that reads right. A
+    healthy step counts by how far the loss would show in it.
     """
-    known = [states[s.value] for s in a.side.sides if s.value in states]
-    sides = [s for s in known if np.any(s == CODE[State.HEALTHY])] or known
-    healthy = [np.isin(s[a.stop : b.start], (CODE[State.HEALTHY], CODE[State.NO_DATA])) for s in sides]
-    return int(np.count_nonzero(np.logical_and.reduce(healthy)))
+    known = [sides[s.value] for s in a.side.sides if s.value in sides]
+    telling = [one for one in known if np.any(one.states == CODE[State.HEALTHY])] or known
+    counts = [
+        np.where(s == CODE[State.HEALTHY], _shows(a, b, one), s == CODE[State.NO_DATA])
+        for one in telling
+        for s in [one.states[a.stop : b.start]]
+    ]
+    return float(np.sum(np.minimum.reduce(counts)))
+
+
+def _shows(a: Finding, b: Finding, one: Assessment) -> NDArray[np.float64]:
+    """How far the lesser loss of a share would show at each step between two findings [1]: its square beside the threshold's, 1 at most.
+
+    All would of what loses no share, and where the evidence has no such series.
+    """
+    steps = np.arange(a.stop, b.start)
+    expected, threshold = (one.columns.get(name) for name in ("expected", "threshold"))
+    sizes = [f.epsilon.value for f in (a, b) if f.epsilon is not None]
+    if not a.mode.scaled or len(sizes) < 2 or expected is None or threshold is None:
+        return np.ones(steps.size)
+    rows = np.minimum((steps / step_of(bucket_of(one.states.size))).astype(np.intp), len(expected) - 1)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        share = (min(sizes) * np.asarray(expected, np.float64)[rows] / np.asarray(threshold, np.float64)[rows]) ** 2
+    return np.minimum(np.nan_to_num(share, nan=1.0, posinf=1.0), 1.0)
 
 
 def _alike(a: Epsilon | None, b: Epsilon | None) -> bool:

@@ -13,6 +13,7 @@ from diagnosis.decision.size_notes import size_note
 from diagnosis.results.assessment import LEAST_SHARE, STATES, Assessment, Finding
 from diagnosis.results.machine_words import MachineWords
 from diagnosis.results.result import Epsilon, FaultInterval, Sat, StateSpan
+from diagnosis.results.sentence import about_of
 from diagnosis.results.vocabulary import Kind, Tier
 from replay.faults import FaultMode, Side
 from replay.machine.config import Machine
@@ -53,6 +54,7 @@ def intervals_of(
                 size_note=size_note(f, f.epsilon, kind),
                 check=check_of_all(kind, component, f.side, f.mode, f.hypotheses, words, machine.advice),
                 evidence=(*f.evidence, *f.course),
+                about=tuple(about_of((*f.evidence, *f.course))),
                 tier=f.tier,
                 detected_s=None if f.detected is None else f.detected * step_ns * 1e-9,
             )

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnosis.results.assessment import STATES, Assessment
+from diagnosis.results.assessment import STATES, Assessment, Finding
 from diagnosis.results.document import CoverageRow, PhaseRow
 from diagnosis.results.loop_rows import LoopRow, MeanRow, MetricsRow, PaperRow
 from diagnosis.results.vocabulary import Tier
@@ -116,9 +116,8 @@ def coverage(
         if side == Side.ACTUATOR and assessment.tier is Tier.DIRECT:  # a motor that coasts is not asked for anything
             drives = drives & (assessment.states != _RESTS)
         decides = _DECIDED[assessment.states] & drives
-        for f in assessment.findings:
-            if sum(h.p for h in f.hypotheses if h.mode == State.HEALTHY) >= _AS_WELL:
-                decides[f.start : f.stop] = False
+        for f in _undecided(assessment):
+            decides[f.start : f.stop] = False
         seconds = float(np.count_nonzero(decides)) * dt
         decided[component, side] = seconds
         rows.append(
@@ -139,6 +138,7 @@ def open_states(
 ) -> dict[tuple[str, str], State]:
     """The commonest state that is no judgement while a part is driven, by component and side; none where all is decided.
 
+    It is that of a fault where findings that leave the part as probably healthy take more of the driving than any other.
     `moving` of shape (n, wheels).
     """
     out: dict[tuple[str, str], State] = {}
@@ -147,9 +147,16 @@ def open_states(
         drives = moving[:, machine.wheels.index(component)] if component in machine.wheels else anything
         counts = np.bincount(assessment.states[drives], minlength=len(STATES))
         counts[[s in DECIDED or s not in assessment.reasons for s in STATES]] = 0
+        for f in _undecided(assessment):
+            counts[STATES.index(State(f.mode.value))] += np.count_nonzero(np.asarray(drives)[f.start : f.stop])
         if counts.any():
             out[component, side] = STATES[int(np.argmax(counts))]
     return out
+
+
+def _undecided(assessment: Assessment) -> list[Finding]:
+    """Findings that leave it as probable that the part is healthy."""
+    return [f for f in assessment.findings if sum(h.p for h in f.hypotheses if h.mode == State.HEALTHY) >= _AS_WELL]
 
 
 def body_motion(timeline: Timeline, replay: Replay, machine: Machine) -> tuple[Array, Array]:

@@ -20,6 +20,8 @@ from replay.machine.config import Limits
 Part = tuple[str, str]
 
 _SAID_S = 0.05  # of judged driving: less is nothing
+#: Why a part was not judged where a finding leaves it as probable that it is healthy.
+AS_WELL_HEALTHY = "what was found there may as well be no fault"
 _WITH_COMMAND = "record again, with wheel.{c}.u (the {valve} command) in the log all the time"
 
 
@@ -202,7 +204,9 @@ def _why_short(assessment: Assessment, driven: float | None, limits: Limits, sta
 
 
 def main_reason(assessment: Assessment, state: State | None) -> str:
-    """Reason of a state that is no judgement; empty where there is none."""
+    """Reason of a state that is no judgement, or of a finding that decides nothing; empty where there is none."""
+    if state in DECIDED:
+        return AS_WELL_HEALTHY
     return "" if state is None else assessment.reasons.get(state, "")
 
 

@@ -13,7 +13,7 @@ from diagnosis.decision.wording import count_words, join_words, remedy_words
 from diagnosis.results.assessed import CutKind, is_judged
 from diagnosis.results.assessment import Assessment
 from diagnosis.results.clearing import Check, Checked
-from diagnosis.results.left_out import is_left_out
+from diagnosis.results.left_out import by_its_clock, is_left_out
 from diagnosis.results.machine_words import MachineWords
 from diagnosis.results.result import FaultInterval
 from diagnosis.results.vocabulary import Kind, Tier
@@ -100,7 +100,7 @@ def to_clear(
             ToClear(
                 f"{said.rstrip('.')}.",
                 "do so, or record a moving signal in both files"
-                if left_out and "its clock could not be compared" in said
+                if by_its_clock(against.damage[0])
                 else "diagnose the files of one mission together, and others apart"
                 if left_out
                 else "copy the log from the machine once more, or record another mission",

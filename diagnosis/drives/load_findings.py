@@ -15,6 +15,7 @@ from diagnosis.drives.inputs import DriveData
 from diagnosis.drives.load import LoadTrack
 from diagnosis.results.assessment import Finding
 from diagnosis.results.result import Epsilon, Hypothesis, Sat
+from diagnosis.results.sentence import About, Sentence
 from diagnosis.results.vocabulary import Tier
 from replay.faults import FaultMode, Side, State
 from replay.machine.config import Limits
@@ -188,22 +189,25 @@ def _finding(stretch: LoadStretch, data: DriveData) -> Finding:
 
 def _sentences(stretch: LoadStretch, onset: Onset, side: Side, data: DriveData) -> tuple[str, ...]:
     """What decided, in figures."""
-    lines = [
+    effort = (
         f"{data.names[2]} was {stretch.mean_load:.3g} above the {stretch.mean_expected:.3g} that healthy missions needed for "
         f"the same speed, over {stretch.seconds:.0f} s."
-    ]
+    )
+    lines: list[str] = [Sentence(About.EFFORT, effort)]
     if data.open_loop:
         lines.append("The recorded controller met no fault of the sensor, so the drive itself took more effort.")
     elif side is Side.SENSOR:
-        lines.append(
+        dropped = (
             f"The measured speed dropped by {onset.seen:.3g} {{speed_unit}} at once; a sensor that lost this much gain drops by "
             f"{onset.wanted:.3g} {{speed_unit}}, a loaded drive falls with its lag."
         )
+        lines.append(Sentence(About.ONSET, dropped))
     elif side is Side.ACTUATOR:
-        lines.append(
+        bent = (
             f"A sensor that lost this much gain would have dropped by {onset.wanted:.3g} {{speed_unit}} at once; no more than "
             f"{onset.seen:.3g} {{speed_unit}} was seen."
         )
+        lines.append(Sentence(About.ONSET, bent))
     else:
         lines.append(
             "Without a clear onset, a sensor that reads low and a loaded or less effective drive are not distinguished."

@@ -10,6 +10,7 @@ from diagnosis.report.second_measurements import second_of
 from diagnosis.report.units import EFFORT_UNIT, MOTION, motion_unit, on_page
 from diagnosis.results.document import IntervalRow
 from diagnosis.results.machine_words import MachineWords
+from diagnosis.results.sentence import About
 from diagnosis.results.vocabulary import Kind, Tier
 from replay.faults import Side
 from replay.machine.quantities import OPENING
@@ -94,7 +95,7 @@ def by_valve(fault: IntervalRow, columns: Collection[str]) -> bool:
 def by_effort(fault: IntervalRow, columns: Collection[str]) -> str:
     """Column of the effort that a drive's fault was decided by; empty where it was decided otherwise."""
     effort = f"{fault['kind']}.{fault['component']}.effort"
-    told = fault["side"] == Side.ACTUATOR and effort in columns and _place(effort, " ".join(fault["evidence"])) >= 0
+    told = fault["side"] == Side.ACTUATOR and effort in columns and About.EFFORT in fault.get("about", ())
     return effort if told else ""
 
 
@@ -163,5 +164,5 @@ def _place(name: str, text: str) -> int:
 
 def shape_sentence(fault: IntervalRow) -> str:
     """The evidence sentence that states what follows from the shape of the onset; empty where none does."""
-    signs = ("at once", "jump", "bends", "with its lag", "within one sample")
-    return next((e for e in fault["evidence"] if any(s in e for s in signs)), "")
+    told = zip(fault["evidence"], fault.get("about", ()), strict=False)
+    return next((text for text, about in told if about == About.ONSET), "")

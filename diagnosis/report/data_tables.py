@@ -17,7 +17,6 @@ from diagnosis.results.document import (
     SignalRow,
 )
 from diagnosis.results.fault_rows import state_label
-from diagnosis.results.left_out import only_left_out
 from diagnosis.results.loop_rows import LoopRow, MetricsRow
 from diagnosis.results.machine_words import MachineWords, words_of
 from diagnosis.results.vocabulary import Severity
@@ -195,5 +194,9 @@ def file_row(file: FileRow) -> Context:
         "sha256": file["sha256"] or "–",
         "size": f"{grouped(file['bytes'])} bytes",
         "notes": [*file["damage"], *file["notes"]],
-        "heading": "Left out" if only_left_out(file["damage"]) else "Damage" if file["damage"] else "Notes",
+        "heading": "Left out"
+        if file["damage"] and file["damage"] == file.get("left_out")
+        else "Damage"
+        if file["damage"]
+        else "Notes",
     }

@@ -222,13 +222,13 @@ def timeline(report: ReportDocument, duration: float, bars: Collection[str] | No
         mine = [f for f in faults if f["component"] == c and f["kind"] == kind and side in Side(f["side"]).sides]
         group = lanes if mine else quiet
         first = not group or group[-1].component != c
-        if mine:
-            group.append(_faulty_lane(c, side, mine, spans, duration, bars, cause, first, machine_words))
-            continue
         state = _main_state(spans)
         words = standings.get((c, side), Standing.NOT_JUDGED)
         if state == State.HEALTHY and words is not Standing.CLEARED:
             state = State.NOT_ASSESSED
+        if mine:
+            group.append(_faulty_lane(c, side, state, mine, spans, duration, bars, cause, first, machine_words))
+            continue
         counts[words] = counts.get(words, 0) + 1
         name = machine_words.part_name(kind, side)
         group.append(Lane(c, name, state, _lines(spans, side, duration), (), "", first, side))
@@ -255,6 +255,7 @@ def _spans_by_lane(report: ReportDocument) -> dict[tuple[str, Kind, str], list[S
 def _faulty_lane(
     component: str,
     side: str,
+    beside: str,
     faults: Sequence[IntervalRow],
     spans: Sequence[Span],
     duration: float,
@@ -263,18 +264,21 @@ def _faulty_lane(
     first: bool,
     machine_words: MachineWords,
 ) -> Lane:
-    """Lane with faults; those without a bar of their own are part of its line."""
+    """Lane with faults; those without a bar of their own are part of its line.
+
+    Remarks, of severity *info*, leave the part in the state `beside` them and count for no faulty time.
+    """
     own = [f for f in sorted(faults, key=lambda f: f["start_s"]) if bars is None or f["id"] in bars]
     bars_of = [_bar(f, duration, machine_words, cause.get(f["id"], "")) for f in own] if duration > 0 else []
     drawn = side_by_side(bars_of)
     if len(own) < len(faults):
         spans = [*spans, *((f["mode"], f["start_s"], f["stop_s"]) for f in faults)]
-    total = sum(f["stop_s"] - f["start_s"] for f in faults)
+    painting = [f for f in faults if f["severity"] != Severity.INFO]
+    total = sum(f["stop_s"] - f["start_s"] for f in painting)
     share = 100 * total / duration if duration > 0 else 0.0
-    words = f"{share:.1f} %" if share >= 0.05 else span(total)
+    words = f"{share:.1f} %" if share >= 0.05 else span(total) if painting else "remark"
     name = machine_words.part_name(faults[0]["kind"], side)
-    painting = next((f["mode"] for f in faults if f["severity"] != Severity.INFO), None)
-    state = painting or _main_state(spans)
+    state = painting[0]["mode"] if painting else beside
     return Lane(component, name, state, _lines(spans, side, duration), drawn, words, first, side)
 
 

@@ -17,6 +17,7 @@ from diagnosis.response.models import BLOCK_S
 from diagnosis.response.wheel import SENSOR_SHARE, sensor_finding
 from diagnosis.results.assessment import Finding
 from diagnosis.results.result import Epsilon
+from diagnosis.results.sentence import About, Sentence
 from replay.faults import FaultMode
 
 Array = NDArray[np.float64]
@@ -101,7 +102,9 @@ def _finding(data: FollowerData, view: View, y: Array, span: tuple[int, int], dt
     )
     size = Epsilon(loss, loss, loss) if gain < 1.0 else None
     end = min(stop * width, data.y.size)
-    return sensor_finding(start * width, end, mode, _P[ends - 1], size, None, (text,), SENSOR_SHARE)
+    return sensor_finding(
+        start * width, end, mode, _P[ends - 1], size, None, (Sentence(About.ONSET, text),), SENSOR_SHARE
+    )
 
 
 def _sudden(y: Array, x: Array, at: int, share: float) -> bool:

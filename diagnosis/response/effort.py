@@ -15,6 +15,7 @@ from diagnosis.response.inputs import FollowerData
 from diagnosis.response.machine import Judged
 from diagnosis.results.assessment import Finding
 from diagnosis.results.result import Epsilon, Hypothesis
+from diagnosis.results.sentence import About, Sentence
 from diagnosis.results.vocabulary import Tier
 from replay.faults import FaultMode, Side, State
 
@@ -290,5 +291,5 @@ def _finding(one: Judged, start: int, stop: int, dragged: bool, block_s: float) 
             Hypothesis(Side.ACTUATOR.value, FaultMode.INEFFICIENT.value, other),
             Hypothesis("none", State.HEALTHY.value, other),
         ),
-        epsilon=Epsilon(1.0, 1.0, 1.0), sat=None, evidence=(text,), tier=Tier.RESPONSE,
+        epsilon=Epsilon(1.0, 1.0, 1.0), sat=None, evidence=(Sentence(About.EFFORT, text),), tier=Tier.RESPONSE,
     )  # fmt: skip

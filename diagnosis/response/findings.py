@@ -11,6 +11,7 @@ from diagnosis.response.spells import Spell
 from diagnosis.response.wheel import EITHER, SENSOR_SHARE, Wheel, sensor_finding
 from diagnosis.results.assessment import Finding
 from diagnosis.results.result import Epsilon, Sat
+from diagnosis.results.sentence import About, Sentence
 from replay.faults import FaultMode
 
 Array = NDArray[np.float64]
@@ -250,10 +251,8 @@ def _scaled(spell: Spell, wheel: Wheel, span: tuple[int, int], speed: Array | No
         texts.append("The measured yaw rate does not follow this reading.")
     sensor = _by_body(spell, sensor, texts)
     if 1.0 - EITHER <= sensor <= EITHER and not bare:
-        texts.append(
-            "It began and ended while the speed was changing, or too slowly for a jump: a {wheel} that is weak or skids and a wrong sensor "
-            "cannot be distinguished."
-        )
+        unseen = "It began and ended while the speed was changing, or too slowly for a jump: a {wheel} that is weak or skids and a wrong sensor cannot be distinguished."
+        texts.append(Sentence(About.ONSET, unseen))
     wide = 2.0 * misfit / np.sqrt(max(1.0, x.size / 4.0))
     loss = 1.0 - gain
     p = spell.p * (0.5 + 0.5 * spell.mine) if speed is not None or bare else 1.0 - (1.0 - spell.p) * 0.5

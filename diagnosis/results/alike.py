@@ -21,7 +21,7 @@ _MOVING = 0.1  # of the usual reference: from here on a channel that lives shows
 _HELD, _LONGER = 0.9, 5.0  # of the time, and times as long as it ever stays elsewhere
 
 #: Says so.
-SHIFTED_SENTENCE = "What it should show hardly moved meanwhile: off by a constant it would read the same."
+SHIFTED_SENTENCE = "In nine tenths of that time what it should show changed by less than 15 % of what it is off by: off by a constant it would read the same."
 
 
 def hardly_moves(y: Array, x: Array, most: float = np.inf) -> bool:

@@ -43,13 +43,17 @@ class ClockRow(TypedDict):
 
 
 class FileRow(TypedDict):
-    """One file of the mission."""
+    """One file of the mission.
+
+    `left_out`: which sentences of `damage` say that a whole file was left out, which is not damaged; absent where none does.
+    """
 
     path: str
     sha256: str
     bytes: int
     format: str
     damage: list[str]
+    left_out: NotRequired[list[str]]
     notes: list[str]
     clock: ClockRow | None
 
@@ -177,7 +181,11 @@ class HypothesisRow(TypedDict):
 
 
 class IntervalRow(TypedDict):
-    """One fault; see `diagnosis.results.result.FaultInterval`."""
+    """One fault; see `diagnosis.results.result.FaultInterval`.
+
+    `about`: what each sentence of `evidence` gives, as `diagnosis.results.sentence.About` names it, empty where it is none of these;
+    results of earlier versions lack it.
+    """
 
     id: str
     component: str
@@ -199,6 +207,7 @@ class IntervalRow(TypedDict):
     detected_s: Seconds | None
     check: NotRequired[str]
     size_note: NotRequired[str]
+    about: NotRequired[list[str]]
 
 
 class StateRow(TypedDict):

@@ -2,21 +2,28 @@
 
 from __future__ import annotations
 
-import re
-from collections.abc import Iterable
+from collections.abc import Sequence
 
-# As `replay.mission` and the audit word it; of a damaged log only chunks are "left out:" with a reason.
-_FILE = re.compile(r"(?P<file>[^:]+?) was left out(?:: |, because nothing could be judged together with it)")
-_CHUNK = re.compile(r"\bchunk at byte \d+$")
+from diagnosis.results.document import ReportDocument
+from replay.log.left_out import FileLeftOut
 
 
 def is_left_out(text: str) -> bool:
     """Whether a sentence on a log's damage says no more than that a whole file was left out, and why."""
-    found = _FILE.match(text)
-    return found is not None and not _CHUNK.search(found["file"])
+    return isinstance(text, FileLeftOut)
 
 
-def only_left_out(texts: Iterable[str]) -> bool:
+def by_its_clock(text: str) -> bool:
+    """Whether a file was left out because its clock could not be compared with the others'."""
+    return isinstance(text, FileLeftOut) and text.clock
+
+
+def only_left_out(texts: Sequence[str]) -> bool:
     """Whether all of them do; not where there are none."""
-    found = list(texts)
-    return bool(found) and all(map(is_left_out, found))
+    return bool(texts) and all(map(is_left_out, texts))
+
+
+def lacks_files_alone(report: ReportDocument) -> bool:
+    """Whether nothing is wrong with a mission's log but that files were left out; see `FileRow`."""
+    files = report["log"]["files"]
+    return any(f["damage"] for f in files) and all(set(f["damage"]) <= set(f.get("left_out", ())) for f in files)

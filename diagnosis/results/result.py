@@ -122,6 +122,8 @@ class FaultInterval:
         How a technician checks the part.
     size_note : str
         Why ε̂ is missing, or a bound of it open; else empty.
+    about : tuple[str, ...]
+        What each sentence of `evidence` gives, as `diagnosis.results.sentence.About` names it; empty where it is none of these.
     """
 
     id: str
@@ -144,6 +146,7 @@ class FaultInterval:
     detected_s: float | None = None
     check: str = ""
     size_note: str = ""
+    about: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

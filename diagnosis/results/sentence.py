@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from enum import StrEnum
 
 
@@ -21,6 +21,8 @@ class About(StrEnum):
     SAT = "sat"
     #: What the shape of a fault's onset says of the side.
     ONSET = "onset"
+    #: The effort by which a drive was judged.
+    EFFORT = "effort"
 
 
 class Sentence(str):
@@ -60,6 +62,11 @@ class Sentence(str):
 def is_about(text: str, *about: About) -> bool:
     """Whether a sentence says that it gives one of some things."""
     return isinstance(text, Sentence) and text.about in about
+
+
+def about_of(texts: Iterable[str]) -> list[str]:
+    """What each of some sentences is about, as text; empty where it does not say."""
+    return [text.about.value if isinstance(text, Sentence) else "" for text in texts]
 
 
 def mapped(text: str, change: Callable[[str], str]) -> str:

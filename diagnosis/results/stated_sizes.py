@@ -102,8 +102,9 @@ def known_probability(
 ) -> dict[str, NDArray[Any]]:
     """The columns ``evidence.<component>.<side>.probability`` without what was not decided, which is NaN; see `size_columns`.
 
-    A fault of either side, which may rest on other evidence than these columns, has half of its probability on each at least; one that
-    these columns hardly show rests on other evidence as well, and has its own.
+    A fault that shows in stretches has none between them, where nothing was decided either. A fault of either side, which may rest on other
+    evidence than these columns, has half of its probability on each at least; one that these columns hardly show rests on other evidence as
+    well, and has its own.
 
     Columns and `t` [s] of shape (n,).
     """
@@ -116,14 +117,16 @@ def known_probability(
         for s in report["states"]:
             if (s["component"], s["side"]) == (component, side) and s["state"] in DECIDED:
                 known[_rows(t, step, s["start_s"], s["stop_s"])] = True
+        decided = known.copy()
         for fault in report["intervals"]:
             if fault["component"] == component and side in Side(fault["side"]).sides:
                 rows = _rows(t, step, fault["start_s"], fault["stop_s"])
-                known[rows] = True
+                told = decided[rows] if decided[rows].any() else np.ones_like(decided[rows])  # by no state of this side
+                known[rows] |= told
                 faulty = 1.0 - sum(h["p"] for h in fault["hypotheses"] if h["mode"] == State.HEALTHY)
                 if fault["side"] == Side.SENSOR_OR_ACTUATOR:
                     values[rows] = np.fmax(values[rows], 0.5 * faulty)
-                elif np.mean(np.nan_to_num(values[rows])) < _HARDLY * faulty:
+                elif np.mean(np.nan_to_num(values[rows][told])) < _HARDLY * faulty:
                     values[rows] = np.fmax(values[rows], faulty)
         out[name] = np.where(known, values, values.dtype.type(np.nan))
     return out

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from diagnosis.estimation.angle_jumps import jumps_of, quickest_of, readings
 from diagnosis.results.assessment import Finding
 from diagnosis.results.result import Hypothesis
+from diagnosis.results.sentence import About, Sentence
 from replay.faults import FaultMode, Side, State
 
 Array = NDArray[np.float64]
@@ -64,7 +65,10 @@ def as_sensors(finding: Finding) -> Finding:
             Hypothesis("none", State.HEALTHY.value, (1.0 - p) / 2.0),
         ),
         evidence=(
-            "The angle jumps where it begins or ends, quicker than an axle turns: it is the reading that is off.",
+            Sentence(
+                About.ONSET,
+                "The angle jumps where it begins or ends, quicker than an axle turns: it is the reading that is off.",
+            ),
             *finding.evidence,
         ),
     )

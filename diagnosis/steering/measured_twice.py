@@ -44,7 +44,9 @@ _IN_MIDDLE, _BESIDE = (
     0.04,
 )  # of full opening: as far off its zero a valve without signal rests, and further off a stuck one
 _MEANWHILE = "Meanwhile {second}, a second measurement of the angle, moved over {other}, and {name} over {own}."
-_CONSTANT = "The command hardly moved meanwhile: a {valve} that is off by a constant would look the same."
+_CONSTANT = (
+    "Its command stayed where it was but for the beginning: a {valve} that is off by a constant would look the same."
+)
 
 
 def of_one_cause(side: Side, found: SideFindings, inputs: AxleInputs, min_sat: float) -> SideFindings:

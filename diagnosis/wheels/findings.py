@@ -28,7 +28,10 @@ _HOLD_S = 0.1
 _REACH_S = 0.4  # within which the raw signal shows an edge that the Kalman models did not place
 _PROBABLE, _OF_STEP, _SEEN_STEP = 0.8, 0.5, 8.0  # a loss less probable needs a step; share that is one; times the noise
 _MOST_STEPLESS = 0.85  # of a loss without one: a sensor that fades, or another cause of what the wheel does
-_NO_STEP = "A sensor's loss that comes or goes at once makes a step, which is missing here: it fades, or something else than the sensor changed."
+_NO_STEP = Sentence(
+    About.ONSET,
+    "A sensor's loss that comes or goes at once makes a step, which is missing here: it fades, or something else than the sensor changed.",
+)
 _LEAST_HEALTHY = 0.95  # probability below which a side is not called healthy
 _TOGETHER = 0.5  # of a run: where no wheel turns, none of them is known to be dead
 _USUAL = 0.5  # below this it deviates by more than what healthy machines do

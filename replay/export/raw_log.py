@@ -20,9 +20,9 @@ from numpy.typing import NDArray
 from replay.arrays.blocks import release
 from replay.errors import LogError, OutputError
 from replay.export.raw_folder import INDEX, SCHEMA, RawFile, RawHead, RawIndex, new_folder, place, refuse_foreign_folder
+from replay.log.content_hash import content_hash
 from replay.log.raw_log import Channel, RawLog, Window
 from replay.log.source_options import SourceOptions
-from replay.mission import content_hash
 from replay.progress import Progress, Stage, Subscriber, silent
 from replay.readers.registry import read_log, summarise_log
 

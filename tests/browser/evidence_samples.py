@@ -26,6 +26,7 @@ def decided() -> tuple[dict[str, Any], samples.Columns]:
         f"{own} stayed between 0.2095 and 0.2105 m/s while {second} moved over 0.3 m/s.",
         "The measured speed dropped by 0.15 m/s at once; a loaded drive falls with its lag.",
     ]
+    report["intervals"][0]["about"] = ["", "onset"]
     report["log"]["open_loop"] = True
     return report, {k: np.asarray(v) for k, v in columns.items()}
 

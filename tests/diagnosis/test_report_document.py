@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from diagnosis.pipeline import diagnose_mission
-from diagnosis.report_document import machine_row
+from diagnosis.recording_rows import machine_row
 from replay.export.mission import write_mission
 from replay.machine.config import haulotte
 from replay.mission import Mission, load_mission

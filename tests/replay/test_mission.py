@@ -11,9 +11,10 @@ import numpy as np
 import pytest
 
 from replay.errors import LogError
+from replay.log.content_hash import content_hash
 from replay.log.source_options import SignalSource, SourceOptions
 from replay.machine.config import haulotte
-from replay.mission import content_hash, load_mission, read_signals, source_options
+from replay.mission import load_mission, read_signals, source_options
 from replay.progress import Progress, Stage
 
 START = 1_760_000_000_000_000_000

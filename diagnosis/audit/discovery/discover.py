@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from diagnosis.audit.discovery.finder import Finder
-from diagnosis.audit.discovery.missions import MissionSource, named_missions
+from diagnosis.audit.discovery.mission_source import MissionSource, named_missions
 from replay.log.file_types import words_of
 
 _SHOWN = 12

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING
 
-from diagnosis.audit.discovery.missions import MissionSource
+from diagnosis.audit.discovery.mission_source import MissionSource
 
 if TYPE_CHECKING:
     from replay.machine.config import Machine

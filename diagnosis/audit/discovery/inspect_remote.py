@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from diagnosis.audit.discovery.discover import discover
-from diagnosis.audit.discovery.missions import MissionSource
+from diagnosis.audit.discovery.mission_source import MissionSource
 from diagnosis.audit.discovery.remote import file_system
 from diagnosis.audit.discovery.remote_mcap import fetched_index
 from diagnosis.audit.discovery.staging import stage

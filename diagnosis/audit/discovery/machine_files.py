@@ -10,7 +10,8 @@ from dataclasses import replace
 from pathlib import Path
 
 from diagnosis.audit.discovery.identity import fallback_id
-from diagnosis.audit.discovery.missions import MACHINE_FILE, MissionSource
+from diagnosis.audit.discovery.mission_source import MissionSource
+from diagnosis.audit.discovery.missions import MACHINE_FILE
 
 _SHOWN = 3
 _PIECE = 1 << 20

@@ -13,15 +13,15 @@ from pathlib import Path
 from typing import Any
 
 from diagnosis.audit.discovery.listing import Entry, joined
-from diagnosis.audit.discovery.missions import MissionSource
+from diagnosis.audit.discovery.mission_source import MissionSource
 from diagnosis.audit.discovery.remote import file_system, stamp_of
 from diagnosis.audit.discovery.remote_mcap import why
 from diagnosis.audit.discovery.safe_names import safe_name
 from replay.errors import ConfigError, LogError
+from replay.log.content_hash import content_hash
 from replay.log.file_types import part_of, split_ending
 from replay.machine.config import Machine
 from replay.machine.toml_file import load_machine
-from replay.mission import content_hash
 
 
 @dataclass(frozen=True)

@@ -16,6 +16,7 @@ from diagnosis.audit.fleet.runs import sides_of
 from diagnosis.audit.fleet.trend_types import TrendRow
 from diagnosis.audit.fleet.words import count, open_words
 from diagnosis.decision.wording import join_words
+from diagnosis.pages.labels import utc_moment
 from diagnosis.results.machine_words import words_of
 from diagnosis.results.vocabulary import Leave, Severity, Verdict
 from replay.faults import FaultMode
@@ -76,6 +77,7 @@ def lists_of(document: FleetDocument) -> tuple[Left, ...]:
         lost = any(is_lost(t["points"][-1][3], t["limit"]) for t in untold)
         leave = leave_of(m["verdict"], m["cleared"], m["unjudged"], lost=lost)
         place, reason = _why(leave, m, standing[k], document["missions"], rising[k])
+        reason += _repaired(every[k], m) if leave is Leave.MAY else ""
         reason = _with_blind(_with_losses(leave, m, reason, untold), m)
         if leave is not Leave.MAY and any(f["open"] and f["since"] for f in standing[k]) and _ready(m, document):
             reason += "; its newest report judges its own mission alone"
@@ -155,6 +157,17 @@ def _why(
     if last is not None and m["verdict"] == missions[last]["verdict"] == Verdict.NOT_ASSESSED:
         return last, _said(missions[last])
     return last, f"{named}: {m['standing'][0].lower()}{m['standing'][1:]}" if named else m["standing"]
+
+
+def _repaired(faults: Sequence[FleetFaultRow], m: MachineRow) -> str:
+    """What was repaired of a machine and not found since, to follow why it may go out."""
+    mended = [f for f in faults if f["status"] == "repaired" and f["repaired_ns"] is not None]
+    mended.sort(key=lambda f: -(f["repaired_ns"] or 0))
+    said = [
+        f"{fault_words(f, words_of(m))}, repaired {utc_moment(f['repaired_ns'] or 0)} and not found since"
+        for f in mended
+    ]
+    return "".join(f"; {text}" for text in said[:_FAULTS])
 
 
 def _lost(mission: MissionRow) -> str:

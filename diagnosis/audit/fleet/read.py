@@ -59,7 +59,7 @@ class FoundFault:
 class Result:
     """What became of one log; see the table ``result``.
 
-    `start_ns` is None where the log's clock does not know the date. `order` is its place in the store.
+    `left_out`: the log lacks nothing but whole files that were left out. `start_ns` is None where the log's clock does not know the date. `order` is its place in the store.
     """
 
     id: int
@@ -75,6 +75,7 @@ class Result:
     driving_s: float | None
     distance_m: float | None
     open_loop: bool
+    left_out: bool
     report: str | None
     version: str
     log_hash: str
@@ -106,9 +107,9 @@ class Mission:
 
 _COLUMNS = (
     "id", "state", "reason", "attempts", "machine_id", "machine_name", "verdict", "title", "start_ns", "duration_s", "driving_s",
-    "distance_m", "open_loop", "report", "version", "log_hash", "config_hash",
+    "distance_m", "open_loop", "left_out", "report", "version", "log_hash", "config_hash",
 )  # fmt: skip
-_RESULTS = f"SELECT {', '.join(_COLUMNS)} FROM result WHERE id IN (SELECT result FROM mission) ORDER BY id"
+_RESULTS = "SELECT {} FROM result WHERE id IN (SELECT result FROM mission) ORDER BY id"
 _FAULTS = (
     "SELECT result, id, component, kind, side, mode, severity, stop_s - start_s, epsilon, epsilon_low, epsilon_high, "
     "probability, {}, stop_s, (SELECT duration_s FROM result WHERE result.id = fault.result) FROM fault ORDER BY result, start_ns, length(id), id"
@@ -156,9 +157,11 @@ def read_missions(store: Path) -> list[Mission]:
             )
             faults[r].append(found)
         parts = read_parts(db)
+        known = db.has_column("result", "left_out")  # a store that is only read may be of an earlier version
+        columns = ", ".join("0" if name == "left_out" and not known else name for name in _COLUMNS)
         results = {
             row[0]: _result(row, tuple(faults.get(row[0], ())), parts.get(row[0], NO_PARTS))
-            for row in db.rows(_RESULTS)
+            for row in db.rows(_RESULTS.format(columns))
         }
         missions = [
             Mission(name, _files(files), size, results.get(r), bool(gone))
@@ -252,7 +255,7 @@ def _result(row: sqlite3.Row, faults: tuple[FoundFault, ...], parts: Parts) -> R
     values["start_ns"] = start if start is not None and start >= CALENDAR_NS else None
     values["state"] = _STATES[values["state"]]
     values["verdict"] = _VERDICTS[values["verdict"]]
-    values["open_loop"] = bool(values["open_loop"])
+    values["open_loop"], values["left_out"] = bool(values["open_loop"]), bool(values["left_out"])
     return Result(**values, faults=faults, parts=parts)
 
 

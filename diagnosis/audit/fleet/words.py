@@ -14,7 +14,6 @@ from diagnosis.decision.wording import join_words
 from diagnosis.pages.labels import utc, utc_moment
 from diagnosis.results.candidates import UNCLEAR
 from diagnosis.results.fault_rows import state_label
-from diagnosis.results.left_out import only_left_out
 from diagnosis.results.machine_words import MachineWords
 from diagnosis.results.vocabulary import Leave, Verdict
 from replay.faults import Side
@@ -53,8 +52,8 @@ def missions_words(all_missions: int, counted: int) -> str:
 
 
 def open_words(is_open: bool, clean: int, needed: int) -> str:
-    """How far an open fault is refuted: ``, not found by 3 of the 10 missions that close it``; empty where it is not, or just found."""
-    return f", not found by {clean} of the {needed} missions that close it" if is_open and clean else ""
+    """How far an open fault is refuted: ``, clean in 3 of the 10 missions that it takes to close it``; empty where it is not, or just found."""
+    return f", clean in {clean} of the {needed} missions that it takes to close it" if is_open and clean else ""
 
 
 def repair_command(label: str, component: str, side: str) -> str:
@@ -145,7 +144,7 @@ def _is_open(m: Machine) -> bool:
 
 def _lacks_a_file(m: Machine) -> bool:
     """Whether nothing is wrong with the logs of a machine's last missions but that a file was left out."""
-    return only_left_out(r.result.reason for r in m.newest if r.result.verdict is Verdict.WATCH)
+    return all(r.result.left_out for r in m.newest if r.result.verdict is Verdict.WATCH)
 
 
 def is_damaged(m: Machine) -> bool:

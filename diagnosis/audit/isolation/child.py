@@ -26,6 +26,7 @@ from diagnosis.results.json_text import dump_json
 from diagnosis.results.vocabulary import Verdict
 from replay.arrays.processors import use_one
 from replay.errors import ConfigError, LogError, NotJudged, OutputError
+from replay.log.left_out import FileLeftOut
 from replay.machine.config import Machine
 from replay.readers.common.room import FULL
 
@@ -144,9 +145,11 @@ def _diagnosed(work: Work) -> MissionResult:
             for path in paths:
                 text = text.replace(str(path), path.name)
             left += [
-                f"{path.name} was left out: {text}"
-                if path.name in text
-                else f"{path.name} was left out, because nothing could be judged together with it ({text})"
+                FileLeftOut(
+                    f"{path.name} was left out: {text}"
+                    if path.name in text
+                    else f"{path.name} was left out, because nothing could be judged together with it ({text})"
+                )
                 for path in unusable
             ]
             paths = [path for path in paths if path not in unusable]

@@ -8,7 +8,7 @@ import os
 import sqlite3
 from collections.abc import Sequence
 
-from diagnosis.audit.discovery.missions import MissionSource
+from diagnosis.audit.discovery.mission_source import MissionSource
 from diagnosis.audit.store.records import FileRecord, names_of, point
 
 Given = Sequence[tuple[MissionSource, list[FileRecord]]]

@@ -22,7 +22,10 @@ _WHAT = "SELECT application_id FROM pragma_application_id UNION ALL SELECT name 
 _TABLES = {"meta", "file", "mission", "result", "attempt", "fault", "component"}
 #: Tables that stores of the same schema may lack, because they were made by an earlier version.
 _LATER = ("repair",)
-_LATER_COLUMNS = (("fault", "unclear", "INTEGER NOT NULL DEFAULT 0"),)
+_LATER_COLUMNS = (
+    ("fault", "unclear", "INTEGER NOT NULL DEFAULT 0"),
+    ("result", "left_out", "INTEGER NOT NULL DEFAULT 0"),
+)
 _FULL = ("database or disk is full", "disk I/O error", "unable to open database file")
 
 

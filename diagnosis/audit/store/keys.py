@@ -10,7 +10,7 @@ from fnmatch import fnmatch
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from diagnosis.audit.discovery.missions import MissionSource
+    from diagnosis.audit.discovery.mission_source import MissionSource
     from diagnosis.audit.store.records import KeyRecord
     from replay.machine.config import Machine
 
@@ -52,7 +52,7 @@ def log_hash(hashes: Sequence[str], roles: Sequence[str] = ()) -> str:
     Parameters
     ----------
     hashes : Sequence[str]
-        SHA-256 of each file or folder (`replay.mission.content_hash`), in the mission's order: the first gives the clock.
+        SHA-256 of each file or folder (`replay.log.content_hash.content_hash`), in the mission's order: the first gives the clock.
     roles : Sequence[str]
         From `file_roles`; empty: no file's name matters.
     """

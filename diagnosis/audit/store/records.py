@@ -13,7 +13,7 @@ from diagnosis.results.json_text import dump_json
 SCHEMA = "mfhca-audit-result/1"
 _KEY = ("log_hash", "config_hash", "version")
 _FROM_REPORT = (
-    "machine_name", "verdict", "title", "start_ns", "duration_s", "driving_s", "decided_s", "distance_m", "open_loop",
+    "machine_name", "verdict", "title", "start_ns", "duration_s", "driving_s", "decided_s", "distance_m", "open_loop", "left_out",
 )  # fmt: skip
 _RESULT = (*_KEY, "state", "reason", "attempts", "machine_id", *_FROM_REPORT, "report")
 _ATTEMPT = ("number", "state", "reason", "wall_s", "cpu_s", "peak_mb")
@@ -25,7 +25,7 @@ _COMPONENT = (
     "component", "side", "driving_s", "decided_s", "healthy_s", "faulty_s", "worst",
     "epsilon", "epsilon_low", "epsilon_high", "epsilon_s", "epsilon_relative",
 )  # fmt: skip
-_NO_REPORT: ResultFacts = {"machine_name": "", "title": "", "open_loop": 0}
+_NO_REPORT: ResultFacts = {"machine_name": "", "title": "", "open_loop": 0, "left_out": 0}
 
 
 class FileRecord(TypedDict):

@@ -39,6 +39,7 @@ CREATE TABLE result (
     decided_s REAL,                 -- mean over components and sides of decided driving
     distance_m REAL,
     open_loop INTEGER NOT NULL DEFAULT 0,
+    left_out INTEGER NOT NULL DEFAULT 0, -- 1: the log lacks nothing but whole files that were left out
     report TEXT,                    -- folder of the report, relative to the output; NULL where there is none
     UNIQUE (log_hash, config_hash, version)
 ) STRICT;

@@ -10,6 +10,7 @@ from typing import NotRequired, TypedDict
 
 from diagnosis.results.candidates import candidates_of
 from diagnosis.results.document import CoverageRow, IntervalRow, LossRow, ReportDocument
+from diagnosis.results.left_out import lacks_files_alone
 from diagnosis.results.size_rows import EpsilonRow
 from diagnosis.results.vocabulary import Severity
 from replay.faults import FAULT_STATES, Side, State
@@ -28,6 +29,7 @@ class ResultFacts(TypedDict, total=False):
     decided_s: float | None
     distance_m: float | None
     open_loop: int
+    left_out: int
 
 
 class BoundsColumns(TypedDict):
@@ -95,6 +97,7 @@ def summarise(report: ReportDocument) -> MissionSummary:
             "decided_s": sum(decided) / len(decided) if decided else None,
             "distance_m": log["distance_m"],
             "open_loop": int(log["open_loop"]),
+            "left_out": int(lacks_files_alone(report)),
         },
         "faults": [_fault(row) for row in report["intervals"]],
         "components": [_component(row, report["intervals"], report["loss"]) for row in coverage],

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from diagnosis.audit.discovery.missions import MissionSource
+from diagnosis.audit.discovery.mission_source import MissionSource
 from diagnosis.audit.isolation.forks import ForkServer
 from diagnosis.audit.isolation.run import Isolation, isolation
 from diagnosis.audit.store.keys import Key, config_hash, log_hash
@@ -72,6 +72,7 @@ def make_report() -> Callable[..., dict[str, Any]]:
                 "driving_s": 80.0,
                 "distance_m": 12.5,
                 "open_loop": False,
+                "files": [],
             },
             "machine": {"id": machine_id, "name": "Haulotte"},
             "verdict": {"status": "watch", "title": "1 fault to watch"},

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from diagnosis.audit import engines
 from diagnosis.audit.discovery.discover import Discovery
-from diagnosis.audit.discovery.missions import MissionSource
+from diagnosis.audit.discovery.mission_source import MissionSource
 from diagnosis.audit.endings import Ending
 from diagnosis.audit.engines import Engine
 from diagnosis.audit.isolation.limits import Limits

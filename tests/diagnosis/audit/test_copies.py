@@ -8,7 +8,7 @@ import pytest
 
 from diagnosis.audit.discovery.discover import discover
 from diagnosis.audit.store.store import Store
-from replay import mission as reading
+from replay.log import content_hash as reading
 from tests.diagnosis.audit.samples import asked_for, run
 
 

@@ -104,7 +104,7 @@ def test_the_newest_report_says_what_is_open_from_earlier_missions(tmp_path: Pat
     assert compare(path, "new") == []
     (said,) = document(path, "new")["previous"]["open_faults"]
     assert said.startswith("FR speed sensor no signal, last found in old (2026-10-")
-    assert said.endswith(", no repair recorded, not found by 2 of the 10 missions that close it")
+    assert said.endswith(", no repair recorded, clean in 2 of the 10 missions that it takes to close it")
     page = (tmp_path / "missions/new/report.html").read_text("utf-8")
     assert "Open from earlier missions" in page
     assert said in page

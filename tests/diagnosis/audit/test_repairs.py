@@ -121,14 +121,23 @@ def test_only_missions_count_that_would_have_shown_it(tmp_path: Path, share: flo
     assert ("open, for none of the missions since would have shown it" in page) == (verdict == "stop")
 
 
+def test_a_machine_that_may_go_out_says_what_was_repaired(tmp_path: Path) -> None:
+    stored(tmp_path, course(".x.."))
+    repair(tmp_path, "HX-1 FR sensor", 1.5)
+    (one,) = lists_of(document(tmp_path))  # type: ignore[arg-type]
+    assert one.leave is Leave.MAY
+    said = f"FR speed sensor no signal, repaired {utc_moment(at(1.5))} and not found since"
+    assert one.reason == f"no fault in its last mission; {said}"
+
+
 def test_an_open_fault_is_on_the_page_and_on_the_terminal(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     stored(tmp_path, [*course("..x....x..."), Sample("z", "HX-2")])
     page = build_fleet_page(document(tmp_path))
     assert "Fault open, no repair recorded" in page
-    assert "open, not found by 3 of the 10 missions that close it" in page
+    assert "open, clean in 3 of the 10 missions that it takes to close it" in page
     assert document(tmp_path)["verdict"]["text"][0] == (
         "HX-1 – fault open, no repair recorded: FR speed sensor no signal in 2 of the 11 missions that judged the part, "
-        "not found by 3 of the 10 missions that close it."
+        "clean in 3 of the 10 missions that it takes to close it."
     )
     listed = listed_machines(document(tmp_path))  # type: ignore[arg-type]
     assert [(m.label, m.words) for m in listed] == [("HX-1", "Fault open, no repair recorded"), ("HX-2", "Ready")]

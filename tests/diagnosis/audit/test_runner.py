@@ -10,7 +10,7 @@ from types import SimpleNamespace
 import pytest
 
 from diagnosis.audit import engines
-from diagnosis.audit.discovery.missions import MissionSource
+from diagnosis.audit.discovery.mission_source import MissionSource
 from diagnosis.audit.discovery.staging import Staged
 from diagnosis.audit.endings import Ending, command, exit_code, quoted
 from diagnosis.audit.isolation.limits import Limits

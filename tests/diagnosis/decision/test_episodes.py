@@ -143,3 +143,13 @@ def test_other_pieces_of_unclear_kind_stay_faults(piece: Finding) -> None:
 def test_a_piece_that_may_be_dead_is_not_hidden_in_a_loss() -> None:
     piece = unclear(5000, 6000, stuck=0.45, no_signal=0.3, inefficient=0.25)
     assert len(joined(loss(1000, 5000), piece)) == 2
+
+
+@pytest.mark.parametrize(("expected", "faults"), [(0.05, 1), (0.2, 2)])
+def test_healthy_time_in_which_a_loss_would_not_show_ends_none(expected: float, faults: int) -> None:
+    """A quarter of little is less than the threshold: that a valve was called healthy at rest says nothing of it."""
+    pieces = (loss(1000, 1500), loss(2100, 2600))
+    ((part, one),) = parts(*pieces, between=State.HEALTHY).items()
+    columns = {"expected": np.full(N, expected, np.float32), "threshold": np.full(N, 0.03, np.float32)}
+    found = with_episodes({part: replace(one, columns=columns)}, DT)
+    assert len(found[part].findings) == faults

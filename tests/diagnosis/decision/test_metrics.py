@@ -9,6 +9,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from diagnosis.decision.metrics import body_motion, coverage, driving, loop_metrics, open_states, path_of, phases
+from diagnosis.decision.short import AS_WELL_HEALTHY, main_reason
 from diagnosis.results.assessment import CODE, Assessment, Finding
 from diagnosis.results.result import Hypothesis
 from diagnosis.results.vocabulary import Tier
@@ -129,6 +130,19 @@ def test_the_commonest_open_state_counts_while_driving_alone() -> None:
     one = Assessment(states, reasons, tier=Tier.DIRECT)
     assert open_states({("A", "sensor"): one}, moving, MACHINE) == {("A", "sensor"): State.MASKED}
     assert open_states({("A", "sensor"): one}, moving & False, MACHINE) == {}
+
+
+def test_a_doubtful_finding_is_why_most_of_the_driving_is_open() -> None:
+    states = np.repeat([CODE[s] for s in (State.HEALTHY, State.NOT_ASSESSED, State.STUCK)], [60, 5, 35]).astype(np.int8)
+    rows = (Hypothesis("none", "healthy", 0.6), Hypothesis("actuator", "stuck", 0.4))
+    finding = Finding(65, 100, Side.ACTUATOR, FaultMode.STUCK, 0.4, rows, None, None, (), Tier.MODEL)
+    one = Assessment(states, {State.NOT_ASSESSED: "alike"}, findings=(finding,), tier=Tier.MODEL)
+    moving = np.ones((100, 2), dtype=bool)
+    state = open_states({("A", "actuator"): one}, moving, MACHINE)["A", "actuator"]
+    assert main_reason(one, state) == AS_WELL_HEALTHY
+    sure = replace(finding, hypotheses=(Hypothesis("actuator", "stuck", 0.9), Hypothesis("none", "healthy", 0.1)))
+    state = open_states({("A", "actuator"): replace(one, findings=(sure,))}, moving, MACHINE)["A", "actuator"]
+    assert main_reason(one, state) == "alike"
 
 
 def test_phases_by_the_command() -> None:

@@ -59,6 +59,6 @@ def test_channels_that_the_sentences_name() -> None:
 
 
 def test_sentence_about_the_onset() -> None:
-    found = fault(evidence=["Residual 0.1 m/s.", "The speed dropped by 0.2 m/s at once."])
-    assert shape_sentence(found) == "The speed dropped by 0.2 m/s at once."
-    assert shape_sentence(fault()) == ""
+    texts = ["Residual 0.1 m/s, which jumps.", "The speed dropped by 0.2 m/s at once."]
+    assert shape_sentence(fault(evidence=texts, about=["deviation", "onset"])) == texts[1]
+    assert shape_sentence(fault(evidence=texts)) == ""  # a result of an earlier version does not say

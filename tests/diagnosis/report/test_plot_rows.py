@@ -55,7 +55,7 @@ def test_directly_measured_valve_is_compared_with_its_command() -> None:
 def test_a_drive_that_pulls_nothing_is_shown_by_its_effort_and_the_law_only_beside_a_recorded_command() -> None:
     report, columns = samples.five_faults()
     fault = {**report["intervals"][1], "tier": "response", "kind": "wheel", "component": "FR", "side": "actuator"}
-    fault["evidence"] = ["wheel.FR.effort is next to nothing for 12.2 s."]
+    fault["evidence"], fault["about"] = ["wheel.FR.effort is next to nothing for 12.2 s."], ["effort"]
     size = len(columns["t"])
     logged = {n: c for n, c in columns.items() if not n.endswith((".u", ".u_applied"))}
     logged |= {f"wheel.{w}.effort": np.ones(size) for w in WHEELS} | {"replay.FR.u": np.ones(size)}

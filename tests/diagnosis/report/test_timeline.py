@@ -100,7 +100,17 @@ def test_brief_noise_of_little_severity_is_drawn_and_paints_no_part() -> None:
     report["intervals"][0] |= {"mode": "noisy", "severity": "info", "start_s": 30.0, "stop_s": 30.013}
     lane = timeline(report, 120.0).lanes[0]
     assert lane.state != "noisy"
+    assert lane.faulty == "remark"
     assert [b.slight for b in lane.bars] == [True]
+
+
+def test_a_remark_gives_no_part_the_sign_of_health() -> None:
+    report, _ = samples.one_wheel()
+    report["intervals"] = [report["intervals"][0] | {"severity": "info"}]
+    point = {"reason": "Not judged long enough.", "act": "drive", "parts": [], "fault": "", "why": ""}
+    report["verdict"] |= {"to_clear": [point]}
+    found = timeline(report, 120.0)
+    assert {lane.state for lane in (*found.lanes, *found.quiet)} == {"not_assessed"}
 
 
 def test_bars_that_touch_have_the_whole_height_each() -> None:

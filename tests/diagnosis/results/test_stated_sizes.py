@@ -65,6 +65,17 @@ def test_no_probability_is_shown_of_what_was_not_decided() -> None:
     assert np.isfinite(shown[name]).nonzero()[0].tolist() == [*range(100), *range(400, 600)]
 
 
+def test_between_the_stretches_of_one_fault_no_probability_is_shown() -> None:
+    fault = samples.fault(mode="stuck", start_s=20.0, stop_s=50.0)
+    states = [state("stuck", 20.0, 30.0), state("not_assessed", 30.0, 45.0), state("stuck", 45.0, 50.0)]
+    report = samples.report_with() | {"intervals": [fault], "states": states}
+    name = "evidence.FR.sensor.probability"
+    seen = np.where((T < 30.0) | (T >= 45.0), 0.8, 0.1).astype(np.float32)
+    shown = known_probability(report, T, 0.1, {name: seen})[name]  # type: ignore[arg-type]
+    assert np.isfinite(shown).nonzero()[0].tolist() == [*range(200, 300), *range(450, 500)]
+    np.testing.assert_allclose(shown[np.isfinite(shown)], 0.8)
+
+
 def test_a_fault_that_rests_on_other_evidence_has_its_own_probability() -> None:
     hypotheses = [{"side": "sensor", "mode": "stuck", "p": 0.6}, {"side": "none", "mode": "healthy", "p": 0.4}]
     fault = samples.fault(mode="stuck", start_s=20.0, stop_s=30.0, probability=0.6, hypotheses=hypotheses)

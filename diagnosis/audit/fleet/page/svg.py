@@ -41,13 +41,16 @@ def mark(state: str) -> Markup:
 
 
 def sparkline(trend: TrendRow) -> Markup:
-    """Values of a trend and its limit in little room."""
-    values = np.array([p[2] for p in trend["points"]], dtype=np.float64)
-    values = values[::-1][:: max(1, math.ceil(values.size / _SPARK))][::-1]
+    """Values of a trend and its limit in little room; those whose bounds reach from nothing beyond the limit say nothing, but for the last."""
+    points = np.array([p[2:5] for p in trend["points"]], dtype=np.float64)
+    points = points[::-1][:: max(1, math.ceil(len(points) / _SPARK))][::-1]
+    known = ~((points[:, 1] <= 0.0) & (points[:, 2] >= trend["limit"]))
+    known[-1] = True
+    values = points[known, 0]
     width, height = 96.0, 26.0
     top = max(float(values.max()), trend["limit"], 1e-3)
     low = min(0.0, float(values.min()))
-    x = 2 + (width - 4) * np.arange(values.size) / max(1, values.size - 1)
+    x = 2 + (width - 4) * np.flatnonzero(known) / max(1, known.size - 1)
     y = height - 3 - (height - 6) * (values - low) / (top - low)
     limit = height - 3 - (height - 6) * (trend["limit"] - low) / (top - low)
     d = "L".join(f"{a:.1f} {b:.1f}" for a, b in zip(x, y, strict=True))

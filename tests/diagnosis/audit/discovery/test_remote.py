@@ -15,7 +15,7 @@ from diagnosis.audit.discovery.apart import span_of
 from diagnosis.audit.discovery.discover import discover
 from diagnosis.audit.discovery.inspect_remote import inspect_remotely, logs_at
 from diagnosis.audit.discovery.listing import Entry
-from diagnosis.audit.discovery.missions import MissionSource
+from diagnosis.audit.discovery.mission_source import MissionSource
 from diagnosis.audit.discovery.remote import RemotePlace, file_system
 from diagnosis.audit.discovery.remote_mcap import span_behind
 from diagnosis.audit.discovery.staging import machine_at, stage
@@ -24,8 +24,8 @@ from replay.errors import ConfigError, LogError
 from replay.inspection.inspect_log import inspect_index
 from replay.inspection.mcap_index import mcap_index
 from replay.inspection.report import InspectReport
+from replay.log.content_hash import content_hash
 from replay.log.source_options import SourceOptions
-from replay.mission import content_hash
 from replay.readers.registry import read_log, summarise_log
 from tests.object_store import object_store
 

@@ -10,7 +10,7 @@ import fsspec
 import pytest
 
 from diagnosis.audit import task
-from diagnosis.audit.discovery.missions import MissionSource
+from diagnosis.audit.discovery.mission_source import MissionSource
 from diagnosis.audit.discovery.staging import Late, stage
 from diagnosis.audit.isolation.limits import Limits
 from diagnosis.audit.isolation.run import Isolation, run_isolated

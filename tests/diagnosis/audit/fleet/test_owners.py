@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from diagnosis.audit.discovery.identity import fallback_id
-from diagnosis.audit.discovery.missions import MissionSource
+from diagnosis.audit.discovery.mission_source import MissionSource
 from diagnosis.audit.fleet.leave import lists_of
 from diagnosis.audit.fleet_files import fleet_json, load_fleet
 from diagnosis.audit.store.keys import Key

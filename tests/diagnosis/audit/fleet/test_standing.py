@@ -297,7 +297,8 @@ def test_parts_that_the_last_mission_did_not_assess_are_named(tmp_path: Path) ->
 
 def test_a_file_that_was_left_out_is_no_damage(tmp_path: Path) -> None:
     reason = "plc.csv was left out: its clock could not be compared with a.mcap: nothing in common"
-    d = document(tmp_path, Sample("a", "M1", state="degraded", verdict="watch", reason=reason), Sample("b", "M2"))
+    apart = Sample("a", "M1", state="degraded", verdict="watch", reason=reason, left_out=True)
+    d = document(tmp_path, apart, Sample("b", "M2"))
     standing = {m["id"]: m["standing"] for m in d["machines"]}
     assert standing["M1"] == "No fault found, but a file of its last log was left out"
     assert d["verdict"]["title"] == "1 of 2 machines may go out, 1 must be checked first"

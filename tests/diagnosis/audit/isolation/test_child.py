@@ -215,6 +215,8 @@ def test_a_side_file_that_is_off_costs_itself_alone(mission_log: Path, forks: Is
     assert outcome.summary["result"]["verdict"] == "not_assessed"  # a log with damage is never ready
     report = json.loads((tmp_path / "report" / "report.json").read_bytes())
     assert [file["damage"] for file in report["log"]["files"]] == [[outcome.reason]]
+    assert [file["left_out"] for file in report["log"]["files"]] == [[outcome.reason]]
+    assert outcome.summary["result"]["left_out"] == 1
 
 
 def test_a_side_file_of_other_columns_is_a_note(mission_log: Path, forks: Isolation, tmp_path: Path) -> None:

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from diagnosis.api.audit_request import AuditRequest
-from diagnosis.audit.discovery.missions import MissionSource
+from diagnosis.audit.discovery.mission_source import MissionSource
 from diagnosis.audit.isolation.limits import Limits
 from diagnosis.audit.isolation.run import isolation_for
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from diagnosis.audit.discovery.missions import MissionSource
+from diagnosis.audit.discovery.mission_source import MissionSource
 from diagnosis.audit.fleet.read import content_mark, read_missions, read_run
 from diagnosis.audit.store.keys import Key
 from diagnosis.audit.store.outcome import MissionState, Outcome

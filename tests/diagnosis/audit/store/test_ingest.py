@@ -8,7 +8,7 @@ from typing import Any
 import fsspec
 import pytest
 
-from diagnosis.audit.discovery.missions import MissionSource
+from diagnosis.audit.discovery.mission_source import MissionSource
 from diagnosis.audit.store.ingest import ingest
 from diagnosis.audit.store.keys import Key
 from diagnosis.audit.store.objects import Objects

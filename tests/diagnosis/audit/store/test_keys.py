@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from diagnosis.audit.discovery.identity import fallback_id, given_id, stated_id
-from diagnosis.audit.discovery.missions import MissionSource
+from diagnosis.audit.discovery.mission_source import MissionSource
 from diagnosis.audit.store.keys import Key, config_hash, file_roles, log_hash, unhashed_log
 from replay.log.source_options import SourceOptions
 from replay.machine.config import haulotte

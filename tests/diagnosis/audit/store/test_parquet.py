@@ -8,7 +8,7 @@ import pandas as pd
 import pyarrow.parquet as pq
 import pytest
 
-from diagnosis.audit.discovery.missions import MissionSource
+from diagnosis.audit.discovery.mission_source import MissionSource
 from diagnosis.audit.store.keys import Key
 from diagnosis.audit.store.outcome import Outcome
 from diagnosis.audit.store.parquet import export

@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from diagnosis.audit.discovery.missions import MissionSource
+from diagnosis.audit.discovery.mission_source import MissionSource
 from diagnosis.audit.store.keys import Key
 from diagnosis.audit.store.outcome import Outcome
 from diagnosis.audit.store.store import Store
@@ -28,7 +28,7 @@ ROOT = Path(__file__).resolve().parents[4]
 WRITER = """
 import hashlib, sys
 from pathlib import Path
-from diagnosis.audit.discovery.missions import MissionSource
+from diagnosis.audit.discovery.mission_source import MissionSource
 from diagnosis.audit.store.keys import Key
 from diagnosis.audit.store.outcome import Outcome
 from diagnosis.audit.store.store import Store

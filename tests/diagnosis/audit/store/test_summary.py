@@ -22,6 +22,7 @@ def test_rows_of_a_report(make_report: Callable[..., dict[str, Any]]) -> None:
         "decided_s": 60.0,
         "distance_m": 12.5,
         "open_loop": 0,
+        "left_out": 0,
     }
     (fault,) = rows["faults"]
     assert (fault["epsilon"], fault["sat"], fault["sat_unit"], fault["mode"]) == (0.2, None, None, "inefficient")

@@ -17,7 +17,7 @@ from diagnosis.audit.fleet.page.matrix import matrix
 from diagnosis.audit.fleet.page.page import build_fleet_page
 from diagnosis.audit.fleet.page.rows import symbol
 from diagnosis.audit.fleet.page.shown import address as address_of
-from diagnosis.audit.fleet.page.svg import sprite, trend_picture
+from diagnosis.audit.fleet.page.svg import sparkline, sprite, trend_picture
 from diagnosis.audit.fleet_files import fleet_json, load_fleet
 from tests import fleet_samples as samples
 from tests.fleet_samples import Fault, Sample, bounds
@@ -177,3 +177,16 @@ def test_a_course_names_the_losses_mission_by_mission_and_whether_the_fault_last
     for fault in document["missions"][-1]["faults"]:
         fault["lasting"] = True
     assert "lasts to the end of its log" in build_fleet_page(document)
+
+
+def test_an_estimate_that_says_nothing_is_not_drawn_across_the_limit() -> None:
+    wide, sure, last = [0, 1.0, 0.19, -0.01, 0.39], [1, 2.0, 0.19, 0.15, 0.23], [2, 3.0, 0.0, -0.2, 0.2]
+
+    def heights(*points: list[float]) -> list[float]:
+        drawn = re.search(r'class="sig" d="M([^"]+)"', sparkline({"points": list(points), "limit": 0.1}))  # type: ignore[typeddict-item]
+        assert drawn is not None
+        return [float(p.split()[1]) for p in drawn[1].split("L")]
+
+    assert len(heights(sure, wide, last)) == 2
+    assert len(heights(last, sure, last)) == 2
+    assert len(heights(sure, sure, last)) == 3
