@@ -44,7 +44,7 @@ _TENTH = 0.1 / 60.0  # of m/min [m/s]
 def wheel_law(w: Array, part: Array, ref: float, y: float, oil: float, b: Build) -> None:
     """Command of a wheel's valve: a table that its trim and some of what the oil does correct, a proportional part, a slew over all of it."""
     u = 0.0
-    if abs(ref) >= 0.004 * b.top:
+    if abs(ref) >= 0.012 * b.top:
         line = b.forward * part[TRIM] * ref / b.radius * b.motor / b.flow
         line /= 1.0 + b.knows * b.drift * (oil - 45.0) / 50.0
         line += b.closed * (ref - y) / b.top
