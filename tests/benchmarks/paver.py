@@ -51,7 +51,7 @@ def build(seed: int) -> tuple[Build, Array]:
     made = Build(
         top=top, mass=empty, height=u(0.8, 1.1), cg=u(-0.08, 0.06), radius=radius, lateral=float(rng.choice([0.0, 0.1])), base=u(2.2, 3.4),
         track=u(1.7, 2.3), inertia=u(0.01, 0.03) * empty * radius**2, motor=motor, flow=flow, pressure=pressure, sag=u(0.03, 0.15),
-        margin=u(8.0, 16.0) * 1e5, lock=u(0.9, 1.3) * pressure, pilot=u(15.0, 40.0) * 1e5, opens=u(0.03, 0.08), shuts=u(0.06, 0.2),
+        margin=u(8.0, 16.0) * 1e5, lock=u(0.9, 1.3) * pressure, pilot=u(0.2, 0.4) * pressure, opens=u(0.1, 0.25), shuts=u(0.12, 0.3),
         leakage=u(0.004, 0.012) * flow / pressure, thin=u(0.015, 0.03), friction=u(0.01, 0.03) * motor * pressure, stiction=u(0.3, 0.9),
         cold=cold, hot=u(60.0, 72.0), warming=u(20.0, 50.0), drift=float(rng.choice([-1.0, 1.0])) * u(0.1, 0.18), knows=u(0.0, 0.6),
         spool=u(35.0, 80.0), damping=u(0.6, 0.95), dead=dead, known=u(0.85, 1.02), forward=u(0.95, 1.05),

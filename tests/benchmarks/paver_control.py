@@ -44,7 +44,7 @@ _TENTH = 0.1 / 60.0  # of m/min [m/s]
 def wheel_law(w: Array, part: Array, ref: float, y: float, oil: float, b: Build) -> None:
     """Command of a wheel's valve: a table that its trim and some of what the oil does correct, a proportional part, a slew over all of it."""
     u = 0.0
-    if abs(ref) >= 0.004 * b.top:
+    if abs(ref) >= 0.012 * b.top:
         line = b.forward * part[TRIM] * ref / b.radius * b.motor / b.flow
         line /= 1.0 + b.knows * b.drift * (oil - 45.0) / 50.0
         line += b.closed * (ref - y) / b.top
@@ -60,7 +60,8 @@ def wheel_law(w: Array, part: Array, ref: float, y: float, oil: float, b: Build)
 def steer_law(wrong: float, turning: float, last: float, b: Build) -> float:
     """Command of a steering valve: on or off with a hysteresis, or in proportion beyond its overlap."""
     if b.bang:
-        if abs(wrong) < (1.5 * b.tolerance if last == 0.0 else 0.5 * b.tolerance):
+        band = b.tolerance + 0.04 * b.steer_rate  # what it runs on by
+        if abs(wrong) < (1.5 * band if last == 0.0 else 0.5 * band):
             return 0.0
         return math.copysign(1.0, wrong)
     if abs(wrong) < (b.tolerance if last == 0.0 else b.tolerance / 3) and turning == 0.0:

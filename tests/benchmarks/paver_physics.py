@@ -117,8 +117,8 @@ def motor(w: Array, part: Array, s: Array, b: Build) -> tuple[float, float, floa
         q = full * math.sqrt(x) if fed else 0.0
         g = full / (2.0 * math.sqrt(max(x, 0.02)) * b.margin) if fed and x < 1.0 else 0.0
         if not fed:  # to the tank, behind the spool
-            q, g = -p * b.flow / (0.1 * b.pressure), 0.0
-            p += H * stiff * q / (1.0 + H * stiff * b.flow / (0.1 * b.pressure))
+            q, g = -p * b.flow / (0.4 * b.pressure), 0.0
+            p += H * stiff * q / (1.0 + H * stiff * b.flow / (0.4 * b.pressure))
         else:
             over = max(p - 1.1 * b.pressure, 0.0)
             net = q - sign * b.motor * w[TURN] - leak * p - relief * over
@@ -127,7 +127,8 @@ def motor(w: Array, part: Array, s: Array, b: Build) -> tuple[float, float, floa
         w[port] = max(p, 0.0)
     pilot = w[PORT_A] if way > 0.0 else w[PORT_B] if way < 0.0 else 0.0
     goal = 1.0 - min(pilot / b.pilot, 1.0)
-    w[SHUT] += H / (b.shuts if goal > w[SHUT] else b.opens) * (goal - w[SHUT])
+    lag = 0.01 if way == 0.0 else b.shuts if goal > w[SHUT] else b.opens  # its check valve shuts at once
+    w[SHUT] += H / lag * (goal - w[SHUT])
     return b.motor * (w[PORT_A] - w[PORT_B]), b.motor * b.lock * w[SHUT], taken
 
 
@@ -142,7 +143,7 @@ def supply_of(s: Array, taken: float, b: Build) -> None:
 def tyre(w: Array, part: Array, along: float, across: float, load: float, grip: float, b: Build) -> tuple[float, float]:
     """Forces of a tyre [N], forward and left: deflections that relax with the way rolled, and what grip holds."""
     rim = w[TURN] * part[RADIUS]
-    slip, rolled, end = rim - along, abs(rim) / b.relaxation, 1.5 * b.relaxation
+    slip, rolled, end = rim - along, abs(rim) / b.relaxation, 2.5 * b.relaxation * b.grip / b.stiffness
     w[ZX] = min(max(w[ZX] + H * (slip - rolled * w[ZX]), -end), end)
     w[ZY] = min(max(w[ZY] + H * (-across - rolled * w[ZY]), -end), end)
     kx, ky = w[ZX] / b.relaxation + 0.05 * slip, 0.7 * (w[ZY] / b.relaxation - 0.05 * across)
@@ -157,7 +158,8 @@ def tyre(w: Array, part: Array, along: float, across: float, load: float, grip: 
 def turn_wheel(w: Array, part: Array, torque: float, locked: float, pull: float, load: float, b: Build) -> None:
     """Move a wheel by its motor and what the ground pulls [N], against its lock, dry friction with more at rest, rolling resistance."""
     rub = part[RUB] * b.friction * (1.0 + b.stiction * math.exp(-((w[TURN] / 0.05) ** 2))) + 0.05 * abs(torque)
-    push = torque - pull * part[RADIUS] - 0.4 * b.friction * w[TURN] * b.radius / b.top
+    way = w[TURN] * b.radius / b.top
+    push = torque - pull * part[RADIUS] - (0.4 * b.friction + (0.1 + w[SHUT]) * b.motor * b.pressure) * way
     w[TURN] = dry(w[TURN], H / b.inertia * push, H / b.inertia * (rub + locked + b.roll * load * b.radius))
     w[ROLLED] += H * w[TURN]
 
