@@ -47,7 +47,9 @@ from diagnosis.response.sides import sides_of
 from diagnosis.response.sideways import crossed, goes_sideways
 from diagnosis.response.spells import until_back, where_asked
 from diagnosis.response.states import judge
+from diagnosis.response.together_held import hold_together
 from diagnosis.response.turning import turning_of, turns_other_way, turns_with, unasked_turn, wrong_yaw_rate
+from diagnosis.response.uphill import lower_by_a_load
 from diagnosis.response.witness import denied, witness_of
 from diagnosis.results.assessment import Assessment, Finding, Reason
 from replay.machine.config import Limits
@@ -194,12 +196,24 @@ def assess_response(
     unclear = left_open(late, judged)
     kept = {w: [x for x in spells if not only_a_ramp(x, unclear[w], judged[w], width)] for w, spells in kept.items()}
     late = {w: [f for f in found if f not in unclear[w]] for w, found in late.items()}
+    nobodys = {
+        w: [x for x in spells if lower_by_a_load(x, judged[w]) or hold_together(x, w, judged)]
+        for w, spells in kept.items()
+    }
+    kept = {w: [x for x in spells if x not in nobodys[w]] for w, spells in kept.items()}
     kept = {w: [x for x in spells if not late_neighbour(x, w, late, width)] for w, spells in kept.items()}
     parts = {
         w: sides_of(j, kept[w], (weak[w], late[w]), (left_out[w], together), limits, dt) for w, j in judged.items()
     }
     parts = {
-        w: (doubted(sensor, [slice(f.start, f.stop) for f in unclear[w]]), drive)
+        w: (
+            doubted(
+                sensor,
+                [slice(f.start, f.stop) for f in unclear[w]]
+                + [slice(x.start * width, x.stop * width) for x in nobodys[w]],
+            ),
+            drive,
+        )
         for w, (sensor, drive) in parts.items()
     }
     astray, lasts = otherwise(judged, width * dt, witness.there)

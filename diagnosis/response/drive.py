@@ -48,6 +48,10 @@ _ALONE_P = 0.6  # that a single drive is at fault, not its commands
 _STANDS, _FULL = 0.1, 0.9  # of what the command makes it do
 _PAIR = 2  # wheels, of which each turns the body alone
 _ANSWER_S = 1.0  # within which a drive answers
+_MOST_OF, _STAYS = (
+    (0.1, 0.9),
+    0.3,
+)  # quantiles of a speed and of its command; of the change of the latter, that is none of the former
 _STEADY = 0.25  # spread of a speed that does not follow its command, by its size
 
 
@@ -154,6 +158,8 @@ def unanswered(
         astray = np.count_nonzero(all_off[max(0, start - reach) : stop + reach])
         if astray * block_s >= _ASTRAY_S and astray > _ASTRAY_SHARE * (stop - start):
             continue
+        if others and all(_held(j.wheel.blocks, slice(start, stop)) for j in judged.values()):
+            continue
         much = float(np.sum(off[start:stop][there[start:stop]])) * block_s / top
         held = dragged(slice(start, stop), wheel, judged, 0.0)
         if much < (_DRAGGED if held else _HABIT) * habit * block_s:
@@ -190,6 +196,15 @@ def _proven(one: Judged, apart: Array, around: slice) -> bool:
     outside = one.driving & np.isfinite(apart)
     outside[around] = False
     return bool(np.count_nonzero(outside) >= _LEAST_OUTSIDE and np.quantile(apart[outside], _MOST) < _SHOWN)
+
+
+def _held(blocks: Blocks, part: slice) -> bool:
+    """Whether a speed stays where it is for most of a time in which its command changes: where all do, commands are held, or ignored."""
+    y, told = (x[part][np.isfinite(x[part])] for x in (blocks.mean, 0.5 * (blocks.low + blocks.high)))
+    if not y.size or not told.size:
+        return False
+    (low, high), (least, most) = (np.quantile(x, _MOST_OF) for x in (y, told))
+    return bool(most - least > _FAR * float(np.median(blocks.noise[part])) and high - low < _STAYS * (most - least))
 
 
 def _off(blocks: Blocks) -> Array:
