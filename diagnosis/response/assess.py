@@ -92,6 +92,7 @@ def assess_response(
     limits: Limits,
     dt: float,
     speeds: tuple[BodySpeed, ...] = (),
+    heading: Array | None = None,
 ) -> Judgement:
     """Judge drives by their response.
 
@@ -109,6 +110,8 @@ def assess_response(
         Step [s].
     speeds : tuple[BodySpeed, ...]
         The body's speed by its own sensors, in blocks of `BLOCK_S`.
+    heading : Array or None, shape (b,)
+        Yaw rate by the heading of odometry in such blocks [rad/s].
     """
     if not data:
         return Judgement({}, ())
@@ -239,7 +242,7 @@ def assess_response(
         signless = (_UNDIRECTED.format(name=names[w]),) if j.data.undirected else ()
         parts[w] = replace(sensor, powers=powers, notes=(*sensor.notes, told, *signless, *remarks)), drive
     unsettled = {w: [*kept[w], *(s for s in slips[w] if not wrong_yaw_rate(s, j))] for w, j in judged.items()}
-    gyro = wrong_gyro(judged, unsettled, turning, width * dt)
+    gyro = wrong_gyro(judged, unsettled, turning, width * dt, heading)
     ignored = () if any(j.response.answered for j in judged.values()) else unexplained(drives, limits, dt)
     stood = standstills(idle, dt) or (
         paused([f for side in parts.values() for f in side[0].findings], dt) if len(data) == 1 else ()

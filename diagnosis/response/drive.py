@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.response.beside import same_side
+from diagnosis.response.body_limits import at_body_limit
 from diagnosis.response.ground import dragged
 from diagnosis.response.identification import Response, as_another
 from diagnosis.response.inputs import cells
@@ -147,6 +148,8 @@ def unanswered(
     there &= np.logical_and.reduce([x < _CLOSER * off for x in others]) if others else True
     there &= _off_asked(one, block_s) > _CLOSER * off
     there &= ~_eager(one, blocks)
+    limit = at_body_limit(judged, block_s)
+    there &= True if limit is None else ~limit
     # where all wheels stand the machine stands, and one of them is no worse than the others
     there &= np.nanmax([np.abs(np.nan_to_num(j.wheel.blocks.mean)) for j in judged.values()], axis=0) > _MOVES * top
     # where all of them do something else their commands are ignored, or held, and each may meet its own by chance

@@ -14,6 +14,7 @@ _MOST_CHANGE, _LEAVES, _FINEST = (
     2.5,
     0.02,
 )  # of its largest change; usual deviations of an effort; of its usual size, which those are at least
+_WINDOW, _APART = 8, 6.0  # blocks; standard errors by which means of so many differ, of the many that a span has
 _USUAL = 0.9  # quantile of an effort that is its usual size
 
 
@@ -30,17 +31,28 @@ def unanswered(effort: Array, load: Array, driving: Flags, span: tuple[int, int]
 
 
 def answers(effort: Array, load: Array, span: tuple[int, int]) -> bool:
-    """Whether an effort, small as it is in a span, leaves its own value there when the load changes most: without power it cannot."""
+    """Whether an effort, small as it is in a span, leaves its own value there: without power it cannot.
+
+    It may do so when the load changes most, or for some seconds by more than the noise of its blocks leaves of so many. Both of shape (b,).
+    """
     part = slice(*span)
     own, change = effort[part], np.abs(np.diff(load[part], prepend=load[span[0]]))
     known = np.isfinite(own)
     if not known.any():
         return False
     off = np.abs(own - np.median(own[known]))
-    usual = max(1.4826 * float(np.median(off[known])), _FINEST * float(np.nanquantile(np.abs(effort), _USUAL)))
+    finest = _FINEST * float(np.nanquantile(np.abs(effort), _USUAL))
+    usual = max(1.4826 * float(np.median(off[known])), finest)
     most = change > _MOST_CHANGE * float(change.max())
     about = known & np.convolve(most, np.ones(3), mode="same").astype(bool)
-    return bool(about.any() and float(np.mean(off[about])) > _LEAVES * usual)
+    if about.any() and float(np.mean(off[about])) > _LEAVES * usual:
+        return True
+    sound = own[known]
+    if sound.size < 2 * _WINDOW:
+        return False
+    noise = 1.05 * float(np.median(np.abs(np.diff(sound))))
+    means = np.convolve(sound, np.ones(_WINDOW) / _WINDOW, mode="valid")
+    return bool(np.ptp(means) > max(_APART * noise / np.sqrt(_WINDOW), 2.0 * finest))
 
 
 def _followed(effort: Array, load: Array, use: Flags) -> tuple[float, float]:
