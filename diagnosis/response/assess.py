@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from diagnosis.response.answering import BODY_COMMANDS, MOVES, wheels_of
 from diagnosis.response.beside import Bodies, same_side, turns_by_wheels, views
 from diagnosis.response.body import BodySpeed
+from diagnosis.response.calm_holds import calm_hold, either
 from diagnosis.response.channel import holds_of, samples_of
 from diagnosis.response.common_cause import (
     consequence,
@@ -47,7 +48,6 @@ from diagnosis.response.sides import sides_of
 from diagnosis.response.sideways import crossed, goes_sideways
 from diagnosis.response.spells import until_back, where_asked
 from diagnosis.response.states import judge
-from diagnosis.response.together_held import hold_together
 from diagnosis.response.turning import turning_of, turns_other_way, turns_with, unasked_turn, wrong_yaw_rate
 from diagnosis.response.uphill import lower_by_a_load
 from diagnosis.response.witness import denied, witness_of
@@ -200,7 +200,7 @@ def assess_response(
     kept = {w: [x for x in spells if not only_a_ramp(x, unclear[w], judged[w], width)] for w, spells in kept.items()}
     late = {w: [f for f in found if f not in unclear[w]] for w, found in late.items()}
     nobodys = {
-        w: [x for x in spells if lower_by_a_load(x, judged[w]) or hold_together(x, w, judged)]
+        w: [x for x in spells if lower_by_a_load(x, judged[w]) or calm_hold(x, w, judged, MOVES * limits.driving_speed)]
         for w, spells in kept.items()
     }
     kept = {w: [x for x in spells if x not in nobodys[w]] for w, spells in kept.items()}
@@ -219,6 +219,8 @@ def assess_response(
         )
         for w, (sensor, drive) in parts.items()
     }
+    if len(data) == 1:
+        parts = {w: (either(a, judged[w], MOVES * limits.driving_speed), b) for w, (a, b) in parts.items()}
     astray, lasts = otherwise(judged, width * dt, witness.there)
     remarks = (*astray, *left_notes, *((_TURNED,) if any(turned.values()) else ()))
     doubts = {w: Reason(j.odd) for w, j in judged.items() if j.odd and not any(side.findings for side in parts[w])}
