@@ -14,7 +14,7 @@ _MOST_CHANGE, _LEAVES, _FINEST = (
     2.5,
     0.02,
 )  # of its largest change; usual deviations of an effort; of its usual size, which those are at least
-_WINDOW, _APART = 8, 6.0  # blocks; standard errors by which means of so many differ, of the many that a span has
+_WINDOW, _APART = 8, 7.0  # blocks; standard errors by which means of so many differ, of the many that a span has
 _USUAL = 0.9  # quantile of an effort that is its usual size
 
 
@@ -50,8 +50,9 @@ def answers(effort: Array, load: Array, span: tuple[int, int]) -> bool:
     sound = own[known]
     if sound.size < 2 * _WINDOW:
         return False
-    noise = 1.05 * float(np.median(np.abs(np.diff(sound))))
     means = np.convolve(sound, np.ones(_WINDOW) / _WINDOW, mode="valid")
+    middle = sound[_WINDOW // 2 : _WINDOW // 2 + means.size]
+    noise = float(np.std(middle - means)) / np.sqrt(1.0 - 1.0 / _WINDOW)
     return bool(np.ptp(means) > max(_APART * noise / np.sqrt(_WINDOW), 2.0 * finest))
 
 
