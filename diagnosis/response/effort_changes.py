@@ -21,7 +21,7 @@ _USUAL = 0.9  # quantile of an effort that is its usual size
 def unanswered(effort: Array, load: Array, driving: Flags, span: tuple[int, int]) -> bool:
     """Whether an effort does not follow changes of the load in a span as it does elsewhere.
 
-    At one speed two loops may share the load in any way, and one of them have none of it; a change takes effort from each.
+    At one speed two loops may share the load in any way, and one of them have none of it; a change takes effort from each. Arrays of shape (b,).
     """
     inside = np.zeros(effort.size, bool)
     inside[span[0] : span[1]] = True
