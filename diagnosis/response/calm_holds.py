@@ -115,6 +115,9 @@ def _back(f: Finding, samples: Samples) -> float:
 
 def _calm(blocks: Blocks, part: slice) -> bool:
     """Whether what the command makes of a wheel stays where it is."""
-    told = (0.5 * (blocks.low + blocks.high))[part]
-    top = float(np.nanquantile(np.abs(blocks.mean), 0.95)) if np.isfinite(blocks.mean).any() else 0.0
-    return bool(np.isfinite(told).all() and np.ptp(np.quantile(told, _MOST)) <= _CHANGES * top)
+    low, high = blocks.low[part], blocks.high[part]
+    if not (np.isfinite(low) & np.isfinite(high)).all() or not np.isfinite(blocks.mean).any():
+        return False
+    told = 0.5 * (low + high)
+    top = float(np.nanquantile(np.abs(blocks.mean), 0.95))
+    return bool(np.ptp(np.quantile(told, _MOST)) <= _CHANGES * top)

@@ -203,11 +203,13 @@ def _proven(one: Judged, apart: Array, around: slice) -> bool:
 
 def _held(blocks: Blocks, part: slice) -> bool:
     """Whether a speed stays where it is for most of a time in which its command changes: where all do, commands are held, or ignored."""
-    y, told = (x[part][np.isfinite(x[part])] for x in (blocks.mean, 0.5 * (blocks.low + blocks.high)))
-    if not y.size or not told.size:
+    y, low, high = (x[part] for x in (blocks.mean, blocks.low, blocks.high))
+    known = np.isfinite(y) & np.isfinite(low) & np.isfinite(high)
+    if not known.any():
         return False
-    (low, high), (least, most) = (np.quantile(x, _MOST_OF) for x in (y, told))
-    return bool(most - least > _FAR * float(np.median(blocks.noise[part])) and high - low < _STAYS * (most - least))
+    y, told = y[known], 0.5 * (low[known] + high[known])
+    moved, asked = (float(np.ptp(np.quantile(x, _MOST_OF))) for x in (y, told))
+    return bool(asked > _FAR * float(np.median(blocks.noise[part])) and moved < _STAYS * asked)
 
 
 def _off(blocks: Blocks) -> Array:
