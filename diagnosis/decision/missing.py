@@ -34,7 +34,7 @@ _COSTS = {
     "odom.x": "no speed of the body by odometry to judge the {wheels} by; the path is drawn from GNSS, if at all",
     "odom.y": "no speed of the body by odometry to judge the {wheels} by; the path is drawn from GNSS, if at all",
     "odom.v": "the speed of the body by odometry rests on its positions, where they are logged",
-    "odom.yaw": "no effect on the verdict: it is only shown beside the evidence",
+    "odom.yaw": "a gyro is not held against the turns of odometry, which matters where no {wheel} speeds are logged",
 }
 
 _OF_WHEELS = "little: the commanded speed of every {wheel} is recorded"

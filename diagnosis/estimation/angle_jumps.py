@@ -25,6 +25,7 @@ _BEYOND = 1.5  # times what an axle may turn meanwhile, and noise may add
 _GAP = 1.5  # times the usual time between readings, over which nothing is said
 _FINE_S, _COARSE_S = 0.03, 0.06  # readings further apart than the latter show no jumps
 _MOVING = 0.02  # rad in `_LASTING_S`
+_CARRIED_ON = 0.75  # of a move between readings far apart: as much as the moves before and after it make together is an axle on its way
 
 
 class Jumps(NamedTuple):
@@ -123,6 +124,20 @@ def _jumps(t: Array, y: Array, quickest: float) -> Jumps:
     )  # a reading is at most as old as the time to the one that differs
     may = max(_QUICKER * quickest, _SLOWEST) * lapse + max(_NOISES * noise, _STEPS * step)
     whole = span <= _GAP * (apart + 2) * usual
-    found = np.flatnonzero(whole & (moved > _BEYOND * may))
+    jumps = whole & (moved > _BEYOND * may)
+    if apart == _COARSE_READINGS:
+        jumps &= ~_on_its_way(y)
+    found = np.flatnonzero(jumps)
     size = np.clip(np.maximum(np.abs(before), np.abs(after))[found], LEAST_RAD, LARGEST_RAD)
     return Jumps(moved[found], size, t[found + 1 + (apart + 1) // 2])
+
+
+def _on_its_way(y: Array) -> NDArray[np.bool_]:
+    """Whether each move between two readings, but the first and the last, goes on in those beside it, shape (n - 3,).
+
+    A servo makes its step in two or three readings that are far apart, quicker than it turns for a while; what jumps does so between two.
+    """
+    move = np.diff(y)
+    way = np.sign(move[1:-1])
+    beside = np.maximum(way * move[:-2], 0.0) + np.maximum(way * move[2:], 0.0)
+    return np.asarray(beside > _CARRIED_ON * np.abs(move[1:-1]))

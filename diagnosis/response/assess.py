@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from diagnosis.response.answering import BODY_COMMANDS, MOVES, wheels_of
 from diagnosis.response.beside import Bodies, same_side, turns_by_wheels, views
 from diagnosis.response.body import BodySpeed
+from diagnosis.response.calm_holds import calm_hold, either
 from diagnosis.response.channel import holds_of, samples_of
 from diagnosis.response.common_cause import (
     consequence,
@@ -48,6 +49,7 @@ from diagnosis.response.sideways import crossed, goes_sideways
 from diagnosis.response.spells import until_back, where_asked
 from diagnosis.response.states import judge
 from diagnosis.response.turning import turning_of, turns_other_way, turns_with, unasked_turn, wrong_yaw_rate
+from diagnosis.response.uphill import lower_by_a_load
 from diagnosis.response.witness import denied, witness_of
 from diagnosis.results.assessment import Assessment, Finding, Reason
 from replay.machine.config import Limits
@@ -90,6 +92,7 @@ def assess_response(
     limits: Limits,
     dt: float,
     speeds: tuple[BodySpeed, ...] = (),
+    heading: Array | None = None,
 ) -> Judgement:
     """Judge drives by their response.
 
@@ -107,6 +110,8 @@ def assess_response(
         Step [s].
     speeds : tuple[BodySpeed, ...]
         The body's speed by its own sensors, in blocks of `BLOCK_S`.
+    heading : Array or None, shape (b,)
+        Yaw rate by the heading of odometry in such blocks [rad/s].
     """
     if not data:
         return Judgement({}, ())
@@ -194,14 +199,28 @@ def assess_response(
     unclear = left_open(late, judged)
     kept = {w: [x for x in spells if not only_a_ramp(x, unclear[w], judged[w], width)] for w, spells in kept.items()}
     late = {w: [f for f in found if f not in unclear[w]] for w, found in late.items()}
+    nobodys = {
+        w: [x for x in spells if lower_by_a_load(x, judged[w]) or calm_hold(x, w, judged, MOVES * limits.driving_speed)]
+        for w, spells in kept.items()
+    }
+    kept = {w: [x for x in spells if x not in nobodys[w]] for w, spells in kept.items()}
     kept = {w: [x for x in spells if not late_neighbour(x, w, late, width)] for w, spells in kept.items()}
     parts = {
         w: sides_of(j, kept[w], (weak[w], late[w]), (left_out[w], together), limits, dt) for w, j in judged.items()
     }
     parts = {
-        w: (doubted(sensor, [slice(f.start, f.stop) for f in unclear[w]]), drive)
+        w: (
+            doubted(
+                sensor,
+                [slice(f.start, f.stop) for f in unclear[w]]
+                + [slice(x.start * width, x.stop * width) for x in nobodys[w]],
+            ),
+            drive,
+        )
         for w, (sensor, drive) in parts.items()
     }
+    if len(data) == 1:
+        parts = {w: (either(a, judged[w], MOVES * limits.driving_speed), b) for w, (a, b) in parts.items()}
     astray, lasts = otherwise(judged, width * dt, witness.there)
     remarks = (*astray, *left_notes, *((_TURNED,) if any(turned.values()) else ()))
     doubts = {w: Reason(j.odd) for w, j in judged.items() if j.odd and not any(side.findings for side in parts[w])}
@@ -225,7 +244,7 @@ def assess_response(
         signless = (_UNDIRECTED.format(name=names[w]),) if j.data.undirected else ()
         parts[w] = replace(sensor, powers=powers, notes=(*sensor.notes, told, *signless, *remarks)), drive
     unsettled = {w: [*kept[w], *(s for s in slips[w] if not wrong_yaw_rate(s, j))] for w, j in judged.items()}
-    gyro = wrong_gyro(judged, unsettled, turning, width * dt)
+    gyro = wrong_gyro(judged, unsettled, turning, width * dt, heading)
     ignored = () if any(j.response.answered for j in judged.values()) else unexplained(drives, limits, dt)
     stood = standstills(idle, dt) or (
         paused([f for side in parts.values() for f in side[0].findings], dt) if len(data) == 1 else ()

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.response.beside import same_side
+from diagnosis.response.body_limits import at_body_limit
 from diagnosis.response.ground import dragged
 from diagnosis.response.identification import Response, as_another
 from diagnosis.response.inputs import cells
@@ -48,6 +49,10 @@ _ALONE_P = 0.6  # that a single drive is at fault, not its commands
 _STANDS, _FULL = 0.1, 0.9  # of what the command makes it do
 _PAIR = 2  # wheels, of which each turns the body alone
 _ANSWER_S = 1.0  # within which a drive answers
+_MOST_OF, _STAYS = (
+    (0.1, 0.9),
+    0.3,
+)  # quantiles of a speed and of its command; of the change of the latter, that is none of the former
 _STEADY = 0.25  # spread of a speed that does not follow its command, by its size
 
 
@@ -143,6 +148,8 @@ def unanswered(
     there &= np.logical_and.reduce([x < _CLOSER * off for x in others]) if others else True
     there &= _off_asked(one, block_s) > _CLOSER * off
     there &= ~_eager(one, blocks)
+    limit = at_body_limit(judged, block_s)
+    there &= True if limit is None else ~limit
     # where all wheels stand the machine stands, and one of them is no worse than the others
     there &= np.nanmax([np.abs(np.nan_to_num(j.wheel.blocks.mean)) for j in judged.values()], axis=0) > _MOVES * top
     # where all of them do something else their commands are ignored, or held, and each may meet its own by chance
@@ -153,6 +160,8 @@ def unanswered(
     for start, stop in _spans(there, round(_GAP_S / block_s)):
         astray = np.count_nonzero(all_off[max(0, start - reach) : stop + reach])
         if astray * block_s >= _ASTRAY_S and astray > _ASTRAY_SHARE * (stop - start):
+            continue
+        if others and all(_held(j.wheel.blocks, slice(start, stop)) for j in judged.values()):
             continue
         much = float(np.sum(off[start:stop][there[start:stop]])) * block_s / top
         held = dragged(slice(start, stop), wheel, judged, 0.0)
@@ -190,6 +199,17 @@ def _proven(one: Judged, apart: Array, around: slice) -> bool:
     outside = one.driving & np.isfinite(apart)
     outside[around] = False
     return bool(np.count_nonzero(outside) >= _LEAST_OUTSIDE and np.quantile(apart[outside], _MOST) < _SHOWN)
+
+
+def _held(blocks: Blocks, part: slice) -> bool:
+    """Whether a speed stays where it is for most of a time in which its command changes: where all do, commands are held, or ignored."""
+    y, low, high = (x[part] for x in (blocks.mean, blocks.low, blocks.high))
+    known = np.isfinite(y) & np.isfinite(low) & np.isfinite(high)
+    if not known.any():
+        return False
+    y, told = y[known], 0.5 * (low[known] + high[known])
+    moved, asked = (float(np.ptp(np.quantile(x, _MOST_OF))) for x in (y, told))
+    return bool(asked > _FAR * float(np.median(blocks.noise[part])) and moved < _STAYS * asked)
 
 
 def _off(blocks: Blocks) -> Array:

@@ -11,6 +11,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from diagnosis.response.effort_changes import answers, unanswered
 from diagnosis.response.inputs import FollowerData
 from diagnosis.response.machine import Judged
 from diagnosis.results.assessment import Finding
@@ -26,7 +27,6 @@ _USUAL = 0.75  # quantile that is the usual size: a drive may pull nothing for h
 _PULLS = 0.4  # of the usual effort of the others: from there on something is to be pulled
 _NOTHING, _OWN = 0.06, 0.9  # of that quantile of its own effort: next to nothing
 _NOISE, _MOST = 3.0, 0.12  # standard errors of the mean of a block; of its usual effort, however noisy it is
-_LEAST_PAIRS = 5  # blocks and the next, whose changes are compared
 _BRIEFLY, _BRIEF_BLOCKS = 2.0, 3  # times that much, in so many blocks, ends no run of nothing
 _NO_DRIVE = 1e-3  # of the largest usual effort on the machine: never more is no drive at all
 _OWN_RUNS, _OTHER_RUNS = 4, 2  # runs of next to nothing that may be faults: of the drive in question, and of each other
@@ -145,7 +145,11 @@ def idle_spans(
         long = [(a, b) for a, b, n in r if n * block_s >= _LEAST_S and n >= _LONGER * habit]
         load = np.sum([np.nan_to_num(efforts[o]) for o in sides.get(w, ()) if o in efforts], axis=0)
         grown = [_grown(a, b, silent[w]) for a, b in long]
-        out[w] = [s for s in grown if _unanswered(efforts[w], load, found[w].driving, s)]
+        out[w] = [
+            s
+            for s, (a, b) in zip(grown, long, strict=True)
+            if unanswered(efforts[w], load, found[w].driving, s) and not answers(efforts[w], load, (a, b))
+        ]
     return {
         w: [s for s in spans if not any(_most_of(s, x) for o, others in out.items() if o != w for x in others)]
         for w, spans in out.items()
@@ -195,29 +199,6 @@ def _grown(start: int, stop: int, silent: NDArray[np.bool_]) -> tuple[int, int]:
     """A span with the silent blocks that it touches, whether anybody pulls in them or not."""
     before, behind = np.flatnonzero(~silent[:start]), np.flatnonzero(~silent[stop:])
     return int(before[-1]) + 1 if before.size else 0, stop + int(behind[0]) if behind.size else silent.size
-
-
-def _unanswered(effort: Array, load: Array, driving: NDArray[np.bool_], span: tuple[int, int]) -> bool:
-    """Whether an effort does not follow changes of the load in a span as it does elsewhere.
-
-    At one speed two loops may share the load in any way, and one of them have none of it; a change takes effort from each.
-    """
-    inside = np.zeros(effort.size, bool)
-    inside[span[0] : span[1]] = True
-    here, error = _followed(effort, load, driving & inside)
-    elsewhere, _ = _followed(effort, load, driving & ~inside)
-    return abs(here) + 2.0 * error < abs(elsewhere)
-
-
-def _followed(effort: Array, load: Array, use: NDArray[np.bool_]) -> tuple[float, float]:
-    """Change of an effort by that of the load from block to block, and its standard error [1]; infinite where nothing changes."""
-    pairs = use[1:] & use[:-1] & np.isfinite(np.diff(effort))
-    own, other = np.diff(effort)[pairs], np.diff(load)[pairs]
-    power = float(other @ other)
-    if own.size < _LEAST_PAIRS or power == 0.0:
-        return 0.0, np.inf
-    share = float(own @ other) / power
-    return share, float(np.sqrt(np.sum((own - share * other) ** 2) / (own.size - 1) / power))
 
 
 def _most_of(span: tuple[int, int], other: tuple[int, int]) -> bool:

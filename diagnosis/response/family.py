@@ -9,14 +9,19 @@ from diagnosis.evidence import ACTUATOR, SENSOR, Contribution, MissionView, Part
 from diagnosis.response.assess import assess_response
 from diagnosis.response.body import body_speeds
 from diagnosis.response.by_body import beside_the_body
-from diagnosis.response.inputs import followers
+from diagnosis.response.disputed import doubted
+from diagnosis.response.heading import Contradiction, contradictions, odometry_rate
+from diagnosis.response.inputs import cells, followers
 from diagnosis.response.lone import by_its_channel, not_shared
 from diagnosis.response.models import BLOCK_S
 from diagnosis.response.sides import without_doubles
 from diagnosis.response.tracking import assess_channel, assess_tracking
-from diagnosis.results.assessment import Assessment
-from diagnosis.results.machine_event import not_following, not_shown, other_yaw_rate
+from diagnosis.results.assessment import Assessment, Reason
+from diagnosis.results.machine_event import not_following, not_shown, other_yaw_rate, turns_otherwise
 from diagnosis.results.vocabulary import Tier
+from replay.machine.config import Machine
+
+_TURNS_OTHERWISE = Reason("the gyro contradicts the heading of odometry, which its speed is a part of")
 
 
 class ResponseEvidence:
@@ -31,16 +36,27 @@ class ResponseEvidence:
         dt = mission.timeline.dt
         several = sum(mission.logged(f"wheel.{w}.v") for w in machine.wheels) > 1
         data = {w: d for w, d in followers(mission).items() if several or np.isfinite(d.asked).any()}
-        speeds = body_speeds(mission.timeline, max(1, round(BLOCK_S / dt))) if data else ()
-        judged = assess_response(data, machine.geometry, yaw, machine.limits, dt, speeds)
+        width = max(1, round(BLOCK_S / dt))
+        speeds = body_speeds(mission.timeline, width) if data else ()
+        heading = odometry_rate(mission.timeline, width) if yaw is not None and data else None
+        judged = assess_response(data, machine.geometry, yaw, machine.limits, dt, speeds, heading)
         parts: dict[Part, Assessment] = {}
         for wheel in mission.wheels:
             if wheel in judged.parts:
                 parts[wheel, SENSOR], parts[wheel, ACTUATOR] = judged.parts[wheel]
+        turns: tuple[Contradiction, ...] = ()
+        if yaw is not None and heading is not None and not several:
+            asked = cells(mission.values("cmd.omega"), width) if mission.logged("cmd.omega") else None
+            turns = contradictions(cells(yaw, width), heading, asked, width * dt)
+            spans = [slice(t.start * width, t.stop * width) for t in turns if t.odometry]
+            for (wheel, side), part in list(parts.items()):
+                if spans and side == SENSOR and _is_odometry(machine, wheel):
+                    parts[wheel, side] = doubted(part, spans, _TURNS_OTHERWISE)
         events = (
             *map(not_following, judged.events),
             *map(not_shown, judged.unshown),
             *map(other_yaw_rate, judged.gyro),
+            *(turns_otherwise(t.text) for t in turns),
         )
         return Contribution(parts, events=events)
 
@@ -71,6 +87,12 @@ class TrackingEvidence:
                 both = assess_channel(data.y, dt, limits, data.name, found[wheel])
             parts[wheel, SENSOR], parts[wheel, ACTUATOR] = both
         return Contribution(parts)
+
+
+def _is_odometry(machine: Machine, wheel: str) -> bool:
+    """Whether what stands for a wheel's speed is the odometry's, by where both come from."""
+    one, other = (machine.signals.get(name) for name in (f"wheel.{wheel}.v", "odom.yaw"))
+    return one is not None and other is not None and one.topic == other.topic
 
 
 def _never_moved(mission: MissionView) -> bool:

@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from diagnosis.response.heading import agree
 from diagnosis.response.machine import Judged
 from diagnosis.response.spells import Spell
 from diagnosis.response.turning import Turning, difference, fitted
@@ -46,8 +47,9 @@ def wrong_gyro(
     faults: Mapping[str, Sequence[Spell]],
     turning: Turning | None,
     block_s: float,
+    heading: Array | None = None,
 ) -> tuple[str, ...]:
-    """A sentence for each time in which the gyro alone contradicts the wheels.
+    """A sentence for each time in which the gyro alone contradicts the wheels, and nothing else turns as it says.
 
     Parameters
     ----------
@@ -59,6 +61,8 @@ def wrong_gyro(
         How the body is turned.
     block_s : float
         Length of a block [s].
+    heading : Array or None, shape (b,)
+        Yaw rate by the heading of odometry [rad/s]: where that has what the gyro shows, and the wheels have not, these slip.
     """
     if turning is None or not all(j.response.answered for j in judged.values()):
         return ()
@@ -84,6 +88,8 @@ def wrong_gyro(
         long = (stop - start) * block_s >= _LEAST_S
         if long and np.mean(off[start:stop][shows[start:stop]]) >= _MOST_OF:
             what = _kind(about, slice(start, stop), sound[start:stop], block_s)
+            if heading is not None and agree(turning.yaw - offset, heading, about.made, slice(start, stop)):
+                continue
             if what:
                 out.append(
                     f"From {start * block_s:.1f} to {stop * block_s:.1f} s the gyro (imu.yaw_rate) {what}, by what the rest of the mission shows of the two."

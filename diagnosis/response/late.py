@@ -18,6 +18,7 @@ from diagnosis.response.kernel import posterior
 from diagnosis.response.machine import Judged
 from diagnosis.response.ramps import at_its_limit
 from diagnosis.response.spells import Spell
+from diagnosis.response.uphill import lower_of
 from diagnosis.results.assessment import Finding
 from diagnosis.results.detectability import Deviation, Power
 from diagnosis.results.result import Hypothesis
@@ -192,7 +193,7 @@ def late_neighbour(spell: Spell, wheel: str, late: Mapping[str, Sequence[Finding
 
 
 def left_open(late: Mapping[str, Sequence[Finding]], judged: Mapping[str, Judged]) -> dict[str, list[Finding]]:
-    """Of times in which a speed comes late, those that the ground explains, or no delay beside all that shows the speed.
+    """Of times in which a speed comes late, those that the ground, or a slope, explains, or no delay beside all that shows the speed.
 
     Nothing healthy can be said of them, either.
 
@@ -204,7 +205,14 @@ def left_open(late: Mapping[str, Sequence[Finding]], judged: Mapping[str, Judged
         All wheels.
     """
     return {
-        w: [f for f in found if _by_ground(f, w, judged) or not _explained(f, judged[w]) or at_its_limit(f, judged[w])]
+        w: [
+            f
+            for f in found
+            if _by_ground(f, w, judged)
+            or not _explained(f, judged[w])
+            or at_its_limit(f, judged[w])
+            or _by_a_load(f, judged[w])
+        ]
         for w, found in late.items()
     }
 
@@ -257,6 +265,21 @@ def _explained(found: Finding, one: Judged) -> bool:
     part, block_s = slice(found.start // width, -(-found.stop // width)), width * one.wheel.dt
     each = (scores(one.wheel.blocks.mean, [p], block_s)[part].sum(axis=0) for p in pasts_of(one, block_s))
     return all(score[1:-1].max() >= _EXPLAINS * score[-1] for score in each)
+
+
+def _by_a_load(found: Finding, one: Judged) -> bool:
+    """Whether what a load makes of a drive without a speed loop explains it as well as any delay; see `diagnosis.response.uphill`."""
+    width = int(one.wheel.blocks.start[1])
+    pasts = pasts_of(one, width * one.wheel.dt)
+    if len(pasts) != 1 or not one.response.answered:
+        return False
+    part = slice(found.start // width, -(-found.stop // width))
+    off = lower_of(one.wheel.blocks.mean[part], pasts[0].speed[part])
+    if off is None:
+        return False
+    lower = -_WEIGHT * float(_loss(off / pasts[0].noise[part]).sum())
+    late = scores(one.wheel.blocks.mean, pasts, width * one.wheel.dt)[part, 1:-1].sum(axis=0).max()
+    return bool(lower >= late)
 
 
 def _beside_sound(wheel: str, judged: Mapping[str, Judged]) -> Judged:

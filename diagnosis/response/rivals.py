@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from diagnosis.response.channel import Samples
 from diagnosis.response.inputs import cells
+from diagnosis.response.lasting_noise import quiet_level
 from diagnosis.response.machine import Judged
 from diagnosis.response.models import Beside, Blocks, held_long
 from diagnosis.response.spells import Spell
@@ -55,6 +56,8 @@ def by_each_other(found: Mapping[str, Judged], block_s: float, rest: Mapping[str
             blocks = blocks._replace(
                 usual=np.clip(shares, 0.0, share) * blocks.usual, habitual=max(held[o] for o in others) > _ALSO_HELD
             )
+        elif not rest:
+            blocks = blocks._replace(usual=quiet_level(blocks, j.driving, block_s))
         known = [x for o, x in wild.items() if o != w]
         usual = bool(known) and wild[w] <= _SPIKIER * float(np.median(known))
         out[w] = j._replace(wheel=j.wheel._replace(blocks=blocks, spiky=not usual))

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
+from diagnosis.response.body_limits import at_body_limit
 from diagnosis.response.machine import Judged
 from diagnosis.response.models import Blocks
 from diagnosis.results.assessment import Finding
@@ -62,6 +63,7 @@ def running_on(wheel: str, judged: Mapping[str, Judged], blocks: Blocks | None, 
     away = _astray(blocks, top)
     others = [np.isfinite(j.wheel.blocks.mean) & ~_astray(j.wheel.blocks, top) for w, j in judged.items() if w != wheel]
     asked = 0.5 * (blocks.low + blocks.high)
+    limit = at_body_limit(judged, block_s)
     found: list[tuple[int, int, float]] = []
     for start, stop, speed in _level(y, alive, float(np.median(tolerance)), round(_LEAST_S / block_s)):
         part = slice(start, stop)
@@ -69,6 +71,8 @@ def running_on(wheel: str, judged: Mapping[str, Judged], blocks: Blocks | None, 
         alone = all(float(np.mean(x[part])) > _FOLLOWS for x in others)
         off = int(np.count_nonzero(away[part]))
         if abs(speed) < _TURNS * top or not told.size or not alone:
+            continue
+        if limit is not None and np.mean(limit[part]) > _MOSTLY:
             continue
         if off < max(_AWAY_S / block_s, _MOSTLY * (stop - start)):
             continue

@@ -71,6 +71,13 @@ def other_yaw_rate(text: str) -> MachineEvent:
     return MachineEvent("The gyro contradicts the {wheels}", text, doubt, act)
 
 
+def turns_otherwise(text: str) -> MachineEvent:
+    """Gyro and odometry turn otherwise, and nothing else measures how the machine turns."""
+    doubt = "gyro and odometry contradict each other"
+    act = "turn the machine by a counted number of turns and compare both with them, then check the gyro's axis and unit, and the encoders"
+    return MachineEvent("Gyro and odometry contradict each other", text, doubt, act)
+
+
 def foreign(text: str) -> MachineEvent:
     """Most wheels deviate now and then from a wheel model that does not fit the machine."""
     doubt = "most {wheels} deviate now and then from what the {wheel} model expects"

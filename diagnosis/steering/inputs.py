@@ -21,6 +21,7 @@ Counts = Mapping[str, NDArray[np.int16]]
 _LEAVES = ("phi", "phi_true", "u", "u_applied")
 _NO_NOISE = SensorNoise(1.0, 1.0, 0.0, 0.0)
 _SLOW = 0.1  # of the top speed, from which on commands of the body tell an angle
+_SET_OFF_S = 1.0  # after which they do
 _TOLERANCE = 0.15  # of the smallest saturation term: what two healthy angle sensors may differ by
 
 
@@ -135,13 +136,21 @@ def _replayed(timeline: Timeline, replay: Replay, machine: Machine, axle: int) -
     """What the replayed loop commands, NaN where nothing tells an angle, shape (n,).
 
     An angle that follows from commands of the body is a quotient of both: while these hardly ask for motion it is anything, and machines
-    leave their wheels where they are, or straight.
+    leave their wheels where they are, or straight, and set them only once they move off.
     """
     u, speed = replay.steer_u[:, axle], timeline.get("cmd.v")
     if timeline.get(f"steer.{machine.axles[axle]}.phi_ref") is not None or speed is None:
         return u
     least = max(machine.limits.driving_speed, _SLOW * machine.max_speed)
-    return timeline.map(lambda u, v: np.where(np.abs(v) < least, np.nan, u), u, speed)
+    from scipy.ndimage import minimum_filter1d
+
+    width = max(1, round(_SET_OFF_S / timeline.dt))
+
+    def known(u: Array, v: Array) -> Array:
+        lately = minimum_filter1d(np.nan_to_num(np.abs(v)), width, mode="nearest", origin=(width - 1) // 2)
+        return np.where(lately < least, np.nan, u)
+
+    return timeline.map(known, u, speed)
 
 
 def _length(timeline: Timeline, machine: Machine) -> int:

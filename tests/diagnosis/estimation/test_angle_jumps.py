@@ -107,3 +107,16 @@ def test_readings_that_repeat_now_and_then_show_a_jump() -> None:
     at = np.maximum.accumulate(np.where(late, 0, np.arange(angle.size)))
     jumps = found(np.round(angle[at], 3), np.ones(angle.size, np.bool_), 2 * DT)
     assert {round(t) for t in jumps.at_s} == {34, 46}
+
+
+def test_a_servo_that_makes_its_step_in_few_readings_far_apart_does_not_jump_and_one_reading_does() -> None:
+    coarse = slice(None, None, 5)
+    angle = turned()
+    at = 2_500
+    step = np.interp(np.arange(N) * DT, [at * DT, at * DT + 0.16], [0.0, -0.4])
+    servo = np.where(np.arange(N) < at, 0.2, 0.2 + step) + 5e-4 * np.random.default_rng(3).standard_normal(N)
+    slow = np.where(np.arange(N) > 4_000, angle - angle[4_000] + servo[4_000], servo)[coarse]
+    fresh = np.ones(slow.size, dtype=np.bool_)
+    assert found(slow, fresh, 5 * DT).at_s.size == 0
+    slow[at // 5 :] = slow[at // 5 - 1] - 0.4
+    assert found(slow, fresh, 5 * DT).at_s.size > 0
