@@ -16,7 +16,13 @@ from typing import Any, NamedTuple
 
 import numba
 from numba.core import config
-from numba.core.caching import FunctionCache, IndexDataCacheFile
+from numba.core.caching import (
+    CompileResultCacheImpl,
+    FunctionCache,
+    IndexDataCacheFile,
+    InTreeCacheLocator,
+    UserProvidedCacheLocator,
+)
 
 from replay.progress import compiling_begins
 
@@ -77,6 +83,28 @@ class ShippedCache(FunctionCache):  # type: ignore[misc]
         return None if data is None else self._impl.rebuild(target_context, data)
 
 
+class _AnyLocator(InTreeCacheLocator):  # type: ignore[misc]
+    """The folder that `NUMBA_CACHE_DIR` names, else the one beside the sources, though nothing can be written there."""
+
+    @classmethod
+    def from_function(cls, py_func: Any, py_file: str) -> Any:
+        """Look there; nothing is tried."""
+        return (UserProvidedCacheLocator if config.CACHE_DIR else InTreeCacheLocator)(py_func, py_file)
+
+
+class _ReadImpl(CompileResultCacheImpl):  # type: ignore[misc]
+    _locator_classes = (_AnyLocator,)
+
+
+class ReadOnlyCache(ShippedCache):
+    """The same where no folder of caches can be written, as in a container with a read-only file system: what is compiled is not kept."""
+
+    _impl_class = _ReadImpl
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        """Nothing can be kept."""
+
+
 def shipped_folder(module: str, top: Path | None = None) -> Path:
     """Where a wheel has the compiled kernels of a module: one folder for each package."""
     return (top or SHIPPED) / module.rpartition(".")[0]
@@ -88,5 +116,8 @@ def njit(function: Any = None, *, cache: bool = False, **options: Any) -> Any:
         return lambda inner: njit(inner, cache=cache, **options)
     kernel = numba.njit(**options)(function)
     if cache and not config.DISABLE_JIT:
-        kernel._cache = ShippedCache(kernel.py_func)
+        try:
+            kernel._cache = ShippedCache(kernel.py_func)
+        except RuntimeError:  # numba found no folder that it can write
+            kernel._cache = ReadOnlyCache(kernel.py_func)
     return kernel

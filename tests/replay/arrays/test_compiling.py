@@ -22,6 +22,11 @@ import numpy as np
 from replay.arrays import compiling
 from replay.progress import tell_of_compiling
 compiling.SHIPPED = Path(sys.argv[1])
+if "read only" in sys.argv:
+    from numba.core import caching
+    def fails(self):
+        raise PermissionError("read-only file system")
+    caching._CacheLocator.ensure_cache_path = fails
 told = []
 tell_of_compiling(told.append)
 from replay.readers.mcap.numbers import u16
@@ -34,10 +39,10 @@ pytestmark = pytest.mark.skipif(
 )
 
 
-def read(shipped: Path, **variables: str) -> list[int]:
+def read(shipped: Path, *words: str, **variables: str) -> list[int]:
     """The kernel's value, how often it came out of a cache, how often it was compiled, how often that was told."""
     outer = {k: v for k, v in os.environ.items() if not k.startswith("NUMBA_")}
-    command = [sys.executable, "-c", KERNEL, str(shipped)]
+    command = [sys.executable, "-c", KERNEL, str(shipped), *words]
     done = subprocess.run(
         command, cwd=ROOT, env=outer | variables, stdin=subprocess.DEVNULL, capture_output=True, check=True, text=True
     )
@@ -64,6 +69,15 @@ def test_a_fresh_installation_compiles_nothing_that_the_wheel_brings(shipped: Pa
 def test_without_kernels_of_the_wheel_they_are_compiled_and_kept(tmp_path: Path) -> None:
     assert read(tmp_path / "none", NUMBA_CACHE_DIR=str(tmp_path)) == [0x0302, 0, 1, 1]
     assert read(tmp_path / "none", NUMBA_CACHE_DIR=str(tmp_path)) == [0x0302, 1, 0, 0]
+
+
+def test_where_no_folder_can_be_written_kernels_are_used_and_none_is_kept(shipped: Path, tmp_path: Path) -> None:
+    nowhere, kept = str(tmp_path / "nowhere"), str(tmp_path / "kept")
+    assert read(shipped, "read only", NUMBA_CACHE_DIR=nowhere) == [0x0302, 1, 0, 0]
+    assert read(tmp_path / "none", "read only", NUMBA_CACHE_DIR=nowhere) == [0x0302, 0, 1, 1]
+    assert not Path(nowhere).exists()
+    assert read(tmp_path / "none", NUMBA_CACHE_DIR=kept) == [0x0302, 0, 1, 1]
+    assert read(tmp_path / "none", "read only", NUMBA_CACHE_DIR=kept) == [0x0302, 1, 0, 0]
 
 
 @pytest.mark.parametrize(
