@@ -1,4 +1,4 @@
-"""Collect the kernels that numba compiled for a common kind of processor, as a wheel brings them (`compiling`).
+"""Collect the kernels that numba compiled for a common kind of processor, as a wheel brings them (`shipped_cache`).
 
 `python -m replay.arrays.shipped_kernels CACHE FOLDER`, at the top of the sources: CACHE is the NUMBA_CACHE_DIR of the
 runs that compiled, in an environment with `environment()`; FOLDER becomes the wheel's `replay/compiled`.
@@ -11,7 +11,7 @@ import shutil
 import sys
 from pathlib import Path
 
-from replay.arrays.compiling import KINDS, shipped_folder
+from replay.arrays.shipped_cache import KINDS, shipped_folder
 
 _PACKAGES = ("replay", "diagnosis")
 

@@ -10,7 +10,9 @@ from pathlib import Path
 
 import pytest
 
-from replay.arrays.compiling import KINDS, kind_of_this_machine, njit, shipped_folder
+from replay.arrays import compiling
+from replay.arrays.compiling import njit
+from replay.arrays.shipped_cache import KINDS, kind_of_this_machine, shipped_folder
 from replay.arrays.shipped_kernels import collect, environment
 from replay.progress import Progress, Stage, compiling_begins, tell_of_compiling
 
@@ -19,9 +21,9 @@ KERNEL = """
 import sys
 from pathlib import Path
 import numpy as np
-from replay.arrays import compiling
+from replay.arrays import shipped_cache
 from replay.progress import tell_of_compiling
-compiling.SHIPPED = Path(sys.argv[1])
+shipped_cache.SHIPPED = Path(sys.argv[1])
 if "read only" in sys.argv:
     from numba.core import caching
     def fails(self):
@@ -139,3 +141,14 @@ def test_a_kernel_may_be_decorated_either_way() -> None:
         return x + 2
 
     assert (one(1), two(1)) == (2, 3)
+
+
+def test_with_caches_of_another_numba_kernels_are_compiled_and_kept_as_always(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(compiling, "_cache_of", None)
+
+    @njit(cache=True)
+    def three(x: int) -> int:
+        return x + 3
+
+    assert three(1) == 4
+    assert type(three._cache).__name__ == "FunctionCache"
