@@ -30,7 +30,7 @@ RUN useradd --uid 1000 --create-home mfhca \
  && install -d -o mfhca -g mfhca /data
 # By number, so that a cluster that demands a user without rights can tell
 USER 1000
-# Compile the kernels now, not in the first run; another kind of processor compiles its own
+# The wheel brings the kernels; what it lacks, and what an older kind of processor needs, is compiled now and not in the first run
 RUN mfhca simulate -o /tmp/warm.mcap --duration 20 --rate 100 -q \
  && mfhca diagnose /tmp/warm.mcap -o /tmp/warm -q --fail-on never \
  && rm -r /tmp/warm /tmp/warm.mcap /tmp/warm.truth.json \

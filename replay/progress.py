@@ -31,6 +31,7 @@ class Stage(Enum):
         self.cost = cost
 
     STARTING = ("starting",)
+    COMPILING = ("compiling numerical kernels for this processor, once after an installation: up to a minute",)
     LOOKING_FOR_LOGS = ("looking for logs",)
     LOOKING_FOR_MISSIONS = ("looking for missions",)
 
@@ -100,3 +101,19 @@ Subscriber = Callable[[Progress], None]
 
 def silent(progress: Progress) -> None:
     """Subscriber that shows nothing."""
+
+
+_to_tell: list[Subscriber] = []
+
+
+def tell_of_compiling(subscriber: Subscriber = silent) -> None:
+    """Have one subscriber told, once, when the first kernel must be compiled before it runs; replaces the former one."""
+    _to_tell[:] = [subscriber]
+
+
+def compiling_begins() -> None:
+    """Tell whoever wants to know that a kernel is compiled now."""
+    told = _to_tell[:]
+    _to_tell.clear()
+    for subscriber in told:
+        subscriber(Progress(Stage.COMPILING))

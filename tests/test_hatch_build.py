@@ -73,7 +73,74 @@ def test_what_an_installation_runs_ends_well(
     assert (tmp_path / "own" / "report.json").is_file()
 
 
-def test_wheels_for_others_compile_nothing(hook_module: ModuleType, monkeypatch: pytest.MonkeyPatch) -> None:
+def _build(module: ModuleType, version: str, target: str = "wheel") -> tuple[dict[str, Any], list[str]]:
+    told, data = _Told(), {"force_include": {}}
+    hook = module.KernelHook(str(ROOT), {}, None, None, "", target, told)
+    hook.initialize(version, data)
+    hook.finalize("standard", data, "")  # what it compiled into goes
+    assert not any(Path(source).parent.exists() for source in data["force_include"])
+    return data, told.lines
+
+
+def test_a_wheel_brings_kernels_of_a_common_kind_of_processor(
+    hook_module: ModuleType, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    runs: list[tuple[list[str], dict[str, str] | None]] = []
+
+    def runs_well(command: list[str], **options: Any) -> subprocess.CompletedProcess[bytes]:
+        runs.append((command, options["env"]))
+        assert options["cwd"] == str(ROOT)
+        answer = b"NUMBA_CACHE_DIR=/cache\nNUMBA_CPU_NAME=common\nNUMBA_CPU_FEATURES=\n" if "-c" in command else b""
+        return subprocess.CompletedProcess(command, 0, answer)
+
+    monkeypatch.setenv("NUMBA_OPT", "0")
+    monkeypatch.setattr(subprocess, "run", runs_well)
+    data, told = _build(hook_module, "standard")
+    (source,) = data["force_include"]
+    assert data["force_include"][source] == "replay/compiled"
+    assert len(told) == 1
+    ours = [(command[4], environment) for command, environment in runs if "cli.main" in command]
+    assert [name for name, _ in ours] == ["simulate", "diagnose"] * len(hook_module._LOGS)
+    for _, environment in ours:
+        assert environment is not None
+        assert environment["NUMBA_CPU_NAME"] == "common"
+        assert "NUMBA_OPT" not in environment
+    assert runs[-1][0][1:3] == ["-m", "replay.arrays.shipped_kernels"]
+    assert runs[-1][0][4] == source
+
+
+@pytest.mark.parametrize(("version", "target"), [("editable", "wheel"), ("standard", "sdist")])
+def test_nothing_but_a_wheel_brings_kernels(
+    hook_module: ModuleType, monkeypatch: pytest.MonkeyPatch, version: str, target: str
+) -> None:
+    monkeypatch.setattr(subprocess, "run", lambda *_, **__: pytest.fail("compiled"))
+    assert _build(hook_module, version, target) == ({"force_include": {}}, [])
+
+
+def test_compiling_can_be_turned_off(hook_module: ModuleType, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("MFHCA_KERNELS", "0")
+    monkeypatch.setattr(subprocess, "run", lambda *_, **__: pytest.fail("compiled"))
+    assert _build(hook_module, "standard") == ({"force_include": {}}, [])
+    assert _finish(hook_module, ROOT, "editable") == []
+    assert hook_module.KernelHook(str(ROOT), {}, None, None, "", "wheel", _Told()).dependencies() == []
+
+
+@pytest.mark.parametrize("answer", [b"", None], ids=["a processor of no known kind", "packages are not there"])
+def test_a_wheel_that_cannot_be_compiled_is_made_all_the_same(
+    hook_module: ModuleType, monkeypatch: pytest.MonkeyPatch, answer: bytes | None
+) -> None:
+    def runs(command: list[str], **_: object) -> subprocess.CompletedProcess[bytes]:
+        if answer is None:
+            raise subprocess.CalledProcessError(1, command)
+        return subprocess.CompletedProcess(command, 0, answer)
+
+    monkeypatch.setattr(subprocess, "run", runs)
+    data, told = _build(hook_module, "standard")
+    assert data == {"force_include": {}}
+    assert told[-1] == "not compiled now; the first diagnosis does it"
+
+
+def test_wheels_compile_nothing_once_they_are_made(hook_module: ModuleType, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(subprocess, "run", lambda *_, **__: pytest.fail("compiled"))
     assert _finish(hook_module, ROOT, "standard") == []
 

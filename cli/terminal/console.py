@@ -13,7 +13,7 @@ from typing import IO, TYPE_CHECKING
 
 from cli.terminal.interrupts import check
 from cli.terminal.streams import clean, console_of
-from replay.progress import Progress, Stage, Subscriber, silent
+from replay.progress import Progress, Stage, Subscriber, silent, tell_of_compiling
 
 if TYPE_CHECKING:
     from rich.console import Console, RenderableType
@@ -114,6 +114,7 @@ def _begun(subscriber: Subscriber, first: Progress) -> Subscriber:
         subscriber(progress)
 
     subscriber(first)
+    tell_of_compiling(subscriber)
     return checked
 
 

@@ -12,9 +12,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from replay.arrays.compiling import njit
 from replay.arrays.copying import put, put_rows
 
 Array = NDArray[np.float64]

@@ -5,11 +5,11 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from diagnosis.channels.habit import Habit
 from diagnosis.channels.sample_status import PAIR, SKIP
+from replay.arrays.compiling import njit
 from replay.arrays.numeric import bridged
 
 Array = NDArray[np.float64]

@@ -11,11 +11,11 @@ from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from diagnosis.channels.noise import shifted
 from diagnosis.channels.scale import scale_of
+from replay.arrays.compiling import njit
 from replay.arrays.numeric import bridged
 
 Array = NDArray[np.float64]

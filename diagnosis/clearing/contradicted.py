@@ -38,7 +38,7 @@ def without_contradicted(assessments: Mapping[Part, Assessment], cells: Cells) -
         return dict(assessments)
     opening = cells.wheels("u_applied")
     used = np.where(np.isfinite(opening), opening, cells.wheels("u"))
-    responses = responses_of(cells, cells.wheels("v"), used, cells.reference)
+    responses = responses_of(cells, cells.wheels("v"), used, cells.reference, over_time=False)
     if not openings_tell(cells, responses):
         return dict(assessments)
     below = np.fmin(responses.windows, responses.beside)

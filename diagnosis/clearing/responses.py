@@ -86,11 +86,13 @@ class Responses(NamedTuple):
     grown: list[float | None]
 
 
-def responses_of(cells: Cells, speed: Array, opening: Array, reference: Array, moving: float = MOVING) -> Responses:
+def responses_of(
+    cells: Cells, speed: Array, opening: Array, reference: Array, moving: float = MOVING, *, over_time: bool = True
+) -> Responses:
     """Speed per opening beside the other wheels', arrays (cells, wheels).
 
     Only where a command (without one: the wheel) has settled beyond `moving` [m/s, for a machine of `USUAL_TOP`]; forward and reverse
-    have usual ones of their own.
+    have usual ones of their own. Without `over_time` it is not asked how they change in the mission: `changes` and `grown` are None.
     """
     frame = cells.frame
     scale = cells.machine.max_speed / USUAL_TOP
@@ -128,8 +130,9 @@ def responses_of(cells: Cells, speed: Array, opening: Array, reference: Array, m
                     usual.append(middle)
                     ways[-1] = middle
         ways_apart = [ahead[:, i], ~ahead[:, i]]
-        changes.append(largest_change(own, ways_apart) if usual else None)
-        grown.append(growth(own, ways_apart) if usual else None)
+        asked = over_time and bool(usual)
+        changes.append(largest_change(own, ways_apart) if asked else None)
+        grown.append(growth(own, ways_apart) if asked else None)
         lasting.append(
             Usual(max(0.0, -min(usual)), max(0.0, *usual), min(usual), max(usual), (ways[0], ways[1]))
             if usual

@@ -69,7 +69,8 @@ def fault_of_wheel(check: Checked, cells: Cells, *, alone: bool) -> Finding | No
         Whether it is the only one that deviates so far; else it is the only one that does not follow its command.
     """
     speed, command, opening = (cells.wheels(leaf) for leaf in ("v", "u", "u_applied"))
-    responses = responses_of(cells, speed, np.where(np.isfinite(opening), opening, command), cells.reference)
+    used = np.where(np.isfinite(opening), opening, command)
+    responses = responses_of(cells, speed, used, cells.reference, over_time=False)
     beside = responses.beside[:, cells.machine.wheels.index(check.component)]
     lost, gained = (float(np.nansum(np.maximum(x - check.limit, 0.0))) for x in (-beside, beside))
     below = lost >= gained

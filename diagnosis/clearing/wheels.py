@@ -56,7 +56,7 @@ def wheel_checks(cells: Cells, clear_at: float) -> Iterator[Checked]:
     responses = responses_of(cells, speed, used, reference)
     tells = openings_tell(cells, responses)
     windows, lasting = responses.windows, responses.usual
-    slow = responses_of(cells, speed, used, reference, CREEPING * USUAL_TOP).windows
+    slow = responses_of(cells, speed, used, reference, CREEPING * USUAL_TOP, over_time=False).windows
     slow[np.isfinite(windows)] = np.nan
     limits = response_limits(responses, twice, clear_at, cells.carried_shares)
     tracking, rough = _tracking(cells, speed, reference), _rough_beside_others(roughness_of(cells, speed, reference))

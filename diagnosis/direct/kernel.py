@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from diagnosis.channels.sample_status import CLEAR, PAIR, SKIP
+from replay.arrays.compiling import njit
 
 _SIGMAS = 3.0
 _SAME = 0.6

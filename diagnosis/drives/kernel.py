@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from diagnosis.channels.sample_status import BLIND, SILENT, SKIP
 from diagnosis.drives.models import EPSILON, HALF_STEP, ROW
 from diagnosis.estimation.fault_models import NO_SIGNAL, NOISY, STUCK
+from replay.arrays.compiling import njit
 
 _TAIL_SHARE, _TAIL_SIZE = 0.01, 3.0
 _WITHIN_NOISY = 4.0  # cost of another bias or power within the noisy row

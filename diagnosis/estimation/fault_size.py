@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from diagnosis.estimation import fault_models
 from diagnosis.results.result import Epsilon, Sat
+from replay.arrays.compiling import njit
 
 Array = NDArray[np.float64]
 

@@ -9,7 +9,6 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from diagnosis.channels.sample_status import BLIND, SILENT, SKIP
@@ -29,6 +28,7 @@ from diagnosis.estimation.fault_models import (
 )
 from diagnosis.estimation.samples import Samples
 from diagnosis.results.fault_rows import ROWS
+from replay.arrays.compiling import njit
 
 Array = NDArray[np.float64]
 

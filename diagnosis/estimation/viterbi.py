@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from diagnosis.channels.sample_status import CLEAR, SKIP
@@ -22,6 +21,7 @@ from diagnosis.estimation.samples import Samples
 from diagnosis.results.fault_rows import ROWS
 from replay.arrays.blocks import release
 from replay.arrays.column_store import ColumnStore
+from replay.arrays.compiling import njit
 
 Array = NDArray[np.float64]
 

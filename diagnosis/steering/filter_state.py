@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from diagnosis.steering.model_bank import ACTUATOR, SENSOR
+from replay.arrays.compiling import njit
 
 Array = NDArray[np.float64]
 

@@ -8,7 +8,6 @@ from __future__ import annotations
 from math import lgamma, log, pi
 
 import numpy as np
-from numba import njit
 
 from diagnosis.steering.filter_constants import AxleConstants, SensorConstants
 from diagnosis.steering.filter_state import Array, Block, FilterBank, RedundantBlock
@@ -22,6 +21,7 @@ from diagnosis.steering.model_bank import (
     STATES,
     STUCK,
 )
+from replay.arrays.compiling import njit
 
 _OUTLIER = -18.0
 _LOST_S = 0.03  # how long an axle may turn unseen

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from diagnosis.channels.sample_status import SKIP
@@ -30,6 +29,7 @@ from diagnosis.steering.model_bank import (
     STUCK,
 )
 from diagnosis.steering.step_kernel import advance, enter
+from replay.arrays.compiling import njit
 from replay.arrays.copying import put, put_rows
 from replay.arrays.numeric import uncounted
 

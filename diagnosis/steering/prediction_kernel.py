@@ -9,7 +9,6 @@ from __future__ import annotations
 from math import exp
 
 import numpy as np
-from numba import njit
 
 from diagnosis.steering.filter_constants import AxleConstants
 from diagnosis.steering.filter_state import Array, Block, FilterBank
@@ -25,6 +24,7 @@ from diagnosis.steering.model_bank import (
     STUCK,
 )
 from diagnosis.steering.valve_map import expected_rate
+from replay.arrays.compiling import njit
 
 _CROSSING = 0.1  # of the gap that a model crosses: its standard deviation
 

@@ -15,8 +15,6 @@ from __future__ import annotations
 
 from math import isnan
 
-from numba import njit
-
 from diagnosis.channels.sample_status import PAIR, SILENT
 from diagnosis.steering.filter_constants import FilterConstants
 from diagnosis.steering.filter_state import Array, Block, FilterBank, RedundantBlock, resting
@@ -33,6 +31,7 @@ from diagnosis.steering.model_bank import (
     STUCK,
 )
 from diagnosis.steering.prediction_kernel import predict
+from replay.arrays.compiling import njit
 
 _SILENT_COST = -6.0
 

@@ -6,8 +6,9 @@ from math import erf, exp, pi, sqrt
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from replay.arrays.compiling import njit
 
 Array = NDArray[np.float64]
 

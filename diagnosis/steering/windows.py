@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from diagnosis.steering.blocks import WHITE_DOF, SensorNoise, SteeringBlocks, window_means
 from diagnosis.steering.valve_map import ValveMap, rate_at
+from replay.arrays.compiling import njit
 
 Array = NDArray[np.float64]
 

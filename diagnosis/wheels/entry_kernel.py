@@ -7,7 +7,6 @@ from __future__ import annotations
 
 # ruff: noqa: SIM109 (compiled: a tuple of constants costs a search)
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from diagnosis.wheels.models import (
@@ -24,6 +23,7 @@ from diagnosis.wheels.models import (
     S_STUCK,
     WheelConstants,
 )
+from replay.arrays.compiling import njit
 
 Array = NDArray[np.float64]
 

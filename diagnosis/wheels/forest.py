@@ -12,9 +12,9 @@ from io import BytesIO
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from replay.arrays.compiling import njit
 from replay.arrays.numeric import uncounted
 
 Array = NDArray[np.float64]

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 # ruff: noqa: SIM109 (compiled: a tuple of constants costs a search)
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from diagnosis.channels.sample_status import SKIP
@@ -33,6 +32,7 @@ from diagnosis.wheels.joint_types import (
 from diagnosis.wheels.models import A_NONE, HEALTHY, ODD, S_NONE, S_OU_LARGE, S_WHITE_3, WheelConstants
 from diagnosis.wheels.shared_kernel import LEAST_DOUBT, constants_of, feed, lagged, rolls_at, see, weights, with_sensors
 from diagnosis.wheels.step_kernel import WheelInput, advance
+from replay.arrays.compiling import njit
 from replay.arrays.numeric import uncounted
 
 Array = NDArray[np.float64]

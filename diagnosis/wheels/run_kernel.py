@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from diagnosis.wheels.blocks import WheelBlocks
@@ -23,6 +22,7 @@ from diagnosis.wheels.joint_types import (
 from diagnosis.wheels.models import HEALTHY, MODELS, JointModel, WheelConstants
 from diagnosis.wheels.runs import Runs
 from diagnosis.wheels.step_kernel import WheelInput, advance, predict
+from replay.arrays.compiling import njit
 from replay.arrays.copying import put, put_rows
 from replay.arrays.numeric import uncounted
 

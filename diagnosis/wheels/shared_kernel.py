@@ -4,7 +4,6 @@ from __future__ import annotations
 
 # ruff: noqa: SIM109 (compiled: a tuple of constants costs a search)
 import numpy as np
-from numba import njit
 from numba.np.unsafe.ndarray import to_fixed_tuple
 from numpy.typing import NDArray
 
@@ -23,6 +22,7 @@ from diagnosis.wheels.joint_types import (
     JointWork,
 )
 from diagnosis.wheels.models import A_BIAS, A_GAIN, A_NONE, A_STUCK, HEALTHY, ODD, S_GAIN, WheelConstants
+from replay.arrays.compiling import njit
 
 Array = NDArray[np.float64]
 

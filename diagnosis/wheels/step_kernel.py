@@ -10,7 +10,6 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from diagnosis.channels.sample_status import PAIR, SILENT
@@ -34,6 +33,7 @@ from diagnosis.wheels.models import (
     S_WHITE_24,
     WheelConstants,
 )
+from replay.arrays.compiling import njit
 
 Array = NDArray[np.float64]
 

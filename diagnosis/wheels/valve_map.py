@@ -7,9 +7,9 @@ play of the spool before it (Prandtl–Ishlinskii with one operator).
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from replay.arrays.compiling import njit
 from replay.arrays.copying import put
 from replay.arrays.numeric import without_nan
 from replay.machine.config import WheelPlant

@@ -8,8 +8,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from numba import njit
 from numpy.typing import NDArray
+
+from replay.arrays.compiling import njit
 
 
 @njit(no_cpython_wrapper=True, no_cfunc_wrapper=True, _nrt=False)

@@ -10,11 +10,11 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from replay.arrays.blocks import blocks, release
 from replay.arrays.column_store import ColumnStore
+from replay.arrays.compiling import njit
 
 FULL_STEPS = 1 << 20
 _BUCKETS = 1 << 18

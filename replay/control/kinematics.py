@@ -11,9 +11,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from replay.arrays.compiling import njit
 from replay.machine.config import PhiDot
 from replay.machine.geometry import Geometry, own_axle
 

@@ -13,9 +13,9 @@ with ρ = β + |v_c| + |v| + ξ. The readings of L15 differ in the signs; see `L
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from replay.arrays.compiling import njit
 from replay.arrays.numeric import without_nan
 
 Array = NDArray[np.float64]

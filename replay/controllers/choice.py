@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 
+from replay.arrays.compiling import njit
 from replay.controllers.adaptive import ADAPTIVE_STATES, AdaptiveGains, adaptive_step
 from replay.controllers.finite_time import FINITE_TIME_STATES, FiniteTimeGains, finite_time_step
 from replay.controllers.fuzzy import FUZZY_STATES, FuzzyGains, fuzzy_step

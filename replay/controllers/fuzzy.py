@@ -16,8 +16,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from replay.arrays.compiling import njit
 from replay.controllers.limits import F, clipped, winds_up
 
 

@@ -14,8 +14,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from replay.arrays.compiling import njit
 from replay.controllers.limits import F, clipped
 
 #: Readings of L15 (14) by their code in compiled loops.

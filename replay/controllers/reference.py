@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from numba import njit
-
+from replay.arrays.compiling import njit
 from replay.controllers.limits import F, clipped, winds_up
 
 

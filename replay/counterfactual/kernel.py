@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from replay.arrays.compiling import njit
 from replay.controllers.choice import ControllerGains, command
 from replay.counterfactual.world import CoupledPlant, F, Flags
 

@@ -12,11 +12,11 @@ from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from replay.arrays.blocks import blocks, release
 from replay.arrays.column_store import ColumnStore
+from replay.arrays.compiling import njit
 from replay.errors import LogError
 from replay.signals.signal import Signal, Signals
 

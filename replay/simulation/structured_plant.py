@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from replay.arrays.compiling import njit
 from replay.arrays.copying import put
 from replay.controllers.choice import command as controlled
 from replay.simulation.plant import _faulted, _friction, _law, _quantised, _references, _reset_at_jumps

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from replay.arrays.compiling import njit
 from replay.simulation.state import PlantModel
 from replay.simulation.structured_state import COUNTING, SAMPLED, TACHO, StructureModel, StructureState
 

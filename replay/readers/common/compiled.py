@@ -11,8 +11,9 @@ from collections.abc import Callable
 from typing import Any, TypeVar
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from replay.arrays.compiling import njit
 
 _F = TypeVar("_F", bound=Callable[..., Any])
 

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from replay.arrays.compiling import njit
 from replay.readers.mcap.format import CHANNEL, MESSAGE, MESSAGE_HEAD, SCHEMA
 from replay.readers.mcap.numbers import u16, u32, u64
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from replay.arrays.compiling import njit
 
 # The indexes below are unsigned, so that none is checked for counting from the end, and a number becomes one load.
 

@@ -9,9 +9,9 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from replay.arrays.compiling import njit
 from replay.readers.common.compiled import part
 from replay.readers.messages.cdr_rows import FREE, FixedLayout, Ints, OpenTable, Payloads
 

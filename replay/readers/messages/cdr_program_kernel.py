@@ -9,8 +9,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from replay.arrays.compiling import njit
 from replay.readers.common.compiled import part, routine
 from replay.readers.messages.cdr_kernel import turn2, turn4, turn8
 from replay.readers.messages.cdr_layout import MAX_ELEMENTS

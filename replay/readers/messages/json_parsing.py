@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 import orjson
-from numba import njit
 from numpy.typing import NDArray
 
+from replay.arrays.compiling import njit
 from replay.arrays.copying import put
 from replay.readers.common.compiled import plain
 from replay.readers.messages.cdr import Outcome

@@ -9,8 +9,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from replay.arrays.compiling import njit
 from replay.readers.common.compiled import part
 from replay.readers.messages.protobuf_places import (
     BEYOND,

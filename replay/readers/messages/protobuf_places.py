@@ -10,9 +10,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from replay.arrays.compiling import njit
 from replay.readers.common.compiled import part, routine
 from replay.readers.messages.protobuf_schema import Tables
 

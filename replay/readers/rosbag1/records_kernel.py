@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from replay.arrays.compiling import njit
 from replay.readers.common.compiled import plain
 
 MESSAGE, HEADER, INDEX, CHUNK, INFO, CONNECTION = 2, 3, 4, 5, 6, 7

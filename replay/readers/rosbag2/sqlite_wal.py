@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import IO
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from replay.arrays.compiling import njit
 from replay.log.reading_notes import Report
 from replay.readers.common.compiled import plain
 from replay.readers.common.room import NoRoom

@@ -12,9 +12,11 @@ from typing import Any
 
 import numpy as np
 from llvmlite import ir  # type: ignore[import-untyped]
-from numba import njit, types
+from numba import types
 from numba.extending import intrinsic
 from numpy.typing import NDArray
+
+from replay.arrays.compiling import njit
 
 BAD, INTEGER, FLOAT, HARD = 0, 1, 2, 3
 

@@ -12,11 +12,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from replay.arrays.blocks import blocks
 from replay.arrays.column_store import ColumnStore
+from replay.arrays.compiling import njit
 from replay.errors import LogError
 from replay.log.raw_log import Channel, Clock, LogSummary, RawLog, TopicInfo, Window
 from replay.log.reading_notes import Report

@@ -94,11 +94,11 @@ def other_columns(raw: bytes, source: random.Random) -> tuple[bytes, str]:
         values = values if values.dtype.kind in "fiu" else np.arange(len(values))
         count = len(values)
         with np.errstate(all="ignore"):
-            halved, tiny = values.astype(np.float16), values.astype(np.int8)
+            halved, tiny, nothing = values.astype(np.float16), values.astype(np.int8), values * 0
         odd = (
             pa.array(["x"] * count), pa.nulls(count), pa.array([None if i % 3 else float(i) for i in range(count)]), pa.array([[1.0]] * count),
             pa.array([{"a": 1.0}] * count), pa.array([True] * count), pa.array([2**63 + 5] * count, pa.uint64()), pa.array(np.arange(count), pa.timestamp("ns")),
-            pa.array(values[::-1]), pa.array(values * 0), pa.array(np.full(count, source.choice((np.nan, np.inf, 1e300, -1.0)))), pa.array(halved),
+            pa.array(values[::-1]), pa.array(nothing), pa.array(np.full(count, source.choice((np.nan, np.inf, 1e300, -1.0)))), pa.array(halved),
             pa.array([b"x"] * count), pa.array(tiny), pa.array(np.full(count, 1, np.int64)).cast(pa.decimal128(19)),
         )  # fmt: skip
         way = source.random()

@@ -1,0 +1,117 @@
+"""Caches of kernels: a wheel brings them compiled, for any processor of its kind.
+
+numba keeps what it compiled for one processor, beside the sources or in the user's folder of caches, and finds nothing
+there after an installation: a first diagnosis took eleven times the processor time of the next, nearly all of it
+compiling. A wheel that was built with numba at hand has the kernels of a diagnosis in `replay/compiled`, made for a
+common kind of processor (`shipped_kernels`). They are used where this machine's processor can run them, Python and
+numba are those that made them, and the sources are the same; else they are not there, and numba compiles as always.
+"""
+
+from __future__ import annotations
+
+import platform
+from functools import cache
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from numba.core import config
+from numba.core.caching import (
+    CompileResultCacheImpl,
+    FunctionCache,
+    IndexDataCacheFile,
+    InTreeCacheLocator,
+    UserProvidedCacheLocator,
+)
+
+from replay.progress import compiling_begins
+
+SHIPPED = Path(__file__).parents[1] / "compiled"
+
+
+class Kind(NamedTuple):
+    """A common kind of processor: its name to the compiler, and what one must have to run what was made for it."""
+
+    name: str
+    needs: frozenset[str]
+
+
+KINDS = {
+    "x86_64": Kind(
+        "x86-64-v3",
+        frozenset(
+            ["avx", "avx2", "bmi", "bmi2", "cx16", "f16c", "fma", "lzcnt", "movbe", "popcnt", "sahf", "sse4.2", "xsave"]
+        ),
+    ),
+    "aarch64": Kind("generic", frozenset()),
+}
+
+_OTHERWISE = ("BOUNDSCHECK", "DEBUG", "DEBUGINFO_DEFAULT", "CPU_NAME", "CPU_FEATURES", "DISABLE_JIT")  # asked of numba
+
+
+@cache
+def kind_of_this_machine() -> Kind | None:
+    """The common kind of processor whose kernels this machine runs; None where there is none, or numba is told otherwise."""
+    from llvmlite import binding  # type: ignore[import-untyped]
+
+    kind = KINDS.get(platform.machine())
+    if kind is None or any(getattr(config, option, None) for option in _OTHERWISE):
+        return None
+    return kind if all(binding.get_host_cpu_features().get(need) for need in kind.needs) else None
+
+
+class ShippedCache(FunctionCache):  # type: ignore[misc]
+    """numba's cache of one kernel, which looks into the wheel's kernels too where there is nothing for this processor."""
+
+    def _load_overload(self, sig: Any, target_context: Any) -> Any:
+        found = super()._load_overload(sig, target_context)
+        if found is None and self._enabled:
+            found = self._shipped(sig, target_context)
+        if found is None:
+            compiling_begins()
+        return found
+
+    def _shipped(self, sig: Any, target_context: Any) -> Any:
+        """The kernel out of the wheel, or None."""
+        folder = shipped_folder(self._py_func.__module__)
+        kind = kind_of_this_machine() if folder.is_dir() else None
+        if kind is None:
+            return None
+        file = IndexDataCacheFile(str(folder), self._impl.filename_base, self._impl.locator.get_source_stamp())
+        name, (triple, *_), code = self._index_key(sig, target_context.codegen())
+        data = file.load((name, (triple, kind.name, ""), code))
+        return None if data is None else self._impl.rebuild(target_context, data)
+
+
+class _AnyLocator(InTreeCacheLocator):  # type: ignore[misc]
+    """The folder that `NUMBA_CACHE_DIR` names, else the one beside the sources, though nothing can be written there."""
+
+    @classmethod
+    def from_function(cls, py_func: Any, py_file: str) -> Any:
+        """Look there; nothing is tried."""
+        return (UserProvidedCacheLocator if config.CACHE_DIR else InTreeCacheLocator)(py_func, py_file)
+
+
+class _ReadImpl(CompileResultCacheImpl):  # type: ignore[misc]
+    _locator_classes = (_AnyLocator,)
+
+
+class ReadOnlyCache(ShippedCache):
+    """The same where no folder of caches can be written, as in a container with a read-only file system: what is compiled is not kept."""
+
+    _impl_class = _ReadImpl
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        """Nothing can be kept."""
+
+
+def shipped_folder(module: str, top: Path | None = None) -> Path:
+    """Where a wheel has the compiled kernels of a module: one folder for each package."""
+    return (top or SHIPPED) / module.rpartition(".")[0]
+
+
+def cache_of(function: Any) -> ShippedCache:
+    """The cache of a kernel's function, by what numba may write."""
+    try:
+        return ShippedCache(function)
+    except RuntimeError:  # numba found no folder that it can write
+        return ReadOnlyCache(function)
