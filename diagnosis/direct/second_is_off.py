@@ -8,6 +8,7 @@ the sensor is, nothing is said of the sensor; of a difference that stays the sam
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -148,7 +149,7 @@ def _windows(start: int, stop: int, width: int, dt: float) -> list[slice]:
         return []
     count = max(1, round((last - first) * width * dt / _WINDOW_S))
     edges = np.linspace(first, last, count + 1).astype(int)
-    return [slice(int(a), int(b)) for a, b in zip(edges[:-1], edges[1:], strict=True)]
+    return [slice(int(a), int(b)) for a, b in itertools.pairwise(edges)]
 
 
 def _left(part: slice, cells: _Cells) -> _Left | None:

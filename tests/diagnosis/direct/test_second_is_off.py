@@ -50,7 +50,7 @@ def told(
     finding = Finding(*span, Side.SENSOR, mode, 0.96, (), None, None, (), Tier.DIRECT)
     sound, healthy = speeds(OPENING), Assessment(np.full(SIZE, CODE[State.HEALTHY]), tier=Tier.DIRECT)
     pairs = {w: sensor(reading, second) if w == "FR" else sensor(sound, sound) for w in WHEELS}
-    assessments = {w: healthy for w in WHEELS} | {"FR": Assessment(states, findings=(finding,), tier=Tier.DIRECT)}
+    assessments = dict.fromkeys(WHEELS, healthy) | {"FR": Assessment(states, findings=(finding,), tier=Tier.DIRECT)}
     return without_second_speeds_own(pairs, assessments, {w: opening if w == "FR" else OPENING for w in WHEELS})["FR"]
 
 
