@@ -21,6 +21,7 @@ from diagnosis.clearing.beside import (
     less_sure_beside_wrong_angles,
 )
 from diagnosis.clearing.contradicted import without_contradicted
+from diagnosis.clearing.nothing_moves import supply_gone
 from diagnosis.clearing.standing_out import what_stands_out, with_findings, without_explained, without_followers
 from diagnosis.decision import metrics, quality
 from diagnosis.decision.episodes import with_episodes
@@ -169,7 +170,7 @@ def _walk(
     _require_something(found.assessments, mission, machine)
     publish(Progress(Stage.DECIDING))
     judged = _without_contradicted(_without_backwards(Judged(mission, recorded, machine, replay, found)))
-    judged = _with_what_stands_out(judged)
+    judged = _with_stalls(_with_what_stands_out(judged))
     found = judged.found
     report = report_of_mission(judged, identity)
     timeline.store.release()
@@ -225,6 +226,15 @@ def _with_what_stands_out(judged: Judged) -> Judged:
     told = replace(found, assessments=seen)
     open_ = tuple(c for c in judged.checks if c.component in more and not c.passed)
     return replace(judged, found=told, named_by=open_)
+
+
+def _with_stalls(judged: Judged) -> Judged:
+    """The same with what stopped the whole machine, whose drives were open."""
+    event = supply_gone(judged.cells)
+    if event is None:
+        return judged
+    found = judged.found
+    return replace(judged, found=replace(found, events=(*found.events, event.worded(found.words))))
 
 
 def _require_something(assessments: Mapping[tuple[str, str], Assessment], mission: Mission, machine: Machine) -> None:

@@ -18,6 +18,7 @@ from diagnosis.clearing.backwards import without_findings
 from diagnosis.clearing.cells import Cells
 from diagnosis.clearing.jumps import fault_of_jumps
 from diagnosis.clearing.responses import Limits, measured_twice, speeds_follow_openings, usual_limits
+from diagnosis.clearing.still import opens_late
 from diagnosis.clearing.untold_faults import fault_of_angle, fault_of_axle, fault_of_wheel
 from diagnosis.results.assessment import CODE, Assessment, Finding
 from diagnosis.results.clearing import Check, Checked
@@ -112,7 +113,9 @@ def _times(check: Checked) -> float:
 
 
 def _does_not_answer(check: Checked, cells: Cells) -> bool:
-    return check.check is Check.STILL and _times(check) >= _STILL and not cells.stated.get(check.component)
+    if check.check is not Check.STILL or _times(check) < _STILL or cells.stated.get(check.component):
+        return False
+    return not opens_late(cells, cells.machine.axles.index(check.component))
 
 
 def _off_second_angle(check: Checked) -> bool:

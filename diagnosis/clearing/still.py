@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from diagnosis.clearing.cells import Array, Cells, Frame
 from diagnosis.clearing.measure import lowest_passed
+from diagnosis.clearing.nothing_moves import nothing_moves
 
 Flags = NDArray[np.bool_]
 
@@ -20,6 +21,9 @@ _END, _REACHED = 0.97, 0.5  # of the largest angle: an end stop, where that is a
 _STEERED = 0.01  # of full opening beyond the dead band: below it, an axle is not steered
 #: Windows of rest, share of windows in which an axle turns, by how much its rests differ in command (of it) and angle (of the largest).
 _RESTS, _TURNS, _SPREAD, _APART, _MOSTLY = 6, 0.1, 0.35, 0.1, 0.75
+_STALLS_S = 1.5  # that wheels take to stop when their supply does
+# Dead band of a valve that lives, at most; below, and above such a share of it an axle turns seldom, of its rests, and often
+_LATEST, _SOONER, _LATER, _SELDOM = 0.28, 0.8, 1.2, 0.15
 _STEPS = 19  # dead bands that are tried
 
 
@@ -77,7 +81,29 @@ def commanded_still(cells: Cells, j: int) -> Array:
     size, ahead = frame.rms(rate), frame.mean(rate) * np.sign(mean)
     creeps = (ahead >= _CREEPS) & (ahead >= _STEADY * size) & (ahead >= _OBEYS * _given(cells, np.abs(mean)))
     rests = (size < _STILL) & ~stopped & ~creeps
-    return np.asarray(np.where(np.isfinite(mean), np.where(rests, np.abs(mean), 0.0), np.nan))
+    stalls, ahead = nothing_moves(cells), round(_STALLS_S / cells.dt)
+    soon = np.lib.stride_tricks.sliding_window_view(np.pad(stalls, (0, ahead)), ahead + 1).any(axis=1)
+    gone = frame.sums(soon.astype(np.float64)) > 0.0  # no axle turns where no wheel does
+    return np.asarray(np.where(np.isfinite(mean) & ~gone, np.where(rests, np.abs(mean), 0.0), np.nan))
+
+
+def opens_late(cells: Cells, j: int) -> bool:
+    """Whether an axle rests at small openings alone, always, and turns at larger ones, always: its valve overlaps by so much, and lives.
+
+    A fault comes and goes, or shows at large openings too.
+    """
+    size, frame = commanded_still(cells, j), still_frame(cells)
+    opening = cells.axles("u")[:, j]
+    passed = np.abs(np.nan_to_num(lowest_passed(opening, cells.dt, _LAG_S)))
+    most = np.array([np.max(passed[k : k + frame.length], initial=0.0) for k in frame.starts])
+    turns = (size == 0.0) & (frame.rms(rate_of(cells.axles("phi"), cells.dt)[:, j]) > 2.0 * _STILL)
+    rests = size[size > _ANSWERED]
+    if not rests.size:
+        return False
+    band = float(rests.max())
+    sooner = np.count_nonzero(turns & (most > _ANSWERED) & (most < _SOONER * band))
+    later = np.count_nonzero(turns & (most > _LATER * band))
+    return band <= _LATEST and later >= _RESTS and sooner <= _SELDOM * rests.size
 
 
 def _given(cells: Cells, opening: Array) -> Array:

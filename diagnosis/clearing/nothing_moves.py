@@ -1,0 +1,90 @@
+"""Spells in which no wheel moves although the drives are open: the machine's supply is gone, an engine that died, and no part has failed."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from diagnosis.clearing.cells import Cells
+from diagnosis.clearing.measure import lowest_passed
+from diagnosis.results.machine_event import MachineEvent, not_following
+
+Flags = NDArray[np.bool_]
+
+_LAG_S = 0.15  # of a valve and its drive: a command that has only just come has moved nothing yet
+_RESTS, _TURNS = 0.03, 0.015  # of the top speed; rad/s
+_HELD = 0.1  # of the top speed: one of four sensors that wait for their next edge may still read so much
+_OPEN = 0.1  # of full opening: from here on a healthy drive moves; beyond the mission's own dead bands as well ...
+_MOVES = 0.95  # ... of the openings at which a wheel moves, so many lie above them
+_WHEELS, _LEAST_S = 3, 1.0  # fewer wheels, or less time, show nothing
+_ELSEWHERE = 5.0  # times as long do wheels move at such openings
+
+
+def nothing_moves(cells: Cells) -> Flags:
+    """Cells in which all wheels rest while most drives are open, for a second and more, and those behind them until anything moves.
+
+    Shape (cells,); none where that is usual.
+    """
+    return cells.once("nothing moves", lambda: _nothing_moves(cells))
+
+
+def _nothing_moves(cells: Cells) -> Flags:
+    speed, command, opening, second = (cells.wheels(leaf) for leaf in ("v", "u", "u_applied", "v_true"))
+    used = np.where(np.isfinite(command), command, opening)
+    none = np.zeros(cells.size, np.bool_)
+    known = np.isfinite(speed).any(axis=0) & np.isfinite(used).any(axis=0)
+    if np.count_nonzero(known) < _WHEELS:
+        return none
+    rest = _RESTS * cells.machine.max_speed
+    moves = (np.abs(np.nan_to_num(speed)) > rest) | (np.abs(np.nan_to_num(second)) > rest)
+    passed = np.abs(np.nan_to_num(lowest_passed(used, cells.dt, _LAG_S)))
+    least = np.array([_needs(u[m]) for u, m in zip(passed.T, moves.T, strict=True)])
+    opens = passed >= np.maximum(_OPEN, least)
+    enough = np.count_nonzero(opens[:, known], axis=1) > 0.5 * np.count_nonzero(known)
+    seen = np.isfinite(speed[:, known]).all(axis=1)
+    fast = np.abs(np.nan_to_num(speed)).max(axis=1) > _HELD * cells.machine.max_speed
+    rests = ~fast & (np.count_nonzero(moves, axis=1) <= (1 if np.count_nonzero(known) > _WHEELS else 0))
+    still = _lasting(enough & seen & rests, max(1, round(_LEAST_S / cells.dt)))
+    drives = np.count_nonzero(enough & moves[:, known].all(axis=1))
+    if drives <= _ELSEWHERE * np.count_nonzero(still):
+        return none
+    angle = cells.axles("phi")
+    turns = np.abs(np.nan_to_num(np.gradient(angle, cells.dt, axis=0))) > _TURNS if len(angle) > 1 else angle > np.inf
+    return _until(still, ~rests | turns.any(axis=1))
+
+
+def _needs(opening: NDArray[np.float64]) -> float:
+    """Opening that hardly any of those is below at which a wheel moves [1]."""
+    return float(np.quantile(opening, 1.0 - _MOVES)) if opening.size else 1.0
+
+
+def _lasting(flags: Flags, least: int) -> Flags:
+    """Those that stand in stretches of at least so many cells."""
+    edges = np.flatnonzero(np.diff(np.r_[False, flags, False].astype(np.int8)))
+    out = np.zeros(flags.size, np.bool_)
+    for a, b in zip(edges[::2], edges[1::2], strict=True):
+        out[a:b] = b - a >= least
+    return out
+
+
+def _until(flags: Flags, ends: Flags) -> Flags:
+    """Stretches that go on until something ends them."""
+    out = flags.copy()
+    for k in np.flatnonzero(np.diff(flags.astype(np.int8)) < 0) + 1:
+        behind = np.flatnonzero(ends[k:])
+        out[k : k + (int(behind[0]) if behind.size else ends.size - k)] = True
+    return out
+
+
+def supply_gone(cells: Cells) -> MachineEvent | None:
+    """That the machine stood while its drives were open, as an event; None where it did not."""
+    still = nothing_moves(cells)
+    if not still.any():
+        return None
+    edges = np.flatnonzero(np.diff(np.r_[False, still, False].astype(np.int8))) * cells.dt
+    spells = [f"{a:.1f}–{b:.1f} s" for a, b in zip(edges[::2], edges[1::2], strict=True)]
+    when = ", ".join(spells[:3]) + (f" and {len(spells) - 3} more times" if len(spells) > 3 else "")
+    return not_following(
+        f"No {{wheel}} moved at {when} although most {{valve}}s were commanded to open: what supplies them all had stopped, as an engine that "
+        "stalls does; no part is blamed for that time."
+    )
