@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnosis.clearing.cells import Cells
+from diagnosis.clearing.cells import Array, Cells
 from diagnosis.clearing.measure import lowest_passed
 from diagnosis.results.machine_event import MachineEvent, not_following
 
@@ -16,7 +16,10 @@ _RESTS, _TURNS = 0.03, 0.015  # of the top speed; rad/s
 _HELD = 0.1  # of the top speed: one of four sensors that wait for their next edge may still read so much
 _OPEN = 0.1  # of full opening: from here on a healthy drive moves; beyond the mission's own dead bands as well ...
 _MOVES = 0.95  # ... of the openings at which a wheel moves, so many lie above them
-_WHEELS, _LEAST_S = 3, 1.0  # fewer wheels, or less time, show nothing
+_WHEELS, _LEAST_S = 3, 1.0  # fewer wheels, or less time, show nothing, ...
+# ... but that much where an axle stands as well, which is told to turn by so much, and openings are such a share of that
+_LEAST_WITH_AXLE_S, _STEERED, _LESS = 0.5, 0.3, 0.5
+_EDGES = 2  # cells, for a rate
 _ELSEWHERE = 5.0  # times as long do wheels move at such openings
 
 
@@ -39,21 +42,34 @@ def _nothing_moves(cells: Cells) -> Flags:
     moves = (np.abs(np.nan_to_num(speed)) > rest) | (np.abs(np.nan_to_num(second)) > rest)
     passed = np.abs(np.nan_to_num(lowest_passed(used, cells.dt, _LAG_S)))
     least = np.array([_needs(u[m]) for u, m in zip(passed.T, moves.T, strict=True)])
-    opens = passed >= np.maximum(_OPEN, least)
-    enough = np.count_nonzero(opens[:, known], axis=1) > 0.5 * np.count_nonzero(known)
-    seen = np.isfinite(speed[:, known]).all(axis=1)
+    count, width = np.count_nonzero(known), lambda seconds: max(1, round(seconds / cells.dt))
     fast = np.abs(np.nan_to_num(speed)).max(axis=1) > _HELD * cells.machine.max_speed
-    rests = ~fast & (np.count_nonzero(moves, axis=1) <= (1 if np.count_nonzero(known) > _WHEELS else 0))
-    still = _lasting(enough & seen & rests, max(1, round(_LEAST_S / cells.dt)))
+    rests = ~fast & (np.count_nonzero(moves, axis=1) <= (1 if count > _WHEELS else 0))
+    rests &= np.isfinite(speed[:, known]).all(axis=1)
+    turns, stands = _axles(cells)
+
+    def open_(least: Array) -> Flags:
+        return np.asarray(np.count_nonzero((passed >= least)[:, known], axis=1) > 0.5 * count)
+
+    enough = open_(np.maximum(_OPEN, least))
+    still = _lasting(enough & rests, width(_LEAST_S))
+    still |= _lasting(open_(np.maximum(_OPEN, _LESS * least)) & rests & stands, width(_LEAST_WITH_AXLE_S))
     drives = np.count_nonzero(enough & moves[:, known].all(axis=1))
-    if drives <= _ELSEWHERE * np.count_nonzero(still):
-        return none
-    angle = cells.axles("phi")
-    turns = np.abs(np.nan_to_num(np.gradient(angle, cells.dt, axis=0))) > _TURNS if len(angle) > 1 else angle > np.inf
-    return _until(still, ~rests | turns.any(axis=1))
+    return _until(still, ~rests | turns) if drives > _ELSEWHERE * np.count_nonzero(still) else none
 
 
-def _needs(opening: NDArray[np.float64]) -> float:
+def _axles(cells: Cells) -> tuple[Flags, Flags]:
+    """Cells in which an axle turns, and in which one stands that is told to turn, each of shape (cells,)."""
+    angle, command = cells.axles("phi"), np.abs(np.nan_to_num(lowest_passed(cells.axles("u"), cells.dt, _LAG_S)))
+    if len(angle) < _EDGES or not angle.shape[1]:
+        none = np.zeros(cells.size, np.bool_)
+        return none, none
+    turns = np.abs(np.nan_to_num(np.gradient(angle, cells.dt, axis=0))) > _TURNS
+    told = (command > _STEERED) & np.isfinite(angle)
+    return turns.any(axis=1), np.asarray(told.any(axis=1) & ~(told & turns).any(axis=1))
+
+
+def _needs(opening: Array) -> float:
     """Opening that hardly any of those is below at which a wheel moves [1]."""
     return float(np.quantile(opening, 1.0 - _MOVES)) if opening.size else 1.0
 

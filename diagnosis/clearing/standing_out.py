@@ -18,7 +18,6 @@ from diagnosis.clearing.backwards import without_findings
 from diagnosis.clearing.cells import Cells
 from diagnosis.clearing.jumps import fault_of_jumps
 from diagnosis.clearing.responses import Limits, measured_twice, speeds_follow_openings, usual_limits
-from diagnosis.clearing.still import opens_late
 from diagnosis.clearing.untold_faults import fault_of_angle, fault_of_axle, fault_of_wheel
 from diagnosis.results.assessment import CODE, Assessment, Finding
 from diagnosis.results.clearing import Check, Checked
@@ -60,7 +59,8 @@ def what_stands_out(checks: Sequence[Checked], cells: Cells, words: MachineWords
     jumping = {c.component: fault_of_jumps(c, cells) for c in checks if c.check is Check.JUMP and not c.passed}
     found = {component: fault for component, fault in jumping.items() if fault is not None}
     found |= {check.component: fault_of_angle(check, cells) for check in checks if _off_second_angle(check)}
-    found |= {check.component: fault_of_axle(check, cells) for check in checks if _does_not_answer(check, cells)}
+    axles = {c.component: fault_of_axle(c, cells) for c in checks if _does_not_answer(c, cells)}
+    found |= {component: fault for component, fault in axles.items() if fault is not None}
     alone = _alone(checks, cells)
     wheel = alone or (None if _stated(cells) else _alone_not_following(checks, cells))
     if wheel is not None and (told := fault_of_wheel(wheel, cells, alone=alone is not None)) is not None:
@@ -113,9 +113,7 @@ def _times(check: Checked) -> float:
 
 
 def _does_not_answer(check: Checked, cells: Cells) -> bool:
-    if check.check is not Check.STILL or _times(check) < _STILL or cells.stated.get(check.component):
-        return False
-    return not opens_late(cells, cells.machine.axles.index(check.component))
+    return check.check is Check.STILL and _times(check) >= _STILL and not cells.stated.get(check.component)
 
 
 def _off_second_angle(check: Checked) -> bool:

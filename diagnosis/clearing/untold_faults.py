@@ -101,8 +101,8 @@ _UNTOLD = (
 )
 
 
-def fault_of_axle(check: Checked, cells: Cells) -> Finding:
-    """The fault of an axle that stands still while it is commanded, by that check of a mission."""
+def fault_of_axle(check: Checked, cells: Cells) -> Finding | None:
+    """The fault of an axle that stands still while it is commanded, by that check of a mission; None where its valve opens late, but lives."""
     j = cells.machine.axles.index(check.component)
     shown = _Shown(still.still_frame(cells), still.commanded_still(cells, j))
     start, stop, _, _ = _where(shown, cells)
@@ -115,6 +115,8 @@ def fault_of_axle(check: Checked, cells: Cells) -> Finding:
             f"it is, and turns otherwise; {moves} So the {{valve}} seems to be off by as much."
         )
         return finding_of((start, stop), FaultMode.OUTSIDE_TABLE, None, (text,), Side.ACTUATOR, _BIASED)
+    if still.opens_late(cells, j):
+        return None
     text = f"The {check.component} axle stands still while its {{valve}} is commanded to {100 * check.worst:.0f}{{percent}}; {moves}"
     least = max(0.0, 1.0 - check.limit / check.worst)  # what is left of the command moves no axle
     return finding_of((start, stop), FaultMode.NO_SIGNAL, Epsilon(1.0, least, 1.0), (text, _UNTOLD))
