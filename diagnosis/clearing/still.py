@@ -24,6 +24,7 @@ _RESTS, _TURNS, _SPREAD, _APART, _MOSTLY = 6, 0.1, 0.35, 0.1, 0.75
 _STALLS_S = 1.5  # that wheels take to stop when their supply does
 # Dead band of a valve that lives, at most; below, and above such a share of it an axle turns seldom, of its rests, and often
 _LATEST, _SOONER, _LATER, _SELDOM = 0.28, 0.8, 1.2, 0.15
+_IDLE = 0.3  # of the command at which an axle rests: as good as none
 _STEPS = 19  # dead bands that are tried
 
 
@@ -141,6 +142,9 @@ def rests_at(cells: Cells, j: int, span: tuple[int, int]) -> float | None:
     if at.size < _RESTS or not np.isfinite(at).all() or np.count_nonzero(turns) < _TURNS * np.count_nonzero(inside):
         return None
     middle = float(np.median(at))
+    idle = frame.rms(command) < _IDLE * abs(middle)
+    if np.count_nonzero(idle & turns) < 0.5 * np.count_nonzero(idle & inside):
+        return None  # a valve that is off turns the axle where it is told to rest
     alike = np.abs(at - middle) < _SPREAD * abs(middle)
     if np.mean(alike) <= _MOSTLY:
         return None
