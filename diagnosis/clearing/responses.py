@@ -16,6 +16,7 @@ _SETTLED_S, _SETTLED = 0.6, 0.03  # a command that has changed by less than this
 USUAL_TOP = 0.36  # m/s, of the machine for which speeds here are
 MOVING = 0.08  # m/s, for such a machine
 _LEAST_CELLS = 0.5  # of a window
+_USUAL_S = 3.0  # of one way, from which on there is a usual one
 _LEAST_WINDOWS, _PART = 8, 0.2  # before and after a change, at least
 _GROWS = 40  # windows, for what grows
 _ALIKE = 0.5  # of the limit: where half of the wheels deviate by more, openings tell little of speeds
@@ -121,14 +122,15 @@ def responses_of(
         usual: list[float] = []
         ways: list[float | None] = []
         for way in (ahead[:, i], ~ahead[:, i]):
-            ways.append(None)
             here = way & np.isfinite(own)
-            if here.any():
-                middle = float(np.median(own[here]))
-                off[way, i] = log[way, i] - middle
-                if np.count_nonzero(here) * frame.hop * cells.dt >= 3.0:
-                    usual.append(middle)
-                    ways[-1] = middle
+            known = np.count_nonzero(here) * frame.hop * cells.dt >= _USUAL_S
+            ways.append(float(np.median(own[here])) if known else None)
+            usual += [ways[-1]] if ways[-1] is not None else []
+        for way, middle, other in zip((ahead[:, i], ~ahead[:, i]), ways, ways[::-1], strict=True):
+            here = way & np.isfinite(own)
+            if here.any():  # what is too short to be usual is held to the other way's usual one: it may be all fault
+                expected = middle if middle is not None else other if other is not None else float(np.median(own[here]))
+                off[way, i] = log[way, i] - expected
         ways_apart = [ahead[:, i], ~ahead[:, i]]
         asked = over_time and bool(usual)
         changes.append(largest_change(own, ways_apart) if asked else None)

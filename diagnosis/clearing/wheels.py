@@ -12,6 +12,7 @@ from diagnosis.clearing.measure import alone, compared, lasts, late, off_command
 from diagnosis.clearing.responses import (
     OTHERS,
     USUAL_TOP,
+    Limits,
     largest,
     measured_twice,
     openings_tell,
@@ -36,8 +37,9 @@ OPENING = 0.03  # of full opening: likewise
 _ANSWER_S = 0.5  # within which a drive jumps as its command did
 ROUGH, _ROUGHER = 0.15, 5.0  # quick changes: share of the speed, times those of the other wheels
 LATE_S = 0.2
-#: How much more of a partial loss the speed per opening shows than a carried wheel's speed alone: its controller asks for more.
-_ASKED_MORE = 2.0
+#: How much more of a partial loss the speed per opening shows than a carried wheel's speed alone, because its controller asks for more, and the
+#: least that is told from what healthy ones do [ln]. A loss of 0.3 showed 1.4 times as much on a machine whose controller asked for little.
+_ASKED_MORE, _LEAST_TOLD = 1.3, 0.06
 _TRACKING, _TRACKING_ALONE = 0.35, 0.12  # at most, and at least where the other wheels follow much better
 _VALVE_ALONE, _SLOWER = 2.2, 3.0  # times the deviation of the others' valves, and speeds
 VALVE = 1.4  # dead band and hysteresis of a healthy valve: the limit as a multiple of the loss that counts
@@ -83,9 +85,9 @@ def wheel_checks(cells: Cells, clear_at: float) -> Iterator[Checked]:
             limit = alone(slowest, i, VALVE * clear_at, clear_at, _VALVE_ALONE)
             yield worst(cells, (*about, Side.ACTUATOR, Check.SECOND_MEASUREMENT), behind[:, i], limit, apart=True)
         if wheel in cells.carried and not twice[i][0] and _known(command[:, i]):
-            limit = most_carried(limits[i].below, clear_at)
             most = max(cells.carried[wheel], cells.may_carry)
-            yield Checked(*about, Side.ACTUATOR, Check.CARRIED, most, limit)
+            limits[i] = beside_ground(limits[i], most, clear_at)
+            yield Checked(*about, Side.ACTUATOR, Check.CARRIED, most, most_carried(clear_at))
         # where an opening is no speed, what it gives says nothing of a wheel whose sides are both measured twice
         if _known(used[:, i]) and speed.shape[1] > OTHERS and (tells or not all(twice[i])):
             own = limits[i]
@@ -132,17 +134,28 @@ def most_creeping(slowly: Sequence[float], i: int, clear_at: float) -> float:
     return max(clear_at, _CREEPS_ALIKE * float(np.median(others))) if others else clear_at
 
 
-def most_carried(below: float, clear_at: float) -> float:
-    """Share of its speed that the ground may give a wheel, so that a loss of its valve still shows in the speed per opening [1].
+def beside_ground(limits: Limits, carried: float, clear_at: float) -> Limits:
+    """Limits of a wheel that the ground carries: below the others by no more than a loss of its valve would leave to be seen.
 
     Parameters
     ----------
-    below : float
-        From here on a fall of the speed per opening counts in this mission [ln].
+    limits : Limits
+        Those without the ground.
+    carried : float
+        Share of its speed that the ground gives it [1].
     clear_at : float
         The loss that counts [1].
     """
-    return 1.0 + below / (_ASKED_MORE * float(np.log1p(-clear_at)))
+    seen = -_ASKED_MORE * (1.0 - carried) * float(np.log1p(-clear_at))
+    return limits._replace(below=min(limits.below, max(seen, _LEAST_TOLD)))
+
+
+def most_carried(clear_at: float) -> float:
+    """Share of its speed that the ground may give a wheel, so that a loss of its valve still shows in the speed per opening [1].
+
+    `clear_at` is the loss that counts [1].
+    """
+    return 1.0 + _LEAST_TOLD / (_ASKED_MORE * float(np.log1p(-clear_at)))
 
 
 def _known(x: Array) -> bool:

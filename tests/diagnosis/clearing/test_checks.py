@@ -13,8 +13,9 @@ from diagnosis.clearing.axles import _parted
 from diagnosis.clearing.cells import Frame
 from diagnosis.clearing.checks import checks_of
 from diagnosis.clearing.measure import off_commands
+from diagnosis.clearing.responses import usual_limits
 from diagnosis.clearing.still import commanded_still, dead_bands
-from diagnosis.clearing.wheels import ROUGH, most_carried, most_creeping, roughness_of
+from diagnosis.clearing.wheels import ROUGH, beside_ground, most_carried, most_creeping, roughness_of
 from diagnosis.results.clearing import Check, Checked
 from diagnosis.results.machine_words import HYDRAULIC
 from replay.faults import FaultMode, FaultSpec, Side
@@ -288,10 +289,13 @@ def test_a_wheel_that_the_ground_carries_shows_no_dead_valve(base: bool, share: 
     assert all(c.passed or "ground carries FR" in c.text for c in asked)
 
 
-def test_how_much_the_ground_may_carry_goes_with_what_counts_in_the_mission() -> None:
-    """Where wheels differ much anyhow, a loss must show more of itself."""
-    assert most_carried(0.06, 0.25) == pytest.approx(1 - 0.06 / (2 * -np.log(0.75)))
-    assert most_carried(0.2, 0.25) < most_carried(0.1, 0.25) < most_carried(0.1, 0.5)
+def test_a_wheel_that_the_ground_carries_is_held_to_what_a_loss_would_leave() -> None:
+    free = usual_limits((False, False), 0.25)
+    assert beside_ground(free, 0.0, 0.25) == free
+    assert beside_ground(free, 0.6, 0.25).below == pytest.approx(1.3 * 0.4 * -np.log(0.75))
+    assert beside_ground(free, 0.99, 0.25).below == pytest.approx(0.06)  # healthy wheels differ by as much
+    assert beside_ground(free, most_carried(0.25), 0.25).below == pytest.approx(0.06)
+    assert most_carried(0.25) < most_carried(0.5)
 
 
 def test_a_creeping_wheel_is_held_to_what_the_others_do() -> None:
