@@ -11,7 +11,7 @@ from diagnosis.decision.explained import explaining
 from diagnosis.decision.open_checks import open_words
 from diagnosis.decision.severity import halved_words, unanswered
 from diagnosis.decision.short import main_reason, main_state, short_parts, unjudged_axles
-from diagnosis.decision.wording import count_words, join_words
+from diagnosis.decision.wording import MORE, count_words, join_words
 from diagnosis.results.assessed import Cut
 from diagnosis.results.assessment import Assessment
 from diagnosis.results.clearing import Checked
@@ -166,7 +166,7 @@ def doubt_of(watch: Sequence[FaultInterval], against: Reservations) -> str:
     elif against.open:
         others = join_words(list(dict.fromkeys(c.component for c in against.open)))
         out.append(f"beside a fault nothing shows whether {others} {'are' if ' and ' in others else 'is'} healthy")
-    return join_words(out[:_REASONS]) + ("; more below" if len(out) > _REASONS else "")
+    return join_words(out[:_REASONS]) + (MORE if len(out) > _REASONS else "")
 
 
 def doubts_of(faults: Sequence[FaultInterval], words: MachineWords) -> list[tuple[FaultInterval, str]]:

@@ -16,6 +16,8 @@ from diagnosis.results.sizes import gain_words, loss_known
 from diagnosis.results.vocabulary import Severity
 from replay.faults import FaultMode, Side
 
+#: What follows reasons of which the first ones are named, where the rest stands below them.
+MORE = "; more below"
 _NAMED = 3  # parts in the verdict's sentence
 _KINDS = 2  # of faults of one part in it: more stand in the part's action
 
