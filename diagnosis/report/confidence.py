@@ -5,7 +5,7 @@ from __future__ import annotations
 from diagnosis.comparison.coverage import SideCoverage, sides_of
 from diagnosis.decision.missing import is_commanded
 from diagnosis.pages.labels import utc
-from diagnosis.report.second_measurements import second_of
+from diagnosis.report.second_measurements import by_position, second_of
 from diagnosis.report.standing import Standing, standings_of
 from diagnosis.results.document import IntervalRow, ReportDocument, VerdictRow
 from diagnosis.results.fault_rows import state_label
@@ -49,6 +49,8 @@ def sure_of(fault: IntervalRow, report: ReportDocument) -> str:
     machine_words = words_of(report["machine"])
     twice = second_of(fault, {s["name"] for s in report["signals"]}) is not None
     how = machine_words.decided(Tier(fault["tier"]), Kind(fault["kind"]), side, twice=twice)
+    if by_position(fault):
+        how = "against what the position of its own joint shows of the same speed"
     words += [how] if how else []
     shares: dict[str, float] = {
         row["side"]: row["decided_driving_s"] / row["driving_s"]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import textwrap
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -18,6 +19,8 @@ from diagnosis.results.vocabulary import Kind, Severity
 from replay.faults import Side, State
 
 _MARGIN, _LINE = 26.0, 15  # room for text on either side, and characters that fit in a line of it
+_ALONG, _ACROSS = {"F": "front", "M": "middle", "R": "rear"}, {"R": "right", "L": "left"}
+_SHORT_NAME = re.compile("[FMR][RL]")
 _W, _TYRE_W, _TYRE_H, _PITCH, _JOINT = 372.0, 50.0, 96.0, 132.0, 58.0
 
 
@@ -122,6 +125,14 @@ def axles_in_words(report: ReportDocument) -> list[tuple[str, str]]:
     """What is wrong with axles, or keeps them from being called healthy, in words after its symbol: in the picture they have the symbol alone."""
     found = _conditions(report)
     return [(found[a].state, found[a].title) for a in report["machine"]["axles"] if found[a].state != State.HEALTHY]
+
+
+def places_in_words(report: ReportDocument) -> str:
+    """What the names of the wheels stand for, where they are the usual short ones: ``FR = front right``; else empty."""
+    wheels = report["machine"]["wheels"]
+    if words_of(report["machine"]).part != "wheel" or not all(_SHORT_NAME.fullmatch(w) for w in wheels):
+        return ""
+    return ", ".join(f"{w} = {_ALONG[w[0]]} {_ACROSS[w[1]]}" for w in wheels)
 
 
 def _conditions(report: ReportDocument) -> dict[str, Condition]:

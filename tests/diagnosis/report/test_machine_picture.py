@@ -5,7 +5,7 @@ import re
 import numpy as np
 import pytest
 
-from diagnosis.report.machine_picture import condition, machine_picture
+from diagnosis.report.machine_picture import condition, machine_picture, places_in_words
 from diagnosis.report.path_picture import path_picture
 from diagnosis.report.standing import Standing
 from diagnosis.report.thumbnail import thumbnail
@@ -26,6 +26,12 @@ def test_front_left_stands_at_the_top_left() -> None:
     assert places["FL"][0] < places["FR"][0]
     assert places["FL"][1] == places["FR"][1] < places["RR"][1]
     assert 'data-f="F4"' in picture
+
+
+def test_short_names_of_wheels_are_spelled_out() -> None:
+    named = places_in_words(samples.report_with(machine={"wheels": ["FR", "ML"]}))
+    assert named == "FR = front right, ML = middle left"
+    assert places_in_words(samples.report_with(machine={"wheels": ["FR", "drive"]})) == ""
 
 
 @pytest.mark.parametrize("count", [0, 1, 3, 12])
