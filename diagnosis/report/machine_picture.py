@@ -69,8 +69,14 @@ def condition(
         same = [f for f in mine if f["side"] == worst["side"] and label_of(f).lower() == label]
         length = span(sum(f["stop_s"] - f["start_s"] for f in same))
         more = (f"and {len(mine) - len(same)} more",) if len(mine) > len(same) else ()
+        faulty = {side for f in mine for side in Side(f["side"]).sides}
+        more += tuple(
+            f"{words.part_name(kind, side)} {how}"
+            for (c, side), how in standings.items()
+            if c == component and side not in faulty and how in (Standing.NOT_JUDGED, Standing.NOT_LONG_ENOUGH)
+        )
         heading = name[0].upper() + name[1:]
-        title = f"{component}: {name} {label}, {length}{', ' + more[0] if more else ''}"
+        title = f"{component}: {name} {label}, {length}{''.join(f', {x}' for x in more)}"
         return Condition(worst["mode"], (heading, label, length, *more), worst["id"], title)
     own = {words.part_name(kind, side): how for (c, side), how in standings.items() if c == component}
     open_ = {name: how for name, how in own.items() if how is not Standing.CLEARED}

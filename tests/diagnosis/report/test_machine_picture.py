@@ -47,6 +47,13 @@ def test_part_that_was_never_judged_is_not_called_healthy() -> None:
     assert (none.state, none.lines) == ("not_assessed", ("Not judged",))
 
 
+def test_what_was_not_judged_of_a_faulty_wheel_is_said_too() -> None:
+    found = condition("FR", Kind.WHEEL, [FAULT], CLEARED | {("FR", "actuator"): Standing.NOT_JUDGED})
+    assert found.lines[-1] == "drive valve not judged"
+    assert found.title.endswith(", drive valve not judged")
+    assert condition("FR", Kind.WHEEL, [FAULT], CLEARED).lines[-1] == "1.0 s"
+
+
 def test_thumbnail_keeps_gaps_and_clips_to_the_mission() -> None:
     y = np.where(np.arange(1000) % 300 < 30, np.nan, 1.0)
     picture = thumbnail(FAULT, y, None, 0.0, 0.01)
