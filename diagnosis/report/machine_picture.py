@@ -68,7 +68,7 @@ def condition(
         label = label_of(worst).lower()
         same = [f for f in mine if f["side"] == worst["side"] and label_of(f).lower() == label]
         length = span(sum(f["stop_s"] - f["start_s"] for f in same))
-        more = (f"and {len(mine) - len(same)} more",) if len(mine) > len(same) else ()
+        more: tuple[str, ...] = (f"and {len(mine) - len(same)} more",) if len(mine) > len(same) else ()
         faulty = {side for f in mine for side in Side(f["side"]).sides}
         more += tuple(
             f"{words.part_name(kind, side)} {how}"
