@@ -168,6 +168,7 @@ def rebuild(
     max_size_mb: float = 8.0,
     previous: tuple[Path, ReportDocument] | None = None,
     open_faults: Sequence[str] = (),
+    asof_ns: int | None = None,
 ) -> Path:
     """Make ``report.html`` again from a saved result, without the log.
 
@@ -181,6 +182,8 @@ def rebuild(
         Name and document of an earlier result of the machine to compare with; kept in ``report.json``.
     open_faults : Sequence[str]
         Sentences on faults of earlier missions that are open, to stand with `previous`.
+    asof_ns : int or None
+        When that was known [ns since 1970].
 
     Raises
     ------
@@ -194,7 +197,7 @@ def rebuild(
     saved = load_result(source)
     report, columns, windows = saved.report, saved.columns, saved.windows
     if previous is not None:
-        compared: ReportDocument = writable(with_previous(report, previous[1], str(previous[0]), open_faults))
+        compared: ReportDocument = writable(with_previous(report, previous[1], str(previous[0]), open_faults, asof_ns))
         report = compared
     with bordered(folder, "a saved result", remedy=_AGAIN):
         page = build_page(report, columns, closeups=windows, max_size_mb=max_size_mb)

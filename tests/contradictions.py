@@ -118,7 +118,7 @@ def _actions(report: Mapping[str, Any]) -> Iterator[str]:
             named[f] = named.get(f, 0) + 1
     for action in report["verdict"]["actions"]:
         sizes = [faults[f]["epsilon"]["value"] for f in action["faults"] if faults[f]["epsilon"]]
-        for found in re.finditer(r"\((?:(\d+) to )?(\d+) % lost\b", action["text"]):
+        for found in re.finditer(r"\((?:reads )?(?:(\d+) to )?(\d+) % (?:lost|too little)\b", action["text"]):
             said = [int(x) for x in found.groups() if x]
             if not all(any(abs(x - 100 * size) <= 0.6 for size in sizes) for x in said):
                 yield f"action {action['n']} says {found.group(0)!r}, its faults {[round(100 * x) for x in sizes]} %"

@@ -109,7 +109,12 @@ def leave_parts(machines: Sequence[ListedMachine]) -> list[RenderableType]:
         parts.append(
             bullets(
                 [
-                    Text.assemble(text(m.label, "bold"), f" – {m.reason}  ", text(m.mission, "dim"))
+                    Text.assemble(
+                        text(m.label, "bold"),
+                        f" – {m.reason}  ",
+                        text(f"{m.lead} {m.mission}".strip(), "dim"),
+                        text(f" ({m.note})" if m.note else ""),
+                    )
                     for m in mine[:_MACHINES]
                 ]
             )

@@ -201,6 +201,8 @@ def _limits(path: Path) -> Limits:
             wheels=tuple(map(str, machine["wheels"])),
             axles=tuple(map(str, machine["axles"])),
             cleared=report["verdict"]["cleared"],
+            not_cleared=str(report["verdict"].get("not_cleared", "")),
+            holds_open=bool(report.get("previous", {}).get("open_faults")),
             found={
                 (r["component"], r["side"], r["deviation"]): float(r["share"])
                 for r in report.get("detectability", {}).get("rows", ())

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
@@ -88,4 +89,10 @@ def _compare(store: Store, result: int, folder: Path, max_size_mb: float, open_f
     same = kept is not None and kept["mission"]["start_ns"] == previous.start_ns
     told = [] if kept is None else kept.get("open_faults", [])
     if not same or told != list(open_faults):
-        rebuild(folder, max_size_mb=max_size_mb, previous=(Path(previous.report), document), open_faults=open_faults)
+        rebuild(
+            folder,
+            max_size_mb=max_size_mb,
+            previous=(Path(previous.report), document),
+            open_faults=open_faults,
+            asof_ns=time.time_ns(),
+        )

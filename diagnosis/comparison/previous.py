@@ -17,7 +17,11 @@ THIS, OTHER = "this mission", "the other mission"
 
 
 def with_previous(
-    report: ReportDocument, previous: ReportDocument, name: str = "", open_faults: Sequence[str] = ()
+    report: ReportDocument,
+    previous: ReportDocument,
+    name: str = "",
+    open_faults: Sequence[str] = (),
+    asof_ns: int | None = None,
 ) -> ReportDocument:
     """Give a report with the comparison with another mission of the same machine under the key ``previous``.
 
@@ -31,6 +35,8 @@ def with_previous(
         What to call the other result in an error.
     open_faults : Sequence[str]
         Sentences on severe faults of earlier missions that nobody is known to have repaired.
+    asof_ns : int or None
+        When that was known [ns since 1970].
 
     Returns
     -------
@@ -54,6 +60,8 @@ def with_previous(
     compact = _compact(found, pair, later)
     if open_faults:
         compact["open_faults"] = list(open_faults)
+        if asof_ns is not None:
+            compact["open_asof_ns"] = asof_ns
     return {**report, "previous": compact}
 
 

@@ -11,7 +11,7 @@ from diagnosis.decision.explained import explaining
 from diagnosis.decision.open_checks import open_words
 from diagnosis.decision.severity import halved_words, unanswered
 from diagnosis.decision.short import main_reason, main_state, short_parts, unjudged_axles
-from diagnosis.decision.wording import count_words, join_words
+from diagnosis.decision.wording import MORE, count_words, join_words
 from diagnosis.results.assessed import Cut
 from diagnosis.results.assessment import Assessment
 from diagnosis.results.clearing import Checked
@@ -43,6 +43,8 @@ class Reservations:
     ----------
     short : tuple[Part, ...]
         Parts of wheels that were not judged long enough.
+    silent : tuple[Part, ...]
+        Those of them that were not judged at all.
     beside_nothing : bool
         Whether their sensors were not judged because nothing in the log shows what they should read.
     unexplained : tuple[Part, ...]
@@ -70,6 +72,7 @@ class Reservations:
     """
 
     short: tuple[Part, ...] = ()
+    silent: tuple[Part, ...] = ()
     beside_nothing: bool = False
     unexplained: tuple[Part, ...] = ()
     not_compared: bool = False
@@ -105,7 +108,8 @@ def by_model(assessments: Mapping[Part, Assessment], shown: Sequence[Detectable]
     """What limits parts that a wheel model of this mission judged, with the losses of ten seconds that it would have shown of them."""
     judged = {part for part, a in assessments.items() if a.tier is Tier.MODEL}
     said, sizes_known = [], False
-    for side, name in ((Side.SENSOR, "sensor"), (Side.ACTUATOR, words.drive)):
+    for side in (Side.SENSOR, Side.ACTUATOR):
+        name = words.part_name(Kind.WHEEL, side)
         about = (Kind.WHEEL, side, Deviation.INEFFICIENT, _TOLD_S)
         rows = [
             r
@@ -150,8 +154,10 @@ def doubt_of(watch: Sequence[FaultInterval], against: Reservations) -> str:
     out = list(dict.fromkeys(out))
     if against.damage:
         out.append("part of the log was left out" if is_left_out(against.damage[0]) else "the log is damaged")
-    if short := len(against.short):
-        out.append(f"{count_words(short, 'part')} {'was' if short == 1 else 'were'} not judged long enough")
+    silent = len(against.silent)
+    for n, how in ((silent, "not judged"), (len(against.short) - silent, "not judged long enough")):
+        if n:
+            out.append(f"{count_words(n, 'part')} {'was' if n == 1 else 'were'} {how}")
     if against.unexplained:
         out.append("a residual is not explained by any fault")
     if against.not_compared:
@@ -166,7 +172,7 @@ def doubt_of(watch: Sequence[FaultInterval], against: Reservations) -> str:
     elif against.open:
         others = join_words(list(dict.fromkeys(c.component for c in against.open)))
         out.append(f"beside a fault nothing shows whether {others} {'are' if ' and ' in others else 'is'} healthy")
-    return join_words(out[:_REASONS]) + ("; more below" if len(out) > _REASONS else "")
+    return join_words(out[:_REASONS]) + (MORE if len(out) > _REASONS else "")
 
 
 def doubts_of(faults: Sequence[FaultInterval], words: MachineWords) -> list[tuple[FaultInterval, str]]:

@@ -18,7 +18,7 @@ from diagnosis.decision.caveats import (
 )
 from diagnosis.decision.endings import endings_of
 from diagnosis.decision.open_checks import open_words, stands_out
-from diagnosis.decision.short import ToClear, beside_nothing, exempt_axles
+from diagnosis.decision.short import SAID_S, ToClear, beside_nothing, exempt_axles
 from diagnosis.decision.to_clear import to_clear
 from diagnosis.decision.wording import actions_of, count_faults, join_words, misplaced_words, sentence_of
 from diagnosis.results.assessed import Cut, is_judged
@@ -235,6 +235,7 @@ def _reservations(
     sensors = [p for p in short if p[1] == Side.SENSOR]
     return Reservations(
         short=short,
+        silent=tuple(p for p in short if decided_s.get(p, 0.0) < SAID_S),
         beside_nothing=bool(sensors)
         and all(driven.get(p, 0.0) >= limits.min_assessed and beside_nothing(assessments[p]) for p in sensors),
         unexplained=tuple(

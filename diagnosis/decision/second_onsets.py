@@ -103,7 +103,8 @@ def _said(asked: _Around, found: Second | None, dt: float) -> str:
     if abs(off) < 0.5 * dt * stride:
         return f"{when}: the same {'sample' if stride == 1 else 'moment'}."
     size = f"{1e3 * abs(off):.0f} ms" if abs(off) < 1.0 else f"{abs(off):.1f} s"
-    return f"{when}: {size} {'later' if off > 0 else 'earlier'}."
+    fit = "a healthy part better than the fault" if off > 0 else "the fault better than a healthy part"
+    return f"{when}: {size} {'later' if off > 0 else 'earlier'}, for by its models the readings between fit {fit}."
 
 
 def _steps(a: Assessment, first: int, last: int) -> tuple[Array, ...] | None:

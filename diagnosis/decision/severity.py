@@ -30,7 +30,7 @@ _LOST = 0.9  # ε̂ from which on so little is left that the part is as good as 
 _EVEN = 0.5  # that a part delivers nothing usable, from which on that is what is said
 _PROBABLY_TOTAL = 0.75  # that the named side is stuck or without signal, from which on the machine is stopped, ...
 _MAY_BE_TOTAL = 0.25  # ... and from which on it is looked at before the machine goes out
-_HALF = 0.5  # of ε: a part that may have lost so much is no fault to drive on with
+HALF = 0.5  # of ε: a part that may have lost so much is no fault to drive on with
 _PARTIAL = (FaultMode.INEFFICIENT, FaultMode.OUTSIDE_TABLE)  # rows of which ε̂ says how much is left
 
 
@@ -111,7 +111,7 @@ def _severity_of_total(
 
 def halved_words(side: Side, mode: FaultMode, epsilon: Epsilon | None) -> str:
     """That a part may have lost half or more, by the upper bound of ε̂, or that so much of what it gives may be noise; else empty."""
-    if epsilon is None or epsilon.high < _HALF:
+    if epsilon is None or epsilon.high < HALF:
         return ""
     if mode.varying:
         return "may give more noise than signal" if side is Side.SENSOR else "may follow noise more than its command"

@@ -19,7 +19,7 @@ from replay.machine.config import Limits
 #: A component and its side.
 Part = tuple[str, str]
 
-_SAID_S = 0.05  # of judged driving: less is nothing
+SAID_S = 0.05  # of judged driving: less is nothing
 #: Why a part was not judged where a finding leaves it as probable that it is healthy.
 AS_WELL_HEALTHY = "what was found there may as well be no fault"
 _WITH_COMMAND = "record again, with wheel.{c}.u (the {valve} command) in the log all the time"
@@ -104,7 +104,7 @@ def short_parts(
             if kind is Kind.WHEEL
             else _act_of_axle(part[1], state, _lack(assessments[part], state))
         )
-        alike.setdefault((reason, act, decided_s.get(part, 0.0) < _SAID_S), []).append(part)
+        alike.setdefault((reason, act, decided_s.get(part, 0.0) < SAID_S), []).append(part)
     out = []
     for (reason, act, silent), parts in alike.items():
         who, why = words.listed(kind, parts), f" ({reason})" if reason else ""

@@ -140,7 +140,12 @@ def to_clear(
     ranks = {check: k for k, check in enumerate(furthest_first(against.open))}
     out += [point for _, point in sorted(deviating, key=lambda d: ranks[d[0]])]
     out += short_parts(brief, assessments, decided_s, driven, limits, words, Kind.STEER, open_state=against.open_state)
-    return tuple(out + ([] if first else dark))
+    out += [] if first else dark
+    rested = [k for k in steered if k in at_rest and k not in unjudged and _brief(k, decided_s, driven, limits)]
+    return tuple(  # these keep no machine in, and come last: what has them judged is said all the same
+        out
+        + short_parts(rested, assessments, decided_s, driven, limits, words, Kind.STEER, open_state=against.open_state)
+    )
 
 
 def _asks_for_steering(check: Checked, twice: Collection[str]) -> bool:

@@ -13,10 +13,14 @@ from diagnosis.results.fault_rows import mode_words
 from diagnosis.results.machine_words import MachineWords
 from diagnosis.results.result import FaultInterval
 from diagnosis.results.sizes import gain_words, loss_known
-from diagnosis.results.vocabulary import Severity
+from diagnosis.results.vocabulary import Kind, Severity
 from replay.faults import FaultMode, Side
+from replay.machine.quantities import OPENING
 
+#: What follows reasons of which the first ones are named, where the rest stands below them.
+MORE = "; more below"
 _NAMED = 3  # parts in the verdict's sentence
+_PLACES, _WIDE = 2, 0.1  # at which a drive is stuck, and width of the bounds of one [of full opening], to be named
 _KINDS = 2  # of faults of one part in it: more stand in the part's action
 
 
@@ -46,7 +50,7 @@ def _by_part(intervals: Sequence[FaultInterval]) -> list[list[FaultInterval]]:
 def _action(n: int, faults: Sequence[FaultInterval], words: MachineWords) -> ActionRow:
     """What to do about one part, with its faults worst first."""
     worst = faults[0]
-    found = _course(faults)
+    found = _course(faults, words)
     lead = f"{_order(faults)} the {words.part_words(worst.kind, worst.component, worst.side)}"
     return {
         "n": n,
@@ -95,15 +99,15 @@ def fault_words(f: FaultInterval) -> str:
     return unclear_words(f.side, modes) if modes else mode_words(f.side, f.mode)
 
 
-def _course(faults: Sequence[FaultInterval]) -> str:
+def _course(faults: Sequence[FaultInterval], words: MachineWords) -> str:
     """What one part was, kind by kind, and for how long; what is unclear with its candidates where they are the same ones."""
-    return join_words([_how_long(kind, same) for kind, same in _kinds(faults).items()])
+    return join_words([_how_long(kind, same, words) for kind, same in _kinds(faults).items()])
 
 
-def _summary(faults: Sequence[FaultInterval]) -> str:
+def _summary(faults: Sequence[FaultInterval], words: MachineWords) -> str:
     """The same for the verdict's sentence: for how long it was faulty at all, where that was in many ways."""
     if len(_kinds(faults)) <= _KINDS:
-        return _course(faults)
+        return _course(faults, words)
     total = seconds_words(sum(f.stop_s - f.start_s for f in faults))
     return f"faulty for {total} in {len(faults)} faults"
 
@@ -119,10 +123,11 @@ def _kinds(faults: Sequence[FaultInterval]) -> dict[str, list[FaultInterval]]:
     return kinds
 
 
-def _how_long(words: str, faults: Sequence[FaultInterval]) -> str:
+def _how_long(kind: str, faults: Sequence[FaultInterval], words: MachineWords) -> str:
     """What faults are, how much they take, the whole time of them on one part, and how many they are."""
     total = seconds_words(sum(f.stop_s - f.start_s for f in faults))
-    return f"{words}{_lost(faults)} for {total}" + ("" if len(faults) == 1 else f" in {len(faults)} faults")
+    held = "" if kind.startswith(UNCLEAR) else _held(faults, words)
+    return f"{kind}{held}{_lost(faults)} for {total}" + ("" if len(faults) == 1 else f" in {len(faults)} faults")
 
 
 def _lost(faults: Sequence[FaultInterval]) -> str:
@@ -143,7 +148,26 @@ def _lost(faults: Sequence[FaultInterval]) -> str:
     bounds = (
         f", 95 % bounds {low} to {high} %" if (low, high) != (span[0], span[-1]) else ""
     )  # which the rounding holds
-    return f" ({' to '.join(span)} % lost{course}{bounds})"
+    size = f"{' to '.join(span)} %"
+    if all(f.side is Side.SENSOR for f in faults):
+        return f" (reads {size} too little{course}{bounds})"
+    return f" ({size} lost{course}{bounds})"
+
+
+def _held(faults: Sequence[FaultInterval], words: MachineWords) -> str:
+    """Where a drive's faults hold it, where that is what they are, to follow *stuck*: `` at +34 % of opening (forward)``."""
+    if not all(f.mode is FaultMode.STUCK and f.sat is not None and f.sat.unit == OPENING for f in faults):
+        return ""
+    sats = [f.sat for f in faults if f.sat is not None]
+    places = list(dict.fromkeys(round(100 * s.mean) for s in sats))
+    if len(places) > _PLACES or any(s.high - s.low > _WIDE for s in sats):
+        return ""
+    rolls = faults[0].kind is Kind.WHEEL and words.part == "wheel"
+    way = {True: " (forward)", False: " (reverse)"} if rolls else {}
+    said = [
+        f"{x:+d}{words.percent}{way.get(x > 0, '')}".replace("-", "−") if x else f"0{words.percent}" for x in places
+    ]
+    return f" at {join_words(said)}"
 
 
 def sentence_of(
@@ -158,7 +182,8 @@ def sentence_of(
     which = " to repair" if 0 < len(high) < len(parts) else ""
     parts = high or parts
     said = [
-        f"the {words.part_words(f[0].kind, f[0].component, f[0].side)} {_was(f, endings or {})}" for f in parts[:_NAMED]
+        f"the {words.part_words(f[0].kind, f[0].component, f[0].side)} {_was(f, words, endings or {})}"
+        for f in parts[:_NAMED]
     ]
     apart = any(len(f) > 1 or _course_of(f, endings or {}) is not Ending.ENDED for f in parts[:_NAMED])
     text = "; ".join(said) if apart else join_words(said)
@@ -167,12 +192,12 @@ def sentence_of(
     return text[0].upper() + text[1:] + more + "."
 
 
-def _was(faults: Sequence[FaultInterval], endings: Mapping[str, Ending]) -> str:
+def _was(faults: Sequence[FaultInterval], words: MachineWords, endings: Mapping[str, Ending]) -> str:
     """What one part was, or has been where that is not seen to end."""
     ending = _course_of(faults, endings)
     if ending is Ending.ENDED:
-        return f"was {_summary(faults)}"
-    return f"has been {_summary(faults)}, {'to the end of the log' if ending is Ending.LASTS else 'and was not seen to end'}"
+        return f"was {_summary(faults, words)}"
+    return f"has been {_summary(faults, words)}, {'to the end of the log' if ending is Ending.LASTS else 'and was not seen to end'}"
 
 
 def _course_of(faults: Sequence[FaultInterval], endings: Mapping[str, Ending]) -> Ending:

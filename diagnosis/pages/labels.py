@@ -169,7 +169,8 @@ def fault_title(fault: IntervalRow, words: MachineWords) -> str:
         noise = sat["rms"] * (epsilon["value"] if epsilon else 1.0)  # what stands in the readings is ε × sat
         sizes |= {"mean": sat_text(sat["mean"], sat["unit"], words), "rms": sat_text(noise, sat["unit"], words)}
     if epsilon and loss_known(epsilon["low"], epsilon["high"]):
-        sizes["lost"] = f"{100 * epsilon['value']:.0f}"
+        lost = f"{100 * epsilon['value']:.0f} %"
+        sizes["lost"] = f"reads {lost} too little" if side == Side.SENSOR else f"{lost} lost"
     row = row_of(side, mode)
     if row is not None and row.title and {name for _, name, _, _ in Formatter().parse(row.title) if name} <= set(sizes):
         return row.title.format_map(sizes)

@@ -6,7 +6,7 @@ from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 
 from diagnosis.pages.labels import number
-from diagnosis.report.second_measurements import second_of
+from diagnosis.report.second_measurements import JOINT, by_position, second_of
 from diagnosis.report.units import EFFORT_UNIT, MOTION, motion_unit, on_page
 from diagnosis.results.document import IntervalRow
 from diagnosis.results.machine_words import MachineWords
@@ -147,7 +147,8 @@ def rests_on(fault: IntervalRow, columns: Iterable[str], words: MachineWords) ->
         if "." in name and not name.startswith(("evidence.", "replay.")) and (at := _place(name, text)) >= 0:
             places[name] = at
     channels = sorted(places, key=lambda n: places[n])
-    tier = words.evidence(Tier(fault["tier"]), Kind(fault["kind"]), second_of(fault, columns))
+    own = by_position(fault)
+    tier = JOINT if own else words.evidence(Tier(fault["tier"]), Kind(fault["kind"]), second_of(fault, columns))
     return f"{tier}: {', '.join(channels)}" if tier and channels else tier or ", ".join(channels)
 
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from diagnosis.comparison.coverage import SideCoverage, sides_of
 from diagnosis.decision.missing import is_commanded
-from diagnosis.report.second_measurements import second_of
+from diagnosis.pages.labels import utc
+from diagnosis.report.second_measurements import by_position, second_of
 from diagnosis.report.standing import Standing, standings_of
 from diagnosis.results.document import IntervalRow, ReportDocument, VerdictRow
 from diagnosis.results.fault_rows import state_label
@@ -48,6 +49,8 @@ def sure_of(fault: IntervalRow, report: ReportDocument) -> str:
     machine_words = words_of(report["machine"])
     twice = second_of(fault, {s["name"] for s in report["signals"]}) is not None
     how = machine_words.decided(Tier(fault["tier"]), Kind(fault["kind"]), side, twice=twice)
+    if by_position(fault):
+        how = "against what the position of its own joint shows of the same speed"
     words += [how] if how else []
     shares: dict[str, float] = {
         row["side"]: row["decided_driving_s"] / row["driving_s"]
@@ -177,7 +180,10 @@ def going_out(report: ReportDocument) -> tuple[str, str]:
     """Whether the machine may go out again: *Yes* or *No*, and what belongs to it, to follow that word."""
     status = Verdict(report["verdict"]["status"])
     if holds_open(report) and status is not Verdict.STOP:
-        return "No", ", not before the fleet page says so: a fault of an earlier mission is open"
+        asof = report["previous"].get("open_asof_ns")
+        when = f"was open on {utc(asof)[:10]}, when this was written" if asof is not None else "is open"
+        why = f"a fault of an earlier mission {when}"
+        return "No", f", not before the fleet page says so, which holds the newest state: {why}"
     if status is Verdict.STOP:
         return "No", ", not before repair"
     if not may_go_out(report["verdict"]):

@@ -102,7 +102,13 @@ def evidence_of(
         keys = _keys(pair) if pair and edges else ()
         note = _note(pair, rates, step) if pair and edges else _missing(pair, columns, per)
         out[fault["id"]] = Evidence(
-            rests_on(fault, columns, words), delay_words(fault), shape_sentence(fault), keys, edges, course, note
+            rests_on(fault, {*columns, *rates}, words),
+            delay_words(fault),
+            shape_sentence(fault),
+            keys,
+            edges,
+            course,
+            note,
         )
     return out
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import textwrap
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -18,6 +19,8 @@ from diagnosis.results.vocabulary import Kind, Severity
 from replay.faults import Side, State
 
 _MARGIN, _LINE = 26.0, 15  # room for text on either side, and characters that fit in a line of it
+_ALONG, _ACROSS = {"F": "front", "M": "middle", "R": "rear"}, {"R": "right", "L": "left"}
+_SHORT_NAME = re.compile("[FMR][RL]")
 _W, _TYRE_W, _TYRE_H, _PITCH, _JOINT = 372.0, 50.0, 96.0, 132.0, 58.0
 
 
@@ -65,9 +68,15 @@ def condition(
         label = label_of(worst).lower()
         same = [f for f in mine if f["side"] == worst["side"] and label_of(f).lower() == label]
         length = span(sum(f["stop_s"] - f["start_s"] for f in same))
-        more = (f"and {len(mine) - len(same)} more",) if len(mine) > len(same) else ()
+        more: tuple[str, ...] = (f"and {len(mine) - len(same)} more",) if len(mine) > len(same) else ()
+        faulty = {side for f in mine for side in Side(f["side"]).sides}
+        more += tuple(
+            f"{words.part_name(kind, side)} {how}"
+            for (c, side), how in standings.items()
+            if c == component and side not in faulty and how in (Standing.NOT_JUDGED, Standing.NOT_LONG_ENOUGH)
+        )
         heading = name[0].upper() + name[1:]
-        title = f"{component}: {name} {label}, {length}{', ' + more[0] if more else ''}"
+        title = f"{component}: {name} {label}, {length}{''.join(f', {x}' for x in more)}"
         return Condition(worst["mode"], (heading, label, length, *more), worst["id"], title)
     own = {words.part_name(kind, side): how for (c, side), how in standings.items() if c == component}
     open_ = {name: how for name, how in own.items() if how is not Standing.CLEARED}
@@ -122,6 +131,14 @@ def axles_in_words(report: ReportDocument) -> list[tuple[str, str]]:
     """What is wrong with axles, or keeps them from being called healthy, in words after its symbol: in the picture they have the symbol alone."""
     found = _conditions(report)
     return [(found[a].state, found[a].title) for a in report["machine"]["axles"] if found[a].state != State.HEALTHY]
+
+
+def places_in_words(report: ReportDocument) -> str:
+    """What the names of the wheels stand for, where they are the usual short ones: ``FR = front right``; else empty."""
+    wheels = report["machine"]["wheels"]
+    if words_of(report["machine"]).part != "wheel" or not all(_SHORT_NAME.fullmatch(w) for w in wheels):
+        return ""
+    return ", ".join(f"{w} = {_ALONG[w[0]]} {_ACROSS[w[1]]}" for w in wheels)
 
 
 def _conditions(report: ReportDocument) -> dict[str, Condition]:

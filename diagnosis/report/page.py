@@ -30,7 +30,7 @@ from diagnosis.report.compared_channels import pair_of
 from diagnosis.report.driven_path import driven_path
 from diagnosis.report.evidence import evidence_of
 from diagnosis.report.healthy_lanes import healthy_lanes
-from diagnosis.report.machine_picture import axles_in_words, machine_picture
+from diagnosis.report.machine_picture import axles_in_words, machine_picture, places_in_words
 from diagnosis.report.path_picture import path_picture
 from diagnosis.report.plot_data import Axis, axis_of, blocks_of, channels_of, figures_of, packed_intervals, view, worst
 from diagnosis.report.plot_rows import loop_groups
@@ -181,6 +181,7 @@ def _pictures(
         "lane_details": healthy_lanes(report),
         "picture": machine_picture(report),
         "picture_notes": axles_in_words(report),
+        "places": places_in_words(report),
         "path": Markup("")
         if path.x is None or path.y is None
         else path_picture(path.x, path.y, *series.place, detailed),

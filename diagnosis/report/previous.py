@@ -53,6 +53,7 @@ def previous_section(report: ReportDocument) -> Context | None:
         "same_loss": sum(not _differs(x) for x in found["loss"]),
         "notes": found["notes"],
         "open_faults": found.get("open_faults", []),
+        "open_asof": labels.utc_moment(found["open_asof_ns"])[:10] if "open_asof_ns" in found else "",
     }
 
 

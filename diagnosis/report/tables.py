@@ -31,7 +31,7 @@ from diagnosis.report.data_tables import (
 from diagnosis.report.edges import time_words
 from diagnosis.report.fault_times import times_words
 from diagnosis.report.judged_parts import judged_sides
-from diagnosis.report.second_measurements import second_of
+from diagnosis.report.second_measurements import JOINT, by_position, second_of
 from diagnosis.results.candidates import label_of
 from diagnosis.results.document import (
     PAPER_DEFAULTS,
@@ -47,6 +47,7 @@ from diagnosis.results.fault_rows import state_label
 from diagnosis.results.machine_words import MachineWords, words_of
 from diagnosis.results.open_sizes import is_open
 from diagnosis.results.size_rows import SatRow
+from diagnosis.results.sizes import loss_known
 from diagnosis.results.vocabulary import Kind, Severity, Tier, Verdict
 from replay.faults import UNDECIDED, FaultMode, Side, State
 
@@ -134,7 +135,9 @@ def _fault(fault: IntervalRow, words: MachineWords, logged: Container[str]) -> C
     epsilon, sat = fault["epsilon"], fault["sat"]
     figures = []
     if epsilon:
-        figures.append(("ε̂", number(epsilon["value"]), f"{number(epsilon['low'])} to {number(epsilon['high'])}"))
+        known = loss_known(epsilon["low"], epsilon["high"])  # else the value is the middle of what may be anything
+        value = number(epsilon["value"]) if known else "not known"
+        figures.append(("ε̂", value, f"{number(epsilon['low'])} to {number(epsilon['high'])}"))
     if sat:
         unit = sat["unit"]
         bounds = f"{sat_text(sat['low'], unit, words).partition(' ')[0]} to {sat_text(sat['high'], unit, words)}"
@@ -146,7 +149,9 @@ def _fault(fault: IntervalRow, words: MachineWords, logged: Container[str]) -> C
     return {
         **fault,
         "label": label_of(fault),
-        "tier": words.evidence(Tier(fault["tier"]), Kind(fault["kind"]), second_of(fault, logged)),
+        "tier": JOINT
+        if by_position(fault)
+        else words.evidence(Tier(fault["tier"]), Kind(fault["kind"]), second_of(fault, logged)),
         "delay": _delay(fault),
         "likely": hypotheses[:likely],
         "both": len({h["side"] for h in hypotheses} & {*Side.SENSOR_OR_ACTUATOR.sides, Side.SENSOR_OR_ACTUATOR}) > 1,

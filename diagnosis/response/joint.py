@@ -54,7 +54,7 @@ class Joint(NamedTuple):
         )
 
 
-def joint_of(blocks: Blocks, rolled: Array, beside: Beside | None) -> Joint | None:
+def joint_of(blocks: Blocks, rolled: Array, beside: Beside | None, name: str) -> Joint | None:
     """The position's view of a wheel; None where it hardly moves.
 
     Parameters
@@ -65,6 +65,8 @@ def joint_of(blocks: Blocks, rolled: Array, beside: Beside | None) -> Joint | No
         Speed by the position [m/s]; NaN where unknown.
     beside : Beside or None
         Another view, which tells channels apart where no command does.
+    name : str
+        Signal that `rolled` is.
     """
     y = blocks.mean
     use = np.isfinite(y) & np.isfinite(rolled)
@@ -80,7 +82,8 @@ def joint_of(blocks: Blocks, rolled: Array, beside: Beside | None) -> Joint | No
     floor = 1.5 * float(np.median(np.abs(y - speed)[use])) + 0.01 * abs(gain) * usual
     noise = floor + _SHARE * np.abs(speed) + 0.5 * change
     return Joint(
-        Beside(speed, noise, _blame(blocks, speed, beside), np.zeros(y.size), "the position of its joint"), gain
+        Beside(speed, noise, _blame(blocks, speed, beside), np.zeros(y.size), f"the position of its joint ({name})"),
+        gain,
     )
 
 

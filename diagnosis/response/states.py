@@ -33,7 +33,7 @@ def judge(one: Judged, beside: Beside | None, dt: float, width: int) -> Judged:
     if beside is not None:  # what shakes other wheels too is no sensor's noise
         blocks = blocks._replace(usual=np.maximum(blocks.usual, beside.rough))
     rolled = one.data.rolled
-    joint = None if rolled is None else joint_of(blocks, cells(rolled, width), beside)
+    joint = None if rolled is None else joint_of(blocks, cells(rolled, width), beside, f"{one.data.name}_position")
     score = scores(blocks, one.driving, block_s, beside, None if joint is None else joint.view)
     places = one.wheel.samples.step[one.wheel.jumps.place] // width
     enters, leaves = np.full((2, len(score)), [[-np.expm1(-block_s / t)] for t in (MEAN_HEALTHY_S, MEAN_FAULTY_S)])

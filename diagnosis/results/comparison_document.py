@@ -128,7 +128,7 @@ class PreviousRow(TypedDict):
     """What became of the faults since another mission of the machine; `counts` and `coverage` hold what changed.
 
     `open_faults` are sentences on severe faults of earlier missions that an audit's fleet holds open when it writes the comparison;
-    it is there where there are any.
+    it is there where there are any, with `open_asof_ns`, when that was written [ns since 1970].
     """
 
     order: Literal["earlier", "later"]
@@ -140,6 +140,7 @@ class PreviousRow(TypedDict):
     loss: list[LossChangeRow]
     notes: list[str]
     open_faults: NotRequired[list[str]]
+    open_asof_ns: NotRequired[int]
 
 
 class ComparisonDocument(Worded):

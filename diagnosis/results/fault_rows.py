@@ -34,7 +34,7 @@ class FaultRow:
         To follow *was*: ``without signal``.
     title : str
         Title of a fault whose size is known, with any of ``{part}``, ``{mean}`` and ``{rms}`` of the saturation term and
-        ``{lost}`` [%]; without it, or with a size not known, part and label.
+        ``{lost}``, what is lost in words; without it, or with a size not known, part and label.
     """
 
     side: Side
@@ -54,7 +54,7 @@ FAULT_ROWS: tuple[FaultRow, ...] = (
         0.05,
         "Inefficient",
         "inefficient",
-        "{part} inefficient, {lost} % lost",
+        "{part} inefficient, {lost}",
     ),
     FaultRow(
         Side.SENSOR,
@@ -72,7 +72,7 @@ FAULT_ROWS: tuple[FaultRow, ...] = (
         0.05,
         "Inefficient",
         "inefficient",
-        "{part} inefficient, {lost} % lost",
+        "{part} inefficient, {lost}",
     ),
     FaultRow(
         Side.ACTUATOR,

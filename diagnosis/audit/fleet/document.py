@@ -189,6 +189,8 @@ def _machine(m: Machine, at: Mapping[str, int]) -> MachineRow:
         "last_verdict": m.last_verdict,
         "last_judged_ns": m.last_judged.result.start_ns if m.last_judged else None,
         "cleared": m.cleared,
+        "not_cleared": m.not_cleared,
+        "outdated": m.outdated,
         "unjudged": m.unjudged,
         "note": m.note,
         "missions": [at[r.name] for r in m.dated],

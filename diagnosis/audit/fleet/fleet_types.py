@@ -119,6 +119,10 @@ class MachineRow(Worded):
         Start of that mission.
     cleared : bool or None
         Whether that mission's report lets it go out, and that of each which may be later; null: not said.
+    not_cleared : str
+        Why that report does not let it go out; empty where it does, or is not of faults to watch.
+    outdated : bool
+        Whether the last report says that a fault of an earlier mission is open which is not any more: it was repaired since.
     unjudged : int
         Missions that were not judged and may be later: such a machine is not ``ready``.
     note : str
@@ -145,6 +149,8 @@ class MachineRow(Worded):
     last_verdict: Verdict
     last_judged_ns: int | None
     cleared: bool | None
+    not_cleared: NotRequired[str]
+    outdated: NotRequired[bool]
     unjudged: int
     note: str
     missions: list[int]

@@ -112,13 +112,16 @@ def _machine(key: Owner, runs: Iterable[Run], failed: Sequence[Mission], known: 
     own = limits(last.result.report or "") if limits and last else Limits()
     name = key[1] or (last.result.machine_name if last else "")
     m = Machine(key[0], name, tuple(dated), tuple(undated), tuple(failed), own)
-    return _with_faults(m.told(cleared=_cleared(m, limits), unjudged=_unjudged(m, first_seen)), known)
+    cleared, why = _cleared(m, limits)
+    return _with_faults(m.told(cleared=cleared, not_cleared=why, unjudged=_unjudged(m, first_seen)), known)
 
 
-def _cleared(m: Machine, limits: Callable[[str], Limits] | None) -> bool | None:
-    """Whether its last judged mission lets it go out, and every judged one that may be later."""
-    cleared = {limits(r.result.report).cleared if limits and r.result.report else None for r in m.newest}
-    return False if False in cleared else None if None in cleared or not cleared else True
+def _cleared(m: Machine, limits: Callable[[str], Limits] | None) -> tuple[bool | None, str]:
+    """Whether its last judged mission lets it go out, and every judged one that may be later; and why the first of those does not."""
+    said = [limits(r.result.report) if limits and r.result.report else None for r in m.newest]
+    cleared = {None if x is None else x.cleared for x in said}
+    why = next((x.not_cleared for x in said if x is not None and x.cleared is False), "")
+    return False if False in cleared else None if None in cleared or not cleared else True, why
 
 
 def _unjudged(m: Machine, first_seen: Callable[[str], int | None]) -> int:

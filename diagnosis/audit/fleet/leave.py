@@ -15,16 +15,18 @@ from diagnosis.audit.fleet.page.rows import fault_words, not_named
 from diagnosis.audit.fleet.runs import sides_of
 from diagnosis.audit.fleet.trend_types import TrendRow
 from diagnosis.audit.fleet.words import count, open_words
-from diagnosis.decision.wording import join_words
+from diagnosis.decision.severity import HALF
+from diagnosis.decision.wording import MORE, join_words
 from diagnosis.pages.labels import utc_moment
 from diagnosis.results.machine_words import words_of
 from diagnosis.results.vocabulary import Leave, Severity, Verdict
-from replay.faults import FaultMode
+from replay.faults import SCALED, FaultMode
 
 #: Statuses of faults that do not stand.
 GONE = ("past", "repaired")
 _FAULTS = 2
 _PARTS = 4
+_OUTDATED = "this report was written before the repair was recorded, and still says that the fault is open: this page holds the newest state"
 _DAMAGE, _BRIEF = "the log is damaged: ", "not judged long enough"
 
 
@@ -46,6 +48,10 @@ class Left:
         Place of the mission that says so, or that blocks it.
     name : str
         That mission's name; empty where there is none.
+    lead : str
+        What that mission is to the reason, to stand before its name; may be empty.
+    note : str
+        What whoever opens its report must know, to follow its name; mostly empty.
     """
 
     leave: Leave
@@ -54,6 +60,8 @@ class Left:
     reason: str
     mission: int | None
     name: str
+    lead: str = ""
+    note: str = ""
 
 
 def lists_of(document: FleetDocument) -> tuple[Left, ...]:
@@ -80,9 +88,12 @@ def lists_of(document: FleetDocument) -> tuple[Left, ...]:
         reason += _repaired(every[k], m) if leave is Leave.MAY else ""
         reason = _with_blind(_with_losses(leave, m, reason, untold), m)
         if leave is not Leave.MAY and any(f["open"] and f["since"] for f in standing[k]) and _ready(m, document):
-            reason += "; its newest report judges its own mission alone"
+            newest = document["missions"][m["missions"][-1]]["name"]
+            reason += f"; its newest report ({newest}) finds no fault, but judges its own mission alone"
         name = "" if place is None else document["missions"][place]["name"]
-        out.append(Left(leave, k, m["label"], reason, place, name))
+        lead = "– fault found in" if leave is Leave.MUST_NOT and standing[k] and name else ""
+        note = _OUTDATED if m.get("outdated") and m["missions"] and place == m["missions"][-1] else ""
+        out.append(Left(leave, k, m["label"], reason, place, name, lead, note))
     return tuple(out)
 
 
@@ -156,7 +167,18 @@ def _why(
             return place, f"{named + '; ' if named else ''}{_said(missions[place])}{lost}{more}"
     if last is not None and m["verdict"] == missions[last]["verdict"] == Verdict.NOT_ASSESSED:
         return last, _said(missions[last])
-    return last, f"{named}: {m['standing'][0].lower()}{m['standing'][1:]}" if named else m["standing"]
+    why = m.get("not_cleared", "").removesuffix(MORE)
+    stands = m["standing"] + (f", because {why}{_halved(faults)}" if why else "")
+    return last, f"{named}: {stands[0].lower()}{stands[1:]}" if named else stands
+
+
+def _halved(faults: Sequence[FleetFaultRow]) -> str:
+    """The rule behind it, where a part may have lost half or more."""
+    lost = any(
+        f["mode"] in SCALED and f["epsilon"] is not None and f["epsilon"]["high"] >= HALF and not f["since"]
+        for f in faults
+    )
+    return " (a part that may have lost half or more is checked first)" if lost else ""
 
 
 def _repaired(faults: Sequence[FleetFaultRow], m: MachineRow) -> str:

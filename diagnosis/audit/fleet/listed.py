@@ -35,6 +35,8 @@ class ListedMachine:
         Missions that are copies of one of its logs, in whichever folder, each with the name of that one.
     leave, reason, mission : str
         Whether it may go out, why, and the name of the mission that says so or blocks it.
+    lead, note : str
+        What that mission is to the reason, and what whoever opens its report must know; mostly empty.
     """
 
     label: str
@@ -47,6 +49,8 @@ class ListedMachine:
     reason: str = ""
     mission: str = ""
     copies: tuple[tuple[str, str], ...] = ()
+    lead: str = ""
+    note: str = ""
 
 
 def machine_words(m: MachineRow, standing: Sequence[FleetFaultRow], approaching: bool, leave: Leave = Leave.MAY) -> str:
@@ -100,6 +104,8 @@ def listed_machines(document: FleetDocument) -> tuple[ListedMachine, ...]:
                 lists[k].reason,
                 lists[k].name,
                 tuple(copies[k]),
+                lists[k].lead,
+                lists[k].note,
             )
         )
     return tuple(out)

@@ -115,6 +115,8 @@ class Machine:
     cleared : bool or None
         Whether the report of its last judged mission lets it go out, and that of each one which may be later; None where
         one does not say.
+    not_cleared : str
+        Why that report does not let it go out; empty where it does, or is not of faults to watch.
     unjudged : int
         Missions that were not judged and may be later than the last judged one.
     faults : tuple[FleetFault, ...]
@@ -130,9 +132,15 @@ class Machine:
     failed: tuple[Mission, ...]
     limits: Limits = field(default_factory=Limits)
     cleared: bool | None = None
+    not_cleared: str = ""
     unjudged: int = 0
     faults: tuple[FleetFault, ...] = ()
     repaired: frozenset[tuple[int, str, str, str]] = frozenset()
+
+    @property
+    def outdated(self) -> bool:
+        """Whether its last report holds a fault of an earlier mission open that is not open any more: it was repaired since."""
+        return self.limits.holds_open and not any(f.open and f.since for f in self.faults)
 
     def told(self, **more: Any) -> Machine:
         """The same with other values than missions and limits; what was found about those is kept, for there is much of it."""

@@ -20,7 +20,8 @@ class Limits:
     """What a report says of limits, steering components, leave to go out (None: it does not say), and words.
 
     The defaults are those of the paper's machine. `found` has the share of places of the mission at which a fault of ten
-    seconds would have been found, by component, side and mode; what is not there was not said.
+    seconds would have been found, by component, side and mode; what is not there was not said. `not_cleared` is why faults to watch
+    give no leave; `holds_open` whether an audit has written into the report that a fault of an earlier mission is open.
     """
 
     min_epsilon: float = 0.1
@@ -28,6 +29,8 @@ class Limits:
     wheels: tuple[str, ...] = ("FR", "FL", "RR", "RL")
     axles: tuple[str, ...] = ("front", "rear")
     cleared: bool | None = None
+    not_cleared: str = ""
+    holds_open: bool = False
     found: Mapping[tuple[str, str, str], float] = field(default_factory=dict, hash=False)
     words: MachineWords = HYDRAULIC
 

@@ -99,3 +99,13 @@ def test_the_document_counts_states_and_verdicts() -> None:
     assert found["verdicts"] == {"ready": 1}
     assert found["problems"] == ["nowhere: no such file"]
     assert [m["name"] for m in found["missions"]] == ["a", "b"]
+
+
+def test_a_report_from_before_a_repair_is_said_to_be_so_beside_its_mission() -> None:
+    gone_out = replace(
+        M1, leave="may go out", reason="no fault in its last mission", mission="M1/b", note="from before"
+    )
+    kept_in = replace(M2, leave="must not go out", reason="FR stuck", mission="M2/a", lead="– fault found in")
+    lines = printed(machines=(kept_in, gone_out))
+    assert "• M2 – FR stuck  – fault found in M2/a" in lines
+    assert "• M1 – no fault in its last mission  M1/b (from before)" in lines

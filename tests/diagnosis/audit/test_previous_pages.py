@@ -14,6 +14,7 @@ from diagnosis.audit.store.keys import Key
 from diagnosis.audit.store.locks import lock_mission
 from diagnosis.audit.store.store import Store
 from diagnosis.output import write_result
+from diagnosis.pages.labels import utc
 from diagnosis.results.result import MissionResult
 from tests import fleet_samples as samples
 from tests import report_samples
@@ -107,6 +108,9 @@ def test_the_newest_report_says_what_is_open_from_earlier_missions(tmp_path: Pat
     assert said.endswith(", no repair recorded, clean in 2 of the 10 missions that it takes to close it")
     page = (tmp_path / "missions/new/report.html").read_text("utf-8")
     assert "Open from earlier missions" in page
+    written_on = utc(document(path, "new")["previous"]["open_asof_ns"])[:10]
+    assert f"when the audit wrote this, on {written_on}; the fleet page holds the newest state." in page
+    assert f"a fault of an earlier mission was open on {written_on}, when this was written" in page
     assert said in page
     assert "Ready for the next mission" not in page.partition('id="verdict"')[2].partition("</section>")[0]
     assert "No fault in this mission" in page

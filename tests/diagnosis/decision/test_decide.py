@@ -14,11 +14,12 @@ from diagnosis.results.assessment import CODE, Assessment, Finding, unassessed
 from diagnosis.results.detectability import Detectable, Deviation
 from diagnosis.results.machine_event import not_following
 from diagnosis.results.machine_words import HYDRAULIC
-from diagnosis.results.result import Epsilon, Hypothesis
+from diagnosis.results.result import Epsilon, Hypothesis, Sat
 from diagnosis.results.vocabulary import Kind, Tier
 from diagnosis.results.wheel_model import WheelModelFit
 from replay.faults import FaultMode, Side, State
 from replay.machine.config import Limits
+from replay.machine.quantities import OPENING
 from tests.diagnosis.decision.findings import AXLES, LIMITS, MACHINE, SIDES, STEP, N, assessed, finding, machine
 
 
@@ -189,7 +190,7 @@ def test_faults_to_watch_are_cleared_only_where_all_else_is_ready() -> None:
     assert (verdict(parts).cleared, verdict(parts).not_cleared) == (True, "")
     short = verdict(parts, dict.fromkeys(parts, 20.0) | {("FL", "sensor"): 9.9, ("FL", "actuator"): 0.0})
     assert (short.status, short.cleared) == ("watch", False)
-    assert short.not_cleared == "2 parts were not judged long enough"
+    assert short.not_cleared == "1 part was not judged and 1 part was not judged long enough"
     damaged = verdict(parts, damage=("chunk 7 is cut off",))
     assert (damaged.status, damaged.cleared, damaged.not_cleared) == ("watch", False, "the log is damaged")
     half = machine(FR_actuator=assessed(finding(Side.ACTUATOR, FaultMode.INEFFICIENT, epsilon=0.6)))
@@ -263,13 +264,13 @@ def test_a_model_of_this_mission_says_what_it_does_not_show() -> None:
 
     none = (None,) * 4
     (some,) = verdict(parts, model=model, shown=shown((0.37, None, None, None), none)).caveats
-    assert "may begin: on 1 of 2 sensors those of 37 % or more, on the other none; on no valve any." in some
+    assert "may begin: on 1 of 2 speed sensors those of 37 % or more, on the other none; on no drive valve any." in some
     (nothing,) = verdict(parts, model=model, shown=shown(none, none)).caveats
     assert "need not show, however large" in nothing
     rows = shown((0.12, 0.31, 0.2, 0.2), (0.4, None, None, 0.4))
     (told,) = verdict(parts, model=model, shown=rows).caveats
     assert (
-        "on every sensor those of 12 to 31 % or more (by part); on 1 of 2 valves those of 40 % or more, on the other none."
+        "on every speed sensor those of 12 to 31 % or more (by part); on 1 of 2 drive valves those of 40 % or more, on the other none."
         in told
     )
     assert verdict(parts, model=replace(model, identified=False)).caveats == ()
@@ -362,6 +363,32 @@ def test_what_is_unclear_in_several_ways_is_said_once_and_losses_have_bounds() -
     text = str(verdict(machine(FR_actuator=assessed(*parts))).actions[0]["text"])
     assert "faulty, kind unclear for 1.0 s in 2 faults" in text
     assert "inefficient (40 to 50 % lost, from fault to fault, 95 % bounds 39 to 51 %) for 2.2 min in 2 faults" in text
+
+
+def test_a_sensor_that_lost_something_reads_too_little() -> None:
+    found = finding(Side.SENSOR, FaultMode.INEFFICIENT, 9_000, 19_000, epsilon=0.47)
+    got = verdict(machine(FR_sensor=assessed(found)))
+    assert got.text == (
+        "The FR speed sensor was inefficient (reads 47 % too little, 95 % bounds 46 to 48 %) for 10.0 s."
+    )
+
+
+def test_where_a_valve_is_stuck_stands_in_the_verdict() -> None:
+    def held(start: int, at: float, half: float = 0.01) -> Finding:
+        found = finding(Side.ACTUATOR, FaultMode.STUCK, start, start + 2000)
+        return replace(found, sat=Sat(at, abs(at), at - half, at + half, OPENING))
+
+    def said(*found: Finding) -> str:
+        return verdict(machine(FR_actuator=assessed(*found))).text
+
+    assert said(held(0, 0.341)) == "The FR drive valve was stuck at +34 % of opening (forward) for 2.0 s."
+    assert "stuck at +34 % of opening (forward) and −20 % of opening (reverse) for 4.0 s" in said(
+        held(0, 0.341), held(5000, -0.2)
+    )
+    for unknown in ([held(0, 0.3, half=0.2)], [held(k * 5000, 0.1 * k) for k in range(3)]):
+        assert "stuck for" in said(*unknown)
+    axle = verdict(machine(front_actuator=assessed(held(0, 0.341)))).text
+    assert "stuck at +34 % of opening for" in axle
 
 
 def test_a_loss_of_which_nothing_is_known_has_no_size() -> None:

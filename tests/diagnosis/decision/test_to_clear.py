@@ -47,6 +47,16 @@ def test_what_hides_a_part_is_repaired_first() -> None:
     assert "repair the speed sensor first" in one
 
 
+def test_an_axle_that_was_hardly_steered_keeps_none_in_and_yet_says_what_has_it_judged() -> None:
+    rested = replace(OPEN, states=np.full(N, CODE[State.NOT_EXCITED]), reasons={State.NOT_EXCITED: "not steered"})
+    parts = {**PARTS, ("front", "actuator"): rested}
+    of_wheels = (("FR", "sensor"),)
+    first, last = told(Reservations(short=of_wheels, open_state={("front", "actuator"): State.NOT_EXCITED}), parts)
+    assert first.startswith("FR speed sensor")
+    assert last.startswith("front steering valve: judged for 20.0 s of driving, of 48 s needed (not steered).")
+    assert last.endswith("steer from stop to stop several times while driving")
+
+
 def test_what_deviates_most_comes_first_and_before_what_is_not_shown() -> None:
     checks = [
         Checked(Kind.WHEEL, "FR", Side.SENSOR_OR_ACTUATOR, Check.EXCESS, None, 0.1),

@@ -100,7 +100,7 @@ def test_titles_of_all_rows_with_their_sizes() -> None:
     }
     assert list(titles.values()) == [
         "FR speed sensor: no signal",
-        "FR speed sensor inefficient, 12 % lost",
+        "FR speed sensor inefficient, reads 12 % too little",
         "FR speed sensor noisy, 0.0307 m/s r.m.s. of noise",
         "FR drive valve: no signal",
         "FR drive valve inefficient, 12 % lost",

@@ -58,6 +58,16 @@ def test_channels_that_the_sentences_name() -> None:
     assert rests_on(fault(tier="none"), columns, HYDRAULIC) == ""
 
 
+def test_evidence_by_the_position_of_the_own_joint_says_so() -> None:
+    by_joint = fault(
+        tier="response", evidence=["wheel.FR.v is 0.53 × what the position of its joint (wheel.FR.v_position) shows."]
+    )
+    names = ["wheel.FR.v", "wheel.FR.v_position"]
+    assert rests_on(by_joint, names, HYDRAULIC) == "position of its joint: wheel.FR.v, wheel.FR.v_position"
+    beside = fault(tier="response", evidence=["wheel.FR.v is 0.53 × what wheel.FL.v shows."])
+    assert rests_on(beside, names, HYDRAULIC) == "command response: wheel.FR.v"
+
+
 def test_sentence_about_the_onset() -> None:
     texts = ["Residual 0.1 m/s, which jumps.", "The speed dropped by 0.2 m/s at once."]
     assert shape_sentence(fault(evidence=texts, about=["deviation", "onset"])) == texts[1]

@@ -43,6 +43,13 @@ def test_no_certainty_that_is_not_there(p: float, words: str) -> None:
     assert percent(p) == words
 
 
+def test_what_the_position_of_a_joint_shows_is_no_want_of_a_second_measurement() -> None:
+    own = fault(0.96, side="sensor", tier="response", evidence=["It is 0.5 × what wheel.FR.v_position shows."])
+    said = sure_of(own, samples.report_with(coverage=[]))
+    assert said.endswith("against what the position of its own joint shows of the same speed")
+    assert "without a second measurement" in sure_of({**own, "evidence": ["."]}, samples.report_with(coverage=[]))
+
+
 def test_phrase_of_a_fault() -> None:
     report = samples.report_with(coverage=[row("actuator", 91.0), row("sensor", 100.0)])
     assert "Very likely (96 %, the most that any finding is given), measured" in sure_of(fault(0.96), report)

@@ -5,7 +5,7 @@ import re
 import numpy as np
 import pytest
 
-from diagnosis.report.machine_picture import condition, machine_picture
+from diagnosis.report.machine_picture import condition, machine_picture, places_in_words
 from diagnosis.report.path_picture import path_picture
 from diagnosis.report.standing import Standing
 from diagnosis.report.thumbnail import thumbnail
@@ -28,6 +28,12 @@ def test_front_left_stands_at_the_top_left() -> None:
     assert 'data-f="F4"' in picture
 
 
+def test_short_names_of_wheels_are_spelled_out() -> None:
+    named = places_in_words(samples.report_with(machine={"wheels": ["FR", "ML"]}))
+    assert named == "FR = front right, ML = middle left"
+    assert places_in_words(samples.report_with(machine={"wheels": ["FR", "drive"]})) == ""
+
+
 @pytest.mark.parametrize("count", [0, 1, 3, 12])
 def test_any_number_of_wheels_without_geometry(count: int) -> None:
     picture = machine_picture(samples.report_with(machine={"wheels": [f"w{i}" for i in range(count)]}))
@@ -39,6 +45,13 @@ def test_part_that_was_never_judged_is_not_called_healthy() -> None:
     assert (half.state, half.lines) == ("not_assessed", ("No fault found", "drive valve not judged"))
     none = condition("FR", Kind.WHEEL, [], {})
     assert (none.state, none.lines) == ("not_assessed", ("Not judged",))
+
+
+def test_what_was_not_judged_of_a_faulty_wheel_is_said_too() -> None:
+    found = condition("FR", Kind.WHEEL, [FAULT], CLEARED | {("FR", "actuator"): Standing.NOT_JUDGED})
+    assert found.lines[-1] == "drive valve not judged"
+    assert found.title.endswith(", drive valve not judged")
+    assert condition("FR", Kind.WHEEL, [FAULT], CLEARED).lines[-1] == "1.0 s"
 
 
 def test_thumbnail_keeps_gaps_and_clips_to_the_mission() -> None:

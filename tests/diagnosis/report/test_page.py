@@ -235,6 +235,14 @@ def test_injected_faults_are_announced_above_the_verdict() -> None:
     assert 'class="banner"' not in build_page(report, columns)
 
 
+def test_a_loss_that_may_be_anything_is_given_as_not_known() -> None:
+    report, columns = samples.one_wheel()
+    report["intervals"][0] |= {"epsilon": {"value": 0.571, "low": 0.0, "high": 1.0}, "mode": "noisy"}
+    words = " ".join(Tree(build_page(report, columns)).text.split())
+    assert "ε̂ not known" in words
+    assert "0.571" not in words
+
+
 def test_table_and_evidence_tell_the_delay_and_what_a_fault_rests_on() -> None:
     report, columns = samples.one_wheel()
     report["intervals"][0] |= {"detected_s": 30.25, "tier": "signal", "evidence": ["wheel.drive.v stood still."]}

@@ -50,7 +50,7 @@ def test_a_speed_that_leaves_its_own_position_is_the_sensors_fault(seed: int, fa
     j = judged(measured, rolled, asked, body)
     assert found(j) == [("FL", Side.SENSOR, mode)]
     (finding,) = j.parts["FL"][0].findings
-    assert any("the position of its joint" in e for e in finding.evidence)
+    assert any("the position of its joint (wheel.FL.v_position)" in e for e in finding.evidence)
 
 
 @pytest.mark.parametrize("seed", campaign([41, 42]))

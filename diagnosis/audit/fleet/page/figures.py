@@ -13,6 +13,7 @@ from diagnosis.audit.store.outcome import MissionState
 from diagnosis.decision.wording import join_words
 from diagnosis.pages import labels
 from diagnosis.results.machine_words import words_of
+from diagnosis.results.vocabulary import Verdict
 
 _FOLDERS = 4  # that are named
 _STATUSES = {"new": "new", "recurring": "recurring", "once": "found once", "past": "past", "repaired": "repaired"}
@@ -101,7 +102,10 @@ def blind(machines: Sequence[MachineRow], document: ShownDocument) -> list[Conte
         if parts:
             last = document["missions"][m["missions"][-1]] if m["missions"] else None
             address = "" if last is None or not last["address"] else last["address"]
-            out.append({"label": m["label"], "parts": join_words(parts), "address": address})
+            # of one that is ready nothing is to be done: the checks of its axles passed
+            ready = last is not None and last["verdict"] == Verdict.READY
+            says = "why" if ready else "why, and what would have them judged"
+            out.append({"label": m["label"], "parts": join_words(parts), "address": address, "says": says})
     return out
 
 

@@ -148,6 +148,8 @@ def _leave(lists: Sequence[Left], document: ShownDocument) -> list[Context]:
                 "name": "" if x.mission is None else document["missions"][x.mission]["name"],
                 "files": [] if x.mission is None else document["missions"][x.mission]["files"][:2],
                 "address": "" if x.mission is None else document["missions"][x.mission]["address"],
+                "lead": x.lead,
+                "note": x.note,
             }
             for x in lists
             if x.leave is leave

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import sqlite3
 from contextlib import closing
 from pathlib import Path
@@ -11,6 +12,8 @@ from diagnosis.audit.fleet.listed import listed_machines
 from diagnosis.audit.fleet.page.page import build_fleet_page
 from diagnosis.audit.fleet_files import fleet_json, load_fleet
 from diagnosis.audit.store.database import Database
+from diagnosis.audit.store.repairs import Repair, record_repair
+from diagnosis.audit.store.store import Store
 from diagnosis.results.vocabulary import Leave
 from tests import fleet_samples as samples
 from tests.fleet_samples import Fault, Sample
@@ -81,9 +84,10 @@ def test_an_open_fault_and_a_rising_loss_are_said(tmp_path: Path) -> None:
     ]
     found = listed(tmp_path, stuck, Sample("a/2", "a", day=1.0), *worn)
     assert found["a"].reason == (
-        "FR speed sensor stuck, no repair recorded, clean in 1 of the 10 missions that it takes to close it; its newest report judges "
-        "its own mission alone"
+        "FR speed sensor stuck, no repair recorded, clean in 1 of the 10 missions that it takes to close it; its newest report "
+        "(a/2) finds no fault, but judges its own mission alone"
     )
+    assert (found["a"].name, found["a"].lead) == ("a/1", "– fault found in")
     assert "RL drive valve inefficient, rising" in found["b"].reason or found["b"].leave is not Leave.MAY
 
 
@@ -146,6 +150,53 @@ def test_a_loss_that_may_be_within_its_limit_is_told_beside_the_leave(tmp_path: 
     )
     assert words == "Ready"
     assert title == "The machine may go out"
+
+
+def said_by(folder: Path, name: str, **more: object) -> None:
+    """Let a mission's report say more than what the fleet's samples have."""
+    path = folder / "missions" / name / "report.json"
+    report = json.loads(path.read_text(encoding="utf-8"))
+    report["verdict"] |= more.pop("verdict", {})
+    path.write_text(json.dumps(report | more), encoding="utf-8")
+
+
+def test_what_must_be_checked_first_says_why(tmp_path: Path) -> None:
+    """A part that may have lost half is the reason, not the parts that were judged too briefly."""
+    lost = Sample("a", verdict="watch", faults=[Fault("RR", "actuator", epsilon=(0.34, 0.14, 0.54))])
+    store = samples.write_store(tmp_path / "fleet.sqlite", [lost])
+    samples.write_report(tmp_path, "a", cleared=False)
+    said_by(tmp_path, "a", verdict={"not_cleared": "the RR drive valve may have lost up to 54 %; more below"})
+    (one,) = lists_of(fleet_json(load_fleet(store)))
+    assert one.leave is Leave.CHECK
+    assert one.reason.endswith(
+        "not cleared, because the RR drive valve may have lost up to 54 % (a part that may have lost half or more is checked first)"
+    )
+
+
+def test_a_report_from_before_the_repair_is_said_to_be_so(tmp_path: Path) -> None:
+    silent = Fault("FR", "sensor", "no_signal", "high")
+    missions = [Sample("a", verdict="stop", faults=[silent]), Sample("b", day=2.0)]
+    store = samples.write_store(tmp_path / "fleet.sqlite", missions)
+    for mission in missions:
+        samples.write_report(tmp_path, mission.name, cleared=True)
+    said_by(tmp_path, "b", previous={"open_faults": ["FR speed sensor no signal, no repair recorded"]})
+    (one,) = lists_of(fleet_json(load_fleet(store)))
+    assert (one.leave, one.note) == (Leave.MUST_NOT, "")  # it is open still, as the report says
+    with Store.open(store) as opened:
+        record_repair(opened, Repair(("HX-1", ""), "FR", "", samples.START_NS + samples.DAY_NS))
+    document = fleet_json(load_fleet(store))
+    (one,) = lists_of(document)
+    assert (one.leave, one.name) == (Leave.MAY, "b")
+    assert one.note.startswith("this report was written before the repair was recorded")
+    assert f"({one.note})" in build_fleet_page(document)
+
+
+def test_a_report_is_not_said_to_tell_what_it_does_not(tmp_path: Path) -> None:
+    """That of a machine that is ready says why a part of an axle was not judged, and asks for nothing."""
+    for verdict, says in (("ready", "why"), ("not_assessed", "why, and what would have them judged")):
+        one = Sample("a", verdict=verdict, blind=[("front", "actuator")])
+        page = build_fleet_page(fleet_json(load_fleet(samples.write_store(tmp_path / verdict / "fleet.sqlite", [one]))))
+        assert f"its report</a> says {says}</li>" in page
 
 
 def test_each_fault_of_a_row_names_its_mission_where_they_are_several(tmp_path: Path) -> None:
