@@ -42,7 +42,7 @@ def _nothing_moves(cells: Cells) -> Flags:
     moves = (np.abs(np.nan_to_num(speed)) > rest) | (np.abs(np.nan_to_num(second)) > rest)
     passed = np.abs(np.nan_to_num(lowest_passed(used, cells.dt, _LAG_S)))
     least = np.array([_needs(u[m]) for u, m in zip(passed.T, moves.T, strict=True)])
-    count, width = np.count_nonzero(known), lambda seconds: max(1, round(seconds / cells.dt))
+    count = np.count_nonzero(known)
     fast = np.abs(np.nan_to_num(speed)).max(axis=1) > _HELD * cells.machine.max_speed
     rests = ~fast & (np.count_nonzero(moves, axis=1) <= (1 if count > _WHEELS else 0))
     rests &= np.isfinite(speed[:, known]).all(axis=1)
@@ -52,10 +52,14 @@ def _nothing_moves(cells: Cells) -> Flags:
         return np.asarray(np.count_nonzero((passed >= least)[:, known], axis=1) > 0.5 * count)
 
     enough = open_(np.maximum(_OPEN, least))
-    still = _lasting(enough & rests, width(_LEAST_S))
-    still |= _lasting(open_(np.maximum(_OPEN, _LESS * least)) & rests & stands, width(_LEAST_WITH_AXLE_S))
+    still = _lasting(enough & rests, _cells_in(_LEAST_S, cells))
+    still |= _lasting(open_(np.maximum(_OPEN, _LESS * least)) & rests & stands, _cells_in(_LEAST_WITH_AXLE_S, cells))
     drives = np.count_nonzero(enough & moves[:, known].all(axis=1))
     return _until(still, ~rests | turns) if drives > _ELSEWHERE * np.count_nonzero(still) else none
+
+
+def _cells_in(seconds: float, cells: Cells) -> int:
+    return max(1, round(seconds / cells.dt))
 
 
 def _axles(cells: Cells) -> tuple[Flags, Flags]:
@@ -64,9 +68,9 @@ def _axles(cells: Cells) -> tuple[Flags, Flags]:
     if len(angle) < _EDGES or not angle.shape[1]:
         none = np.zeros(cells.size, np.bool_)
         return none, none
-    turns = np.abs(np.nan_to_num(np.gradient(angle, cells.dt, axis=0))) > _TURNS
+    turns = np.asarray(np.abs(np.nan_to_num(np.gradient(angle, cells.dt, axis=0))) > _TURNS)
     told = (command > _STEERED) & np.isfinite(angle)
-    return turns.any(axis=1), np.asarray(told.any(axis=1) & ~(told & turns).any(axis=1))
+    return np.asarray(turns.any(axis=1)), np.asarray(told.any(axis=1) & ~(told & turns).any(axis=1))
 
 
 def _needs(opening: Array) -> float:

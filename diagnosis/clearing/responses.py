@@ -116,22 +116,23 @@ def responses_of(
     changes: list[float | None] = []
     grown: list[float | None] = []
     for i, wheel in enumerate(cells.machine.wheels):
+        ways_apart = [ahead[:, i], ~ahead[:, i]]
         own = np.where(cells.explained(wheel), np.nan, log[:, i])  # a stated fault is not what is usual
         if np.count_nonzero(np.isfinite(own)) < _LEAST_WINDOWS:  # it is nearly all that there is
             own = log[:, i]
         usual: list[float] = []
         ways: list[float | None] = []
-        for way in (ahead[:, i], ~ahead[:, i]):
+        for way in ways_apart:
             here = way & np.isfinite(own)
-            known = np.count_nonzero(here) * frame.hop * cells.dt >= _USUAL_S
-            ways.append(float(np.median(own[here])) if known else None)
-            usual += [ways[-1]] if ways[-1] is not None else []
-        for way, middle, other in zip((ahead[:, i], ~ahead[:, i]), ways, ways[::-1], strict=True):
-            here = way & np.isfinite(own)
+            lasts = np.count_nonzero(here) * frame.hop * cells.dt >= _USUAL_S
+            ways.append(float(np.median(own[here])) if lasts else None)
+        for k, middle in enumerate(ways):
+            here = ways_apart[k] & np.isfinite(own)
+            usual += [] if middle is None else [middle]
             if here.any():  # what is too short to be usual is held to the other way's usual one: it may be all fault
-                expected = middle if middle is not None else other if other is not None else float(np.median(own[here]))
-                off[way, i] = log[way, i] - expected
-        ways_apart = [ahead[:, i], ~ahead[:, i]]
+                either = [x for x in (middle, ways[1 - k]) if x is not None]
+                expected = either[0] if either else float(np.median(own[here]))
+                off[ways_apart[k], i] = log[ways_apart[k], i] - expected
         asked = over_time and bool(usual)
         changes.append(largest_change(own, ways_apart) if asked else None)
         grown.append(growth(own, ways_apart) if asked else None)

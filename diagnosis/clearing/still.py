@@ -82,9 +82,9 @@ def commanded_still(cells: Cells, j: int) -> Array:
     size, ahead = frame.rms(rate), frame.mean(rate) * np.sign(mean)
     creeps = (ahead >= _CREEPS) & (ahead >= _STEADY * size) & (ahead >= _OBEYS * _given(cells, np.abs(mean)))
     rests = (size < _STILL) & ~stopped & ~creeps
-    stalls, ahead = nothing_moves(cells), round(_STALLS_S / cells.dt)
-    soon = np.lib.stride_tricks.sliding_window_view(np.pad(stalls, (0, ahead)), ahead + 1).any(axis=1)
-    gone = frame.sums(soon.astype(np.float64)) > 0.0  # no axle turns where no wheel does
+    before, stalls = round(_STALLS_S / cells.dt), nothing_moves(cells)
+    soon = np.lib.stride_tricks.sliding_window_view(np.pad(stalls, (0, before)), before + 1).any(axis=1)
+    gone = frame.sums(np.asarray(soon, np.float64)) > 0.0  # no axle turns where no wheel does
     return np.asarray(np.where(np.isfinite(mean) & ~gone, np.where(rests, np.abs(mean), 0.0), np.nan))
 
 
@@ -104,7 +104,7 @@ def opens_late(cells: Cells, j: int) -> bool:
     band = float(rests.max())
     sooner = np.count_nonzero(turns & (most > _ANSWERED) & (most < _SOONER * band))
     later = np.count_nonzero(turns & (most > _LATER * band))
-    return band <= _LATEST and later >= _RESTS and sooner <= _SELDOM * rests.size
+    return bool(band <= _LATEST and later >= _RESTS and sooner <= _SELDOM * rests.size)
 
 
 def _given(cells: Cells, opening: Array) -> Array:
