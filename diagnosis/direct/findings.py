@@ -38,7 +38,7 @@ _HOLD_S = 0.1
 _LEAD_S, _TAIL_S, _CHAIN_S = 0.3, 0.1, 0.05
 _SETTLED_LAGS = 5.0  # after a fault a channel returns with its lag
 _CLEAR = 3.0  # times the noise
-_WITHIN_P = 0.7  # of noise whose root mean square stays below that
+_WITHIN_P = 0.7  # of noise whose root mean square stays below that, at most; all of it from one more time the noise on
 _MOST_SHIFTED = 0.4  # of the span: no channel that lives is off by more
 _END, _SAME_WAY = 0.97, 0.3  # of the span: where a valve stands, and at least what it is told, the same way
 _LARGEST, _BEYOND = 0.999, 0.9  # of the largest reading; of the time
@@ -157,8 +157,10 @@ def finding_of(run: Run, found: IdentifiedPair, limits: Limits) -> Finding | Non
         return None
     ahead = [r for r in codes_of(pair.side) if r != HEALTHY and p[r] >= p[run.row]]
     p[ahead] = p[ahead].mean()  # what other rows explain as well is called by none of them more surely
-    if run.row in VARYING_ROWS and isolated.seen.deviation < _CLEAR * isolated.seen.noise:
-        more = max(float(p[run.row]) - _WITHIN_P, 0.0)  # it deviates by no more than a healthy one may
+    if run.row in VARYING_ROWS:
+        times = isolated.seen.deviation / max(isolated.seen.noise, 1e-30)
+        most = _WITHIN_P + (1.0 - _WITHIN_P) * max(times - _CLEAR, 0.0)
+        more = max(float(p[run.row]) - most, 0.0)  # it deviates by hardly more than a healthy one may
         p[run.row] -= more
         p[HEALTHY] += more
     epsilon, sat, _ = isolated.estimate
