@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from diagnosis.channels.liveness import alive
 from diagnosis.steering.blocks import SensorNoise, SteeringBlocks, block_length, blocks_of, sensor_noise
 from diagnosis.steering.redundancy import with_second_angle, with_valve_opening
+from diagnosis.steering.silence import silences
 from replay.control.loop import Replay
 from replay.machine.config import Machine, Noise
 from replay.signals.timeline import Timeline
@@ -45,6 +46,8 @@ class AxleInputs:
         Of the angle.
     valve_deviation : Array, shape (n,), or None
         Opening less command as multiples of its noise; None unless both are logged.
+    silent : tuple[tuple[int, int], ...]
+        Samples [start, stop) in which the angle has no value for long while its source delivers.
     """
 
     name: str
@@ -54,6 +57,7 @@ class AxleInputs:
     blocks: SteeringBlocks | None = None
     noise: SensorNoise = _NO_NOISE
     valve_deviation: Array | None = None
+    silent: tuple[tuple[int, int], ...] = ()
 
     @property
     def measured(self) -> str:
@@ -175,4 +179,5 @@ def _with_blocks(inputs: AxleInputs, machine: Machine, counts: Counts, length: i
         new = timeline.fresh[inputs.channel("u_applied")]
         position = inputs.values("u_applied")
         blocks, deviation = with_valve_opening(blocks, inputs.command, position, new, timeline.dt)
-    return replace(inputs, blocks=blocks, noise=noise, valve_deviation=deviation)
+    silent = silences(y, delivers, timeline.dt)
+    return replace(inputs, blocks=blocks, noise=noise, valve_deviation=deviation, silent=silent)

@@ -1,0 +1,76 @@
+"""A steering sensor that delivers nothing while its source does has no signal, whatever the axle's model makes of the time without it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from diagnosis.results.assessment import CODE, Assessment, Finding
+from diagnosis.results.result import Epsilon, Hypothesis
+from diagnosis.results.vocabulary import Tier
+from replay.faults import FaultMode, Side, State
+
+_LEAST_S = 3.0  # a shorter while may be a disturbed bus
+_AS_USUAL = 0.7  # of how often its source delivers elsewhere
+_P = 0.95
+Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+Span = tuple[int, int]
+
+
+def silences(y: Array, delivers: Flags, dt: float) -> tuple[Span, ...]:
+    """Samples [start, stop) in which a channel has no value for long, while its source goes on as usual.
+
+    Parameters
+    ----------
+    y : Array, shape (n,)
+        The channel; NaN where it has no value.
+    delivers : NDArray[np.bool_], shape (n,)
+        Steps at which other signals of its source come.
+    dt : float
+        Step [s].
+    """
+    known = np.isfinite(y)
+    if not known.any():
+        return ()
+    usual = float(np.mean(delivers[known]))
+    missing = ~known
+    missing[: int(np.argmax(known))] = False  # what has not begun yet may be late
+    edges = np.flatnonzero(np.diff(np.r_[False, missing, False].astype(np.int8)))
+    spans = [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True) if (b - a) * dt >= _LEAST_S]
+    return tuple((a, b) for a, b in spans if usual > 0.0 and float(np.mean(delivers[a:b])) >= _AS_USUAL * usual)
+
+
+def with_silence(assessment: Assessment, spans: Sequence[Span], name: str, dt: float) -> Assessment:
+    """An assessment of a sensor with what it leaves out: that the sensor was silent for long.
+
+    Parameters
+    ----------
+    assessment : Assessment
+        By the model.
+    spans : Sequence[tuple[int, int]]
+        From `silences`.
+    name : str
+        The channel.
+    dt : float
+        Step [s].
+    """
+    told = assessment.findings
+    left = [(a, b) for a, b in spans if not any(f.start < b and f.stop > a for f in told)]
+    if not left:
+        return assessment
+    states = assessment.states.copy()
+    for a, b in left:
+        states[a:b] = CODE[State.NO_SIGNAL]
+    text = "{name} delivered nothing for {seconds:.1f} s while other signals of its source came."
+    more = [_finding(a, b, text.format(name=name, seconds=(b - a) * dt)) for a, b in left]
+    return replace(assessment, states=states, findings=tuple(sorted([*told, *more], key=lambda f: f.start)))
+
+
+def _finding(start: int, stop: int, text: str) -> Finding:
+    mode, side = FaultMode.NO_SIGNAL, Side.SENSOR.value
+    rows = (Hypothesis(side, mode.value, _P), Hypothesis("none", State.HEALTHY.value, 1.0 - _P))
+    return Finding(start, stop, Side.SENSOR, mode, _P, rows, Epsilon(1.0, 1.0, 1.0), None, (text,), Tier.SIGNAL)
