@@ -14,6 +14,7 @@ from diagnosis.channels.copied_rows import without_copied_rows
 from diagnosis.channels.recording_gaps import recording_gaps, without_gaps
 from diagnosis.channels.resting_position import with_zeroed_positions
 from diagnosis.channels.shared_gain import without_shared_gain
+from diagnosis.channels.silence import with_silent_sensors
 from diagnosis.clearing.backwards import without_claims
 from diagnosis.clearing.beside import (
     less_sure_beside_dead_sensors,
@@ -184,7 +185,8 @@ def _walk(
 def _outside_gaps(found: ComponentResult, timeline: Timeline) -> ComponentResult:
     """Nothing is judged where nothing was recorded; findings that are one fault are one."""
     gaps = recording_gaps(timeline)
-    seen = {key: without_gaps(a, gaps, timeline) for key, a in found.assessments.items()}
+    told = with_silent_sensors(found.assessments, timeline)
+    seen = {key: without_gaps(a, gaps, timeline) for key, a in told.items()}
     joined = with_episodes(seen, timeline.dt)
     return replace(found, assessments=with_second_onsets(joined, timeline.dt))
 

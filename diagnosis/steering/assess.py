@@ -32,7 +32,6 @@ from diagnosis.steering.path_refinement import refine_path
 from diagnosis.steering.plant import SteeringPlant
 from diagnosis.steering.prior import plant_before
 from diagnosis.steering.reliability import commanded, lost_by_model, paired, weighed
-from diagnosis.steering.silence import with_silence
 from diagnosis.steering.states import REASONS, states_of
 from diagnosis.steering.together import less_sure_all_along, not_starved, not_together
 from replay.arrays.processors import each
@@ -233,8 +232,6 @@ def _judged(inputs: AxleInputs, told: _Found, *, otherwise: bool) -> _Judged:
             notes=(_note(axle), _OTHERWISE) if otherwise else (_note(axle),),
             unexplained_s=unexplained * inputs.timeline.dt,
         )
-    if inputs.measured == "phi":
-        sides[Side.SENSOR] = with_silence(sides[Side.SENSOR], inputs.silent, inputs.channel("phi"), inputs.timeline.dt)
     return _Judged(sides, path_angle(axle, path, inputs.timeline))
 
 

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from diagnosis.channels.liveness import alive
 from diagnosis.steering.blocks import SensorNoise, SteeringBlocks, block_length, blocks_of, sensor_noise
 from diagnosis.steering.redundancy import with_second_angle, with_valve_opening
-from diagnosis.steering.silence import silences
 from replay.control.loop import Replay
 from replay.machine.config import Machine, Noise
 from replay.signals.timeline import Timeline
@@ -46,8 +45,6 @@ class AxleInputs:
         Of the angle.
     valve_deviation : Array, shape (n,), or None
         Opening less command as multiples of its noise; None unless both are logged.
-    silent : tuple[tuple[int, int], ...]
-        Samples [start, stop) in which the angle has no value for long while its source delivers.
     """
 
     name: str
@@ -57,7 +54,6 @@ class AxleInputs:
     blocks: SteeringBlocks | None = None
     noise: SensorNoise = _NO_NOISE
     valve_deviation: Array | None = None
-    silent: tuple[tuple[int, int], ...] = ()
 
     @property
     def measured(self) -> str:
@@ -179,5 +175,4 @@ def _with_blocks(inputs: AxleInputs, machine: Machine, counts: Counts, length: i
         new = timeline.fresh[inputs.channel("u_applied")]
         position = inputs.values("u_applied")
         blocks, deviation = with_valve_opening(blocks, inputs.command, position, new, timeline.dt)
-    silent = silences(y, delivers, timeline.dt)
-    return replace(inputs, blocks=blocks, noise=noise, valve_deviation=deviation, silent=silent)
+    return replace(inputs, blocks=blocks, noise=noise, valve_deviation=deviation)

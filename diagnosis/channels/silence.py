@@ -1,24 +1,47 @@
-"""A steering sensor that delivers nothing while its source does has no signal, whatever the axle's model makes of the time without it."""
+"""A sensor that delivers nothing while its source does has no signal, whatever a model makes of the time without it."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from diagnosis.channels.liveness import alive, alive_sources
 from diagnosis.results.assessment import CODE, Assessment, Finding
 from diagnosis.results.result import Epsilon, Hypothesis
 from diagnosis.results.vocabulary import Tier
 from replay.faults import FaultMode, Side, State
+from replay.signals.timeline import Timeline
 
 _LEAST_S = 3.0  # a shorter while may be a disturbed bus
 _AS_USUAL = 0.7  # of how often its source delivers elsewhere
-_P = 0.95
+_P, _SAID = 0.95, 0.5  # probability; of what is told already
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 Span = tuple[int, int]
+Part = tuple[str, str]
+
+
+def with_silent_sensors(assessments: Mapping[Part, Assessment], timeline: Timeline) -> dict[Part, Assessment]:
+    """Assessments with sensors that are silent for long while other signals of their source come.
+
+    Parameters
+    ----------
+    assessments : Mapping[tuple[str, str], Assessment]
+        By component and side.
+    timeline : Timeline
+        The mission.
+    """
+    out, counts = dict(assessments), alive_sources(timeline)
+    for (component, side), a in assessments.items():
+        names = [n for n in (f"wheel.{component}.v", f"steer.{component}.phi") if n in timeline.fresh]
+        values = timeline.get(names[0]) if names else None
+        if side == Side.SENSOR.value and values is not None and a.tier is not Tier.NONE:
+            spans = silences(values, alive(timeline, counts, names[0]), timeline.dt)
+            out[component, side] = with_silence(a, spans, names[0], timeline.dt)
+    return out
 
 
 def silences(y: Array, delivers: Flags, dt: float) -> tuple[Span, ...]:
@@ -58,10 +81,12 @@ def with_silence(assessment: Assessment, spans: Sequence[Span], name: str, dt: f
     dt : float
         Step [s].
     """
-    told = assessment.findings
+    told = [f for f in assessment.findings if not f.mode.total or f.probability >= _SAID]
     left = [(a, b) for a, b in spans if not any(f.start < b and f.stop > a for f in told)]
     if not left:
         return assessment
+    unsure = [f for f in assessment.findings if f not in told]
+    told += [f for f in unsure if not any(f.start < b and f.stop > a for a, b in left)]
     states = assessment.states.copy()
     for a, b in left:
         states[a:b] = CODE[State.NO_SIGNAL]

@@ -1,13 +1,13 @@
-"""A steering sensor that falls silent is told, also where the axle's model puts that down to something else."""
+"""A sensor that falls silent is told, also where a model puts that down to something else."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
+from diagnosis.channels.silence import silences, with_silence
 from diagnosis.results.assessment import CODE, Assessment, Finding
 from diagnosis.results.vocabulary import Tier
-from diagnosis.steering.silence import silences, with_silence
 from replay.faults import FaultMode, Side, State
 
 SIZE, DT = 5000, 0.01
@@ -45,3 +45,9 @@ def test_a_log_that_ends_is_no_fault() -> None:
 def test_what_is_told_already_is_not_told_twice() -> None:
     one = Finding(2990, 5000, Side.SENSOR, FaultMode.NO_SIGNAL, 0.96, (), None, None, (), Tier.MODEL)
     assert told(3000, SIZE, (one,)).findings == (one,)
+
+
+def test_an_unsure_finding_gives_way() -> None:
+    one = Finding(2990, 5000, Side.SENSOR, FaultMode.NO_SIGNAL, 0.45, (), None, None, (), Tier.MODEL)
+    (found,) = told(3000, SIZE, (one,)).findings
+    assert found.probability == pytest.approx(0.95)
