@@ -17,7 +17,7 @@ _HELD = 0.1  # of the top speed: one of four sensors that wait for their next ed
 _OPEN = 0.1  # of full opening: from here on a healthy drive moves; beyond the mission's own dead bands as well ...
 _MOVES = 0.95  # ... of the openings at which a wheel moves, so many lie above them
 _WHEELS, _LEAST_S = 3, 1.0  # fewer wheels, or less time, show nothing, ...
-# ... but that much where an axle stands as well, which is told to turn by so much, and openings are such a share of that
+# ... but that much, and half of the drives, where an axle stands as well, which is told to turn by so much; openings as a share of that
 _LEAST_WITH_AXLE_S, _STEERED, _LESS = 0.5, 0.3, 0.5
 _EDGES = 2  # cells, for a rate
 _ELSEWHERE = 5.0  # times as long do wheels move at such openings
@@ -48,12 +48,13 @@ def _nothing_moves(cells: Cells) -> Flags:
     rests &= np.isfinite(speed[:, known]).all(axis=1)
     turns, stands = _axles(cells)
 
-    def open_(least: Array) -> Flags:
-        return np.asarray(np.count_nonzero((passed >= least)[:, known], axis=1) > 0.5 * count)
+    def open_(least: Array) -> NDArray[np.intp]:
+        return np.asarray(np.count_nonzero((passed >= least)[:, known], axis=1))
 
-    enough = open_(np.maximum(_OPEN, least))
+    enough = open_(np.maximum(_OPEN, least)) > 0.5 * count
     still = _lasting(enough & rests, _cells_in(_LEAST_S, cells))
-    still |= _lasting(open_(np.maximum(_OPEN, _LESS * least)) & rests & stands, _cells_in(_LEAST_WITH_AXLE_S, cells))
+    half = open_(np.maximum(_OPEN, _LESS * least)) >= 0.5 * count
+    still |= _lasting(half & rests & stands, _cells_in(_LEAST_WITH_AXLE_S, cells))
     drives = np.count_nonzero(enough & moves[:, known].all(axis=1))
     return _until(still, ~rests | turns) if drives > _ELSEWHERE * np.count_nonzero(still) else none
 

@@ -56,6 +56,16 @@ def test_wheels_that_stand_while_others_move_are_no_stall(stands: tuple[str, ...
     assert supply_gone(driving(stands)) is None
 
 
+@pytest.mark.parametrize(("steered", "stalls"), [(0.6, True), (0.1, False)])
+def test_half_of_the_drives_tell_it_where_an_axle_stands_as_well(steered: float, stalls: bool) -> None:
+    """Motors of the rear axle alone may drive; without an axle that shows it, too, the others may merely rest."""
+    openings = {w: np.where(STALLED & (w in WHEELS[:2]), 0.0, DRIVEN) for w in WHEELS}
+    command = np.where(STALLED, steered, 0.6 * np.sin(0.7 * T))
+    angle = 0.3 * np.cumsum(np.where(STALLED, 0.0, command)) * DT
+    cells = mission({w: DRIVEN * 0.8 * ~STALLED for w in WHEELS}, openings, angle, command)
+    assert (supply_gone(cells) is not None) is stalls
+
+
 def test_a_moment_is_no_stall() -> None:
     assert supply_gone(driving(when=(T >= 40.0) & (T < 40.6))) is None
 
