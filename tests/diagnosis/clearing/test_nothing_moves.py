@@ -62,7 +62,7 @@ def test_half_of_the_drives_tell_it_where_an_axle_stands_as_well(steered: float,
     openings = {w: np.where(STALLED & (w in WHEELS[:2]), 0.0, DRIVEN) for w in WHEELS}
     command = np.where(STALLED, steered, 0.6 * np.sin(0.7 * T))
     angle = 0.3 * np.cumsum(np.where(STALLED, 0.0, command)) * DT
-    cells = mission({w: DRIVEN * 0.8 * ~STALLED for w in WHEELS}, openings, angle, command)
+    cells = mission(dict.fromkeys(WHEELS, DRIVEN * 0.8 * ~STALLED), openings, angle, command)
     assert (supply_gone(cells) is not None) is stalls
 
 
