@@ -33,7 +33,7 @@ from diagnosis.steering.plant import SteeringPlant
 from diagnosis.steering.prior import plant_before
 from diagnosis.steering.reliability import commanded, lost_by_model, paired, weighed
 from diagnosis.steering.states import REASONS, states_of
-from diagnosis.steering.together import less_sure_all_along, not_starved, not_together
+from diagnosis.steering.together import less_sure_all_along, not_shaken_together, not_starved, not_together
 from replay.arrays.processors import each
 from replay.control.loop import Replay
 from replay.faults import Side, State
@@ -127,15 +127,13 @@ def assess_steering(
     judged_axles = zip(axles, each(found, axles, timeline.size, begun), strict=True)
     told = {inputs.name: one for inputs, one in judged_axles if one is not None}
     once = {a.name: told[a.name] for a in axles if a.name in told and not a.redundant}
-    length = max((one.axle.blocks.length for one in once.values()), default=1)
+    length = max((one.axle.blocks.length for one in told.values()), default=1)
     alone = less_sure_all_along(
         not_together({name: one.sides for name, one in once.items()}, length, timeline.dt), timeline.size
     )
     single = {a.name for a in axles if a.redundant and not a.angle_redundant}  # their openings alone are measured
-    alone |= not_starved(
-        {name: alone.get(name, one.sides) for name, one in told.items() if name in single},
-        {name: one.axle for name, one in told.items()},
-    )
+    alone |= not_shaken_together({n: one.sides for n, one in told.items() if n not in once}, length, timeline.dt)
+    alone |= not_starved({n: alone[n] for n in told if n in single}, {n: one.axle for n, one in told.items()})
     assessments: dict[Part, Assessment] = {}
     angles: list[Array] = []
     doubts: list[Flags] = []

@@ -21,6 +21,7 @@ _COMMON = 0.7  # of the time of the longer one
 #: What axles lack together: rad that both must be told to turn, of that, and of what the accused one lacks.
 _TRAVEL, _LACKS, _LIKEWISE = 0.05, 0.1, 0.5
 _FEW = 5  # readings
+_BRIEF_S = 3.0  # of noise that a surge makes
 _MOST, _NO_SURER = 0.5, 0.6  # of the mission; of a partial fault while so much of it is one on two axles
 _NO_MODEL = "The steering model finds such faults on two axles for most of this mission: that it does not fit the machine is as probable."
 
@@ -48,6 +49,35 @@ def not_together(
             kept = tuple(f for f in one.findings if f not in shared)
             spans = [(f.start // length, -(-f.stop // length)) for f in shared]
             out[axle][side] = SideFindings(kept, (*one.unexplained, *spans))
+    return out
+
+
+def not_shaken_together(
+    found: Mapping[str, Mapping[Side, SideFindings]], length: int, dt: float
+) -> dict[str, dict[Side, SideFindings]]:
+    """Findings by axle and side without brief noise of a valve that another axle's has at the same time: a supply that surges, not two valves.
+
+    Parameters
+    ----------
+    found : Mapping[str, Mapping[Side, SideFindings]]
+        Of all axles whose openings are measured, and angles once.
+    length : int
+        Samples per block.
+    dt : float
+        Sample [s].
+    """
+    side = Side.ACTUATOR
+    brief = {
+        name: [f for f in sides[side].findings if f.mode is FaultMode.NOISY and (f.stop - f.start) * dt < _BRIEF_S]
+        for name, sides in found.items()
+    }
+    out: dict[str, dict[Side, SideFindings]] = {}
+    for axle, sides in found.items():
+        others = [f for name, of in brief.items() if name != axle for f in of]
+        shared = [f for f in brief[axle] if any(_together(f, g, dt) for g in others)]
+        kept = tuple(f for f in sides[side].findings if f not in shared)
+        spans = [(f.start // length, -(-f.stop // length)) for f in shared]
+        out[axle] = {**sides, side: sides[side]._replace(findings=kept, unexplained=(*sides[side].unexplained, *spans))}
     return out
 
 

@@ -12,7 +12,7 @@ import pytest
 from diagnosis.results.assessment import Finding
 from diagnosis.results.vocabulary import Tier
 from diagnosis.steering.findings import SideFindings
-from diagnosis.steering.together import less_sure_all_along, not_starved, not_together
+from diagnosis.steering.together import less_sure_all_along, not_shaken_together, not_starved, not_together
 from replay.faults import FaultMode, Side
 
 DT, LENGTH = 0.01, 2
@@ -50,6 +50,20 @@ def test_what_both_axles_do_at_once_is_a_fault_of_neither(mode: FaultMode, start
         side = out[axle][Side.ACTUATOR]
         assert bool(side.findings) is kept
         assert side.unexplained == (() if kept else ((begin // LENGTH, end // LENGTH),))
+
+
+@pytest.mark.parametrize(
+    ("mode", "stop", "kept"),
+    [(FaultMode.NOISY, 1110, False), (FaultMode.NOISY, 1900, True), (FaultMode.STUCK, 1110, True)],
+)
+def test_brief_noise_of_both_valves_is_the_supplys_though_their_openings_are_measured(
+    mode: FaultMode, stop: int, *, kept: bool
+) -> None:
+    out = not_shaken_together({"front": sides(mode, 1000, stop), "rear": sides(mode, 1010, stop)}, LENGTH, DT)
+    for axle, begin in (("front", 1000), ("rear", 1010)):
+        side = out[axle][Side.ACTUATOR]
+        assert bool(side.findings) is kept
+        assert side.unexplained == (() if kept else ((begin // LENGTH, stop // LENGTH),))
 
 
 @pytest.mark.parametrize(
