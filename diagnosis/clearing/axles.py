@@ -75,6 +75,8 @@ def axle_checks(cells: Cells, clear_at: float) -> Iterator[Checked]:
             yield worst(
                 cells, (*about, Side.ACTUATOR, Check.SECOND_MEASUREMENT), behind[:, j], VALVE * clear_at, apart=True
             )
+        if not np.isfinite(np.column_stack([second[:, j], used[:, j], cells.means("imu.yaw_rate")])).any():
+            yield Checked(*about, Side.SENSOR, Check.ANGLE_SCALE, None, clear_at)
         if np.isfinite(command[:, j]).any():
             yield _still(cells, j, limit)
             twice = bool(np.isfinite(second[:, j]).any() and np.isfinite(opening[:, j]).any())

@@ -258,6 +258,10 @@ def _act(check: Checked, twice: Collection[str]) -> str:
     words: MachineWords = check.words
     if check.check in _TURNED:
         return "set the axles straight, compare their angles with the marks on the machine, and drive ten seconds straight ahead"
+    if check.check is Check.ANGLE_SCALE:
+        return words.fill(
+            f"log steer.{check.component}.u (the {{valve}} command), steer.{check.component}.phi_true (a second angle) or imu.yaw_rate"
+        )
     if check.check is Check.PLANT_RATE and check.worst is None:
         return (
             "run `mfhca fit` on healthy missions, and diagnose with the file that it writes (-m), or log "

@@ -34,6 +34,7 @@ class Check(StrEnum):
     YAW = "yaw"
     LASTING_YAW = "lasting_yaw"
     JUMP = "jump"
+    ANGLE_SCALE = "angle_scale"
 
 
 #: What a check compares, and what is said where it is beyond its limit; ``{part}`` and ``{value}`` are filled in, and the
@@ -103,6 +104,10 @@ CHECK_WORDS: dict[Check, tuple[str, str]] = {
     Check.LASTING_YAW: (
         "yaw rate against that by the steering angles, over the mission",
         "the machine turns as if the {part} axle were {value} off its measured angle over the mission",
+    ),
+    Check.ANGLE_SCALE: (
+        "what tells the scale of the angle",
+        "nothing in this log tells whether the angle of the {part} axle is as large as it reads: its loop holds a wrong reading at its command",
     ),
     Check.JUMP: (
         "jumps of the angle",
@@ -174,7 +179,7 @@ class Checked:
         if self.passed:
             return ""
         words = self.words.part_words(self.kind, self.component, self.side)
-        if self.worst is None and self.check is not Check.BEHIND:
+        if self.worst is None and self.check not in (Check.BEHIND, Check.ANGLE_SCALE):
             return f"{words}: this mission leaves the check “{self.asked}” open"
         two = self.check is Check.SECOND_MEASUREMENT
         value = "" if self.worst is None else self._value

@@ -376,3 +376,17 @@ def test_a_lone_drive_may_jump_as_its_command_does(wheels: int, *, spikes: bool,
     cells = SimpleNamespace(frame=Frame(100, 30, 5), machine=SimpleNamespace(max_speed=1.2), dt=0.1)
     rough = roughness_of(cells, np.hstack([speed, *beside]), np.hstack([asked, *beside]))  # type: ignore[arg-type]
     assert bool(np.nanmax(rough.quick[:, 0] / rough.size[:, 0]) > ROUGH) is doubted
+
+
+@pytest.mark.parametrize(("told_by", "open_"), [(None, True), ("u", False), ("phi_true", False), ("yaw", False)])
+def test_an_angle_whose_scale_nothing_tells_clears_no_axle(told_by: str | None, open_: bool) -> None:
+    mission = simulated()
+    dropped = {f"steer.front.{leaf}" for leaf in ("u", "u_applied", "phi_true") if leaf != told_by}
+    columns = {n: x for n, x in mission.columns.items() if n not in dropped}
+    if told_by == "yaw":
+        columns["imu.yaw_rate"] = np.zeros(mission.stamps.size)
+    cells = in_cells(replace(mission, columns=columns), base=False)
+    asked = [c for c in checks_of(cells, HYDRAULIC) if c.check is Check.ANGLE_SCALE and c.component == "front"]
+    assert bool(asked) is open_
+    assert not any(c.passed for c in asked)
+    assert all("as large as it reads" in c.text for c in asked)
