@@ -22,6 +22,7 @@ from replay.signals.mapping import map_signals
 from replay.signals.name_words import english, tokens
 from replay.signals.signal import Signal, Signals
 from replay.signals.to_si import peak_of
+from replay.signals.unit_doubts import per_minute
 
 _RADII, _TRACKS = (0.02, 2.5), (0.05, 4.0)  # m
 _BASES = 20.0  # m; the longest
@@ -245,6 +246,8 @@ def with_speeds(draft: Draft, machine: Machine, logs: Sequence[RawLog]) -> Machi
         by_mm = _SLOW <= slow <= _STANDS_IN and not any(s.origin.unit for s in fast)
         stands_in = slow if by_mm else _STANDS_IN
         hint = f" (in mm/s it would be {reached * UNITS['mm/s'][1]:.3g} m/s)" if by_mm else ""
+        if fast and all(per_minute(s.origin.label) for s in fast):  # and what they are multiplied by is a guess
+            hint += '; their names speak of turns per minute: unit = "rpm", with the size of the wheels in wheel_diameter and gear_ratio'
         named = ", ".join(s.origin.label for s in fast) or "the speeds"
         draft.ask(
             "geometry",

@@ -66,6 +66,11 @@ class Doubt:
         return f"{self.text}{answer}"
 
 
+def per_minute(name: str) -> bool:
+    """Whether the name of a speed speaks of turns per minute."""
+    return _PER_MINUTE.search(name) is not None
+
+
 def _mostly_beyond(values: NDArray[Any], limit: float) -> bool:
     """Whether many of the samples other than zero lie beyond a limit."""
     moving = magnitudes(values)
@@ -134,10 +139,12 @@ def _fitting_speed(signal: str, peak: float, origin: SignalSource, machine: Mach
     rotation = known_unit(origin.unit) in (*_TURNING, *_ANGLES)
     joint = _JOINT.search(origin.field or "") is not None
     ways_to_try = (turns,) if joint else (turns, speeds) if rotation else (speeds + turns,)
-    if _PER_MINUTE.search(origin.label):
+    named = per_minute(origin.label)
+    if named:
         ways_to_try = ([tried for tried in turns if tried.unit == "rpm"], *ways_to_try)
-    for ways in ways_to_try:
-        best, most = "", 0.1 * machine.max_speed
+    for k, ways in enumerate(ways_to_try):
+        # what its name says may be slow: neither top speed nor wheel size need be known yet
+        best, most = "", 0.0 if named and k == 0 else 0.1 * machine.max_speed
         for tried in ways:
             try:
                 reached = recorded * abs(factor_of(signal, tried, machine))

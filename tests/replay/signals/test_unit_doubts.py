@@ -18,6 +18,7 @@ from replay.machine.toml_file import load_machine
 from replay.mission import check_units
 from replay.signals.mapping import map_signals
 from replay.signals.signal import Signals
+from replay.signals.unit_doubts import doubt
 
 WHEELS = haulotte().wheels
 KNOWN = replace(haulotte(), assumed=())
@@ -113,3 +114,12 @@ def test_a_position_is_offered_units_of_positions(unit: str, size: float, line: 
     source = SignalSource(column="x", unit=unit, derivative=True)
     (question,) = mapped({"x": size * WAVE}, {"wheel.FR.v": source}).questions
     assert f"{line}, derivative = true" in question
+
+
+def test_turns_per_minute_are_offered_though_neither_speed_nor_size_is_known() -> None:
+    """A top speed that stands in is no reason to take slow turns for kilometres per hour."""
+    machine = replace(haulotte(), max_speed=10.0)
+    values = 40.0 * np.sin(np.linspace(0.0, 20.0, 500))
+    found = doubt("wheel.FR.v", values, SignalSource(column="MAIN.fbRad_VR.rDrehzahl_Ist"), machine)
+    assert found is not None
+    assert "rpm" in found.line
