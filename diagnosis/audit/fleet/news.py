@@ -73,10 +73,23 @@ def since_runs(m: Machine, runs: Mapping[str, int]) -> list[int | None]:
     return [first.get((f.component, f.side, f.mode), 0) or None for f in m.faults]
 
 
+def _back(m: Machine, f: FleetFault, runs: Mapping[str, int]) -> int | None:
+    """Run that first brought a mission with a fault after its repair; None where it was not repaired, or that is not known."""
+    if f.repaired_ns is None:
+        return None
+    key = f.component, f.side, f.mode
+    found = [
+        runs.get(r.name, 0)
+        for r in m.runs
+        if (r.result.start_ns or 0) > f.repaired_ns and any((g.component, g.side, g.mode) == key for g in r.faults)
+    ]
+    return min(found, default=0) or None
+
+
 def news(
     machines: Sequence[Machine], runs: Mapping[str, int], run: int
 ) -> tuple[int, list[tuple[Machine, FleetFault]]]:
-    """Missions that the last run brought, and the faults that stand in them alone, severe ones first.
+    """Missions that the last run brought, and the faults that stand in them alone, or since a repair in them alone, severe ones first.
 
     Nothing where all missions are of that run, or nothing is known of earlier ones.
     """
@@ -87,6 +100,6 @@ def news(
         (m, f)
         for m in machines
         for f, first in zip(m.faults, since_runs(m, runs), strict=True)
-        if f.standing and first == run
+        if f.standing and (first == run or _back(m, f, runs) == run)
     ]
     return new, sorted(found, key=lambda p: -max(p[1].severity.rank, Severity.LOW.rank))

@@ -277,7 +277,8 @@ def new_words(missions: int, faults: Sequence[tuple[Machine, FleetFault]]) -> li
     named = [f"{m.label} {fault_words(f, m.limits.words)} ({f.severity}{_often(f)})" for m, f in faults[:_NAMED]]
     more = f" and {len(faults) - len(named)} more" if len(faults) > len(named) else ""
     known = "without a fault that was not known"
-    said = f"first seen in {'it' if missions == 1 else 'them'}: {'; '.join(named) + more}" if named else known
+    first = "found" if any(f.repaired_ns is not None for _, f in faults) else "first seen"
+    said = f"{first} in {'it' if missions == 1 else 'them'}: {'; '.join(named) + more}" if named else known
     return [f"The last audit run brought {count(missions, 'mission')}{';' if named else ','} {said}."]
 
 
@@ -288,7 +289,9 @@ def as_sentence(note: str) -> str:
 
 
 def _often(f: FleetFault) -> str:
-    """That a fault came in several missions of the last run at once, which is why it is called recurring."""
+    """That a fault is back since its repair; or that it came in several missions of the last run at once, and so is called recurring."""
+    if f.repaired_ns is not None:
+        return f", back since its repair on {utc_moment(f.repaired_ns)}"
     return f", recurring in {f.missions} of them" if f.missions > 1 else ""
 
 

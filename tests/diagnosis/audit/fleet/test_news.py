@@ -6,10 +6,15 @@ import json
 from collections.abc import Sequence
 from contextlib import closing
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
+from diagnosis.audit.fleet.news import news
+from diagnosis.audit.fleet.words import new_words
 from diagnosis.audit.fleet_files import write_fleet
 from diagnosis.audit.store.database import Database
+from diagnosis.results.machine_words import HYDRAULIC
+from diagnosis.results.vocabulary import Severity
 from tests import fleet_samples as samples
 from tests.fleet_samples import Fault, Sample
 
@@ -86,3 +91,25 @@ def test_the_page_says_of_when_its_logs_and_results_are(tmp_path: Path) -> None:
         in page
     )
     assert f"fleet audit, {span}</title>" in page
+
+
+def test_a_fault_that_is_back_since_its_repair_is_news() -> None:
+    runs = {"m1": 1, "m2": 2, "m3": 3}
+
+    def run(name: str, day: int, *, faulty: bool) -> SimpleNamespace:
+        faults = (SimpleNamespace(component="RL", side="sensor", mode="no_signal"),) if faulty else ()
+        return SimpleNamespace(name=name, faults=faults, result=SimpleNamespace(start_ns=day * samples.DAY_NS))
+
+    limits = SimpleNamespace(words=HYDRAULIC)
+    missions = [run("m1", 1, faulty=True), run("m2", 5, faulty=False), run("m3", 7, faulty=True)]
+    fault = SimpleNamespace(
+        component="RL", side="sensor", mode="no_signal", kind="wheel", standing=True, missions=2,
+        severity=Severity.HIGH, repaired_ns=4 * samples.DAY_NS, unclear=False, epsilon=None,
+    )  # fmt: skip
+    machine: Any = SimpleNamespace(runs=missions, faults=[fault], label="HX-1", limits=limits)
+    count, found = news([machine], runs, 3)
+    assert count == 1
+    assert new_words(count, found) == [
+        "The last audit run brought 1 mission; found in it: HX-1 RL speed sensor no signal (high, back since its repair on 1970-01-05 00:00 UTC)."
+    ]
+    assert news([machine], runs | {"m3": 2, "m4": 3}, 3)[1] == []
