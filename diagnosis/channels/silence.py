@@ -17,6 +17,7 @@ from replay.signals.timeline import Timeline
 
 _LEAST_S = 3.0  # a shorter while may be a disturbed bus
 _AS_USUAL = 0.7  # of how often its source delivers elsewhere
+_MOSTLY = 0.5  # of a stretch
 _P, _SAID = 0.95, 0.5  # probability; of what is told already
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -25,7 +26,9 @@ Part = tuple[str, str]
 
 
 def with_silent_sensors(assessments: Mapping[Part, Assessment], timeline: Timeline) -> dict[Part, Assessment]:
-    """Assessments with sensors that are silent for long while other signals of their source come.
+    """Assessments with sensors that are silent for long, each alone, while other signals of their source come.
+
+    What several sensors lack at the same time is their recorder's or their bus's loss, and no fault of each.
 
     Parameters
     ----------
@@ -35,13 +38,22 @@ def with_silent_sensors(assessments: Mapping[Part, Assessment], timeline: Timeli
         The mission.
     """
     out, counts = dict(assessments), alive_sources(timeline)
+    spans: dict[Part, tuple[str, tuple[Span, ...]]] = {}
     for (component, side), a in assessments.items():
         names = [n for n in (f"wheel.{component}.v", f"steer.{component}.phi") if n in timeline.fresh]
         values = timeline.get(names[0]) if names else None
         if side == Side.SENSOR.value and values is not None and a.tier is not Tier.NONE:
-            spans = silences(values, alive(timeline, counts, names[0]), timeline.dt)
-            out[component, side] = with_silence(a, spans, names[0], timeline.dt)
+            delivers = alive(timeline, counts, names[0])
+            spans[component, side] = names[0], silences(values, delivers, timeline.dt)
+    for part, (name, own) in spans.items():
+        others = [s for other, (_, of) in spans.items() if other != part for s in of]
+        out[part] = with_silence(out[part], [s for s in own if not _shared(s, others)], name, timeline.dt)
     return out
+
+
+def _shared(span: Span, others: Sequence[Span]) -> bool:
+    """Whether another one covers most of a stretch."""
+    return any(min(span[1], b) - max(span[0], a) > _MOSTLY * (span[1] - span[0]) for a, b in others)
 
 
 def silences(y: Array, delivers: Flags, dt: float) -> tuple[Span, ...]:

@@ -60,7 +60,7 @@ def not_shaken_together(
     Parameters
     ----------
     found : Mapping[str, Mapping[Side, SideFindings]]
-        Of all axles whose openings are measured, and angles once.
+        Of all axles of which a quantity is measured twice.
     length : int
         Samples per block.
     dt : float

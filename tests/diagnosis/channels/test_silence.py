@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+from typing import Any
+
 import numpy as np
 import pytest
 
-from diagnosis.channels.silence import silences, with_silence
+from diagnosis.channels.silence import silences, with_silence, with_silent_sensors
 from diagnosis.results.assessment import CODE, Assessment, Finding
 from diagnosis.results.vocabulary import Tier
 from replay.faults import FaultMode, Side, State
@@ -51,3 +54,25 @@ def test_an_unsure_finding_gives_way() -> None:
     one = Finding(2990, 5000, Side.SENSOR, FaultMode.NO_SIGNAL, 0.45, (), None, None, (), Tier.MODEL)
     (found,) = told(3000, SIZE, (one,)).findings
     assert found.probability == pytest.approx(0.95)
+
+
+@pytest.mark.parametrize(
+    ("silent", "blamed"), [(("FR",), {"FR"}), (("FR", "FL"), set()), (("FR", "FL", "RR", "RL"), set())]
+)
+def test_what_several_sensors_lack_at_once_is_no_fault_of_each(silent: tuple[str, ...], blamed: set[str]) -> None:
+    wheels = ("FR", "FL", "RR", "RL")
+    columns = {f"wheel.{w}.v": np.ones(SIZE) for w in wheels} | {"wheel.FR.u": np.ones(SIZE)}
+    for w in silent:
+        columns[f"wheel.{w}.v"][3000:4000] = np.nan
+    fresh = {n: np.isfinite(x) for n, x in columns.items()}
+    timeline: Any = SimpleNamespace(
+        dt=DT,
+        size=SIZE,
+        fresh=fresh,
+        get=columns.get,
+        groups=dict.fromkeys(columns, "one"),
+        sources=dict.fromkeys(columns, "file"),
+    )
+    states = np.full(SIZE, CODE[State.HEALTHY])
+    told = with_silent_sensors({(w, "sensor"): Assessment(states, tier=Tier.MODEL) for w in wheels}, timeline)
+    assert {w for (w, _), a in told.items() if a.findings} == blamed
