@@ -14,6 +14,7 @@ from diagnosis.direct.isolation import Isolated, estimate_run, isolate
 from diagnosis.direct.onset import refine
 from diagnosis.direct.same_share import as_beside, as_excess_beside
 from diagnosis.direct.sentences import END_SENTENCE, RANGE_SENTENCE, alike_sentence, sentences
+from diagnosis.direct.slow_deviation import not_noise
 from diagnosis.direct.stated_mode import least_constant, mode_of
 from diagnosis.direct.timing import timing_explains
 from diagnosis.estimation.by_itself import told_by_itself
@@ -115,7 +116,11 @@ def find_faults(path: ModePath, found: IdentifiedPair, limits: Limits) -> Faults
     joined = with_one_cause(with_spikes(beside, measured), measured)
     spells = [part for f in joined for part in in_spells(as_changing_gain(f, measured), measured)]
     kept = [told_by_itself(f, measured) for f in spells]
-    return FaultsFound([part for parts in kept for part in parts], timing, below + sum(not parts for parts in kept))
+    return FaultsFound(
+        [not_noise(part, measured, found.pair.habit.window) for parts in kept for part in parts],
+        timing,
+        below + sum(not parts for parts in kept),
+    )
 
 
 def _left_open(run: Run, found: IdentifiedPair, limits: Limits) -> bool:
