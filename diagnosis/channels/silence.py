@@ -37,14 +37,22 @@ def with_silent_sensors(assessments: Mapping[Part, Assessment], timeline: Timeli
     timeline : Timeline
         The mission.
     """
-    out, counts = dict(assessments), alive_sources(timeline)
-    spans: dict[Part, tuple[str, tuple[Span, ...]]] = {}
+    gapped: dict[Part, tuple[str, Array]] = {}
     for (component, side), a in assessments.items():
         names = [n for n in (f"wheel.{component}.v", f"steer.{component}.phi") if n in timeline.fresh]
         values = timeline.get(names[0]) if names else None
-        if side == Side.SENSOR.value and values is not None and a.tier is not Tier.NONE:
-            delivers = alive(timeline, counts, names[0])
-            spans[component, side] = names[0], silences(values, delivers, timeline.dt)
+        if side != Side.SENSOR.value or values is None or a.tier is Tier.NONE:
+            continue
+        if _long_gaps(np.isfinite(values), timeline.dt):
+            gapped[component, side] = names[0], values
+    out = dict(assessments)
+    if not gapped:  # as in most missions, which need not be searched for what else comes
+        return out
+    counts = alive_sources(timeline)
+    spans = {
+        part: (name, silences(values, alive(timeline, counts, name), timeline.dt))
+        for part, (name, values) in gapped.items()
+    }
     for part, (name, own) in spans.items():
         others = [s for other, (_, of) in spans.items() if other != part for s in of]
         out[part] = with_silence(out[part], [s for s in own if not _shared(s, others)], name, timeline.dt)
@@ -72,11 +80,18 @@ def silences(y: Array, delivers: Flags, dt: float) -> tuple[Span, ...]:
     if not known.any():
         return ()
     usual = float(np.mean(delivers[known]))
+    spans = _long_gaps(known, dt)
+    return tuple((a, b) for a, b in spans if usual > 0.0 and float(np.mean(delivers[a:b])) >= _AS_USUAL * usual)
+
+
+def _long_gaps(known: Flags, dt: float) -> list[Span]:
+    """Samples [start, stop) without a value for long, after the first value; none where there is no value at all."""
+    if known.all() or not known.any():
+        return []
     missing = ~known
     missing[: int(np.argmax(known))] = False  # what has not begun yet may be late
     edges = np.flatnonzero(np.diff(np.r_[False, missing, False].astype(np.int8)))
-    spans = [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True) if (b - a) * dt >= _LEAST_S]
-    return tuple((a, b) for a, b in spans if usual > 0.0 and float(np.mean(delivers[a:b])) >= _AS_USUAL * usual)
+    return [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True) if (b - a) * dt >= _LEAST_S]
 
 
 def with_silence(assessment: Assessment, spans: Sequence[Span], name: str, dt: float) -> Assessment:
