@@ -41,6 +41,7 @@ import numpy as np
 import paver
 import sprayer
 import telehandler
+import tug
 from accuracy import EVIDENCE
 from campaign import Outcome, Task, judged
 from foreign_machine import NAME as FOREIGN
@@ -74,6 +75,7 @@ OTHERS = {
         sprayer,
         telehandler,
         paver,
+        tug,
     )
 }
 _DRIVEN, _STEERED = 0.06, 0.02  # m/s, rad/s
@@ -261,7 +263,7 @@ def main() -> None:
         "--machine",
         nargs="+",
         default=None,
-        help="default, structures, foreign, hydrostatic, electrohydraulic, electric, flow_sharing, closed_circuit, geared_circuit, forwarder, dumper, sprayer, telehandler, paver",
+        help="default, structures, foreign, hydrostatic, electrohydraulic, electric, flow_sharing, closed_circuit, geared_circuit, forwarder, dumper, sprayer, telehandler, paver, tug",
     )
     parser.add_argument("--duration", type=float, default=75.0, help="length of a mission [s]")
     parser.add_argument("--every", type=int, default=1, help="one of so many kinds of trouble")
