@@ -19,6 +19,7 @@ _AROUND_S = 3.0  # over which way is compared: receivers are late, and machines 
 _NEAR = 0.35  # of what is asked, that the way over ground may differ from it
 _ASKED = 2.0  # driving speeds
 _MOSTLY = 0.5  # of a time
+_OTHERWISE = 0.6  # of the usual speed over ground, that all speeds usually read, or it of theirs: they contradict it
 _LEAST_S = 2.0
 
 
@@ -80,6 +81,35 @@ def witness_of(
         if there.any():
             return Witness(body.name, np.asarray(there), bool(np.mean(there[goes]) > _MOSTLY))
     return Witness("", np.zeros(asked.size, np.bool_))
+
+
+def contradicted(speeds: Sequence[BodySpeed], drives: Sequence[FollowerData], width: int, limits: Limits) -> str:
+    """A sentence where a receiver shows the machine going, at another speed than all of its drives read; empty where none does.
+
+    It need not go as fast as it is told: also where a limit keeps it slower, medians that contradict the way over ground say nothing of
+    how it followed. Arguments as for `witness_of`.
+    """
+    asked = np.abs(np.mean([np.nan_to_num(cells(d.asked, width)) for d in drives], axis=0))
+    for body in speeds:
+        if body.name == "odometry":
+            continue
+        use = (asked > _ASKED * limits.driving_speed) & np.isfinite(body.speed)
+        if not use.any() or np.mean(use[asked > _ASKED * limits.driving_speed]) < _MOSTLY:
+            continue
+        went = float(np.median(np.abs(body.speed[use])))
+        steps = np.repeat(use, width)
+        readings = [np.abs(d.y[: steps.size][steps[: d.y.size]]) for d in drives]
+        if not all(np.isfinite(y).any() for y in readings):
+            continue
+        read = [float(np.nanmedian(y)) for y in readings]
+        if went > _ASKED * limits.driving_speed and (max(read) < _OTHERWISE * went or min(read) > went / _OTHERWISE):
+            names = " and ".join(d.name for d in drives)
+            return (
+                f"By the {body.name} the machine went at {went:.2g} {{speed_unit}} while it was commanded, and {names} read "
+                f"{np.median(read):.2g} {{speed_unit}} (medians): readings that come in pulses, a wrong unit, a channel of something else, or "
+                "readings that are wrong; how the machine followed its commands they do not tell."
+            )
+    return ""
 
 
 def denied(

@@ -71,3 +71,16 @@ def test_speeds_that_nothing_relates_to_commands_are_wrong_where_the_receiver_fo
     j = judged(measured, asked, body, *((receiver(went),) if seen else ()))
     assert bool(j.unshown) is seen
     assert bool(j.events) is not seen
+
+
+@pytest.mark.parametrize("over_ground", [0.4, 0.01])
+def test_a_slow_machine_whose_speeds_contradict_the_receiver_did_not_ignore_its_commands(over_ground: float) -> None:
+    """It goes half as fast as it is told, and its speeds read almost nothing; where the receiver reads so, too, it did not follow."""
+    measured, asked, body = speeds(8)
+    rng = np.random.default_rng(8)
+    measured = {w: np.abs(rng.normal(0.0, 0.02, y.size)) for w, y in measured.items()}
+    asked = {w: np.full(c.size, 0.8) for w, c in asked.items()}
+    j = judged(measured, asked, body, receiver(np.full(body.shape[0], over_ground)))
+    seen = over_ground > 0.1
+    assert any("went at" in e for e in j.unshown) is seen
+    assert bool(j.events) is not seen
