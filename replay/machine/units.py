@@ -68,6 +68,14 @@ def kept_unit(signal: str, recorded: str) -> str:
     return {"mA": "A", "Nm": "N·m", "%": "1", "fraction": "1"}.get(name, name)
 
 
+def _no_opening(signal: str, unit: str) -> str:
+    """Why volts or amperes are no opening, and the line to write instead."""
+    usual = {"V": "gain = 0.1 where 10 V open it fully", "mA": "gain = 0.0625, offset = -0.25 of 4 to 20 mA"}
+    how = usual.get(unit, "gain = 1 / the value that opens it fully")
+    motor = f"; if it is the effort of a motor, name it {signal[:-1]}effort" if signal.endswith(".u") else ""
+    return f'unit {unit!r} is no opening; write unit = "1" and the scale: {how}{motor}'
+
+
 def si_factor(
     signal: str,
     unit: str,
@@ -127,10 +135,8 @@ def si_factor(
         signal == "cmd.omega" and quantity == "angle"
     ):  # of a car's steering; `turned_by_steering` makes a yaw rate of it
         return factor
-    if quantity == "effort" and signal.endswith(".u"):
-        raise ConfigError(
-            f"[signals] {signal!r}: unit {unit!r} is an effort of a motor, not an opening; name it {signal[:-1]}effort"
-        )
+    if quantity == "effort" and wanted == "fraction":
+        raise ConfigError(f"[signals] {signal!r}: {_no_opening(signal, name)}")
     if wanted == "speed" and quantity == "rotation" and signal.startswith("wheel."):
         if wheel_radius is None:
             raise ConfigError(

@@ -23,6 +23,8 @@ _USUAL = {
     "angle": ("deg", 3.2, 180.0, "radians"),
     "rotation": ("deg/s", 6.3, 400.0, "rad/s"),
 }
+_MOST_VOLTS = 10.5  # what an analogue signal of 10 V may reach
+_VOLTS = ' If they are volts, of which 10 open a valve fully, write unit = "1", gain = 0.1 in each line: taken as %, healthy valves seem to fail.'
 _TOO_FAST = 100.0  # m/s
 _SPEEDS = ("v", "v_ref", "v_true")
 
@@ -96,7 +98,8 @@ def usual_units(draft: Draft, found: Signals) -> Mapping[str, SignalSource]:
             continue
         out |= {n: replace(s.origin, unit=unit) for n, s in bare.items()}
         named = ", ".join(s.origin.label for s in bare.values())
-        draft.ask("signals", f"are {named} in {unit}? None is stated; in {si} they would reach {peak:.3g}.")
+        volts = _VOLTS if quantity == "fraction" and peak <= _MOST_VOLTS else ""
+        draft.ask("signals", f"are {named} in {unit}? None is stated; in {si} they would reach {peak:.3g}.{volts}")
     return out
 
 

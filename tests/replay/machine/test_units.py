@@ -120,3 +120,14 @@ def _fits(signal: str, unit: str) -> bool:
         return factor(signal, unit) > 0
     except ConfigError:
         return False
+
+
+@pytest.mark.parametrize(
+    ("unit", "scale"), [("V", "gain = 0.1"), ("mA", "gain = 0.0625, offset = -0.25"), ("A", "1 / the")]
+)
+@pytest.mark.parametrize("signal", ["wheel.FR.u", "wheel.FR.u_applied", "steer.front.u_applied"])
+def test_volts_and_amperes_are_no_opening_and_the_line_to_write_is_said(signal: str, unit: str, scale: str) -> None:
+    with pytest.raises(ConfigError) as refused:
+        si_factor(signal, unit, wheel_radius=0.4, gear_ratio=1.0, at="wheel")
+    assert 'unit = "1"' in str(refused.value)
+    assert scale in str(refused.value)
