@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -19,6 +21,7 @@ _MOVES = 0.95  # ... of the openings at which a wheel moves, so many lie above t
 _WHEELS, _LEAST_S = 3, 1.0  # fewer wheels, or less time, show nothing, ...
 # ... but that much, and half of the drives, where an axle stands as well, which is told to turn by so much; openings as a share of that
 _LEAST_WITH_AXLE_S, _STEERED, _LESS = 0.5, 0.3, 0.5
+_AXLES = 2  # that stand together where the drives are told to rest: one alone has a fault
 _EDGES = 2  # cells, for a rate
 _ELSEWHERE = 5.0  # times as long do wheels move at such openings
 
@@ -46,7 +49,8 @@ def _nothing_moves(cells: Cells) -> Flags:
     fast = np.abs(np.nan_to_num(speed)).max(axis=1) > _HELD * cells.machine.max_speed
     rests = ~fast & (np.count_nonzero(moves, axis=1) <= (1 if count > _WHEELS else 0))
     rests &= np.isfinite(speed[:, known]).all(axis=1)
-    turns, stands = _axles(cells)
+    axles = _axles(cells)
+    turns, stands = axles.turns, axles.stands
 
     def open_(least: Array) -> NDArray[np.intp]:
         return np.asarray(np.count_nonzero((passed >= least)[:, known], axis=1))
@@ -55,6 +59,7 @@ def _nothing_moves(cells: Cells) -> Flags:
     still = _lasting(enough & rests, _cells_in(_LEAST_S, cells))
     half = open_(np.maximum(_OPEN, _LESS * least)) >= 0.5 * count
     still |= _lasting(half & rests & stands, _cells_in(_LEAST_WITH_AXLE_S, cells))
+    still |= _axles_alone(axles, rests, cells)
     drives = np.count_nonzero(enough & moves[:, known].all(axis=1))
     return _until(still, ~rests | turns) if drives > _ELSEWHERE * np.count_nonzero(still) else none
 
@@ -63,15 +68,30 @@ def _cells_in(seconds: float, cells: Cells) -> int:
     return max(1, round(seconds / cells.dt))
 
 
-def _axles(cells: Cells) -> tuple[Flags, Flags]:
-    """Cells in which an axle turns, and in which one stands that is told to turn, each of shape (cells,)."""
+class _Axles(NamedTuple):
+    """Cells in which an axle turns, in which one stands that is told to turn and none that is told turns, and how many are told, each of shape (cells,)."""
+
+    turns: Flags
+    stands: Flags
+    told: NDArray[np.intp]
+
+
+def _axles(cells: Cells) -> _Axles:
     angle, command = cells.axles("phi"), np.abs(np.nan_to_num(lowest_passed(cells.axles("u"), cells.dt, _LAG_S)))
     if len(angle) < _EDGES or not angle.shape[1]:
         none = np.zeros(cells.size, np.bool_)
-        return none, none
+        return _Axles(none, none, np.zeros(cells.size, np.intp))
     turns = np.asarray(np.abs(np.nan_to_num(np.gradient(angle, cells.dt, axis=0))) > _TURNS)
     told = (command > _STEERED) & np.isfinite(angle)
-    return np.asarray(turns.any(axis=1)), np.asarray(told.any(axis=1) & ~(told & turns).any(axis=1))
+    stands = np.asarray(told.any(axis=1) & ~(told & turns).any(axis=1))
+    return _Axles(np.asarray(turns.any(axis=1)), stands, np.asarray(np.count_nonzero(told, axis=1)))
+
+
+def _axles_alone(axles: _Axles, rests: Flags, cells: Cells) -> Flags:
+    """Cells of a machine at rest in which several axles are told to turn and stand together; none unless they turn at rest for longer elsewhere."""
+    told = rests & (axles.told >= _AXLES)
+    still = _lasting(told & axles.stands, _cells_in(_LEAST_WITH_AXLE_S, cells))
+    return still & (np.count_nonzero(told & ~axles.stands) > np.count_nonzero(still))
 
 
 def _needs(opening: Array) -> float:
@@ -106,6 +126,6 @@ def supply_gone(cells: Cells) -> MachineEvent | None:
     spells = [f"{a:.1f}–{b:.1f} s" for a, b in zip(edges[::2], edges[1::2], strict=True)]
     when = ", ".join(spells[:3]) + (f" and {len(spells) - 3} more times" if len(spells) > 3 else "")
     return not_following(
-        f"No {{wheel}} moved at {when} although most {{valve}}s were commanded to open: what supplies them all had stopped, as an engine that "
-        "stalls does; no part is blamed for that time."
+        f"No {{wheel}} moved at {when} although most {{valve}}s were commanded to open, or every steered axle to turn: what supplies them all "
+        "had stopped, as an engine that stalls does; no part is blamed for that time."
     )

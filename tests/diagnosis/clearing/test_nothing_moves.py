@@ -66,6 +66,28 @@ def test_half_of_the_drives_tell_it_where_an_axle_stands_as_well(steered: float,
     assert (supply_gone(cells) is not None) is stalls
 
 
+@pytest.mark.parametrize(
+    ("axles", "turns_at_rest", "stalls"), [(AXLES, True, True), (AXLES[:1], True, False), (AXLES, False, False)]
+)
+def test_axles_that_stand_together_at_rest_are_the_supplys(
+    axles: tuple[str, ...], *, turns_at_rest: bool, stalls: bool
+) -> None:
+    """An engine may die while nobody drives; tyres that never turn at rest, and one axle alone, tell nothing of that."""
+    rests, dead = (T >= 40.0) & (T < 48.0), (T >= 40.0) & (T < 42.0)
+    command = 0.6 * np.where((T // 4.0).astype(int) % 2 == 0, 1.0, -1.0)
+    driven = np.where(rests, 0.0, DRIVEN)
+    columns = {f"wheel.{w}.v": driven * 0.8 * MACHINE.max_speed for w in WHEELS} | {
+        f"wheel.{w}.u": driven for w in WHEELS
+    }
+    for axle in AXLES:
+        stands = dead if axle in axles else np.zeros(SIZE, np.bool_)
+        moved = np.where(stands if turns_at_rest or axle not in axles else rests, 0.0, command)
+        columns |= {f"steer.{axle}.phi": 0.3 * np.cumsum(moved) * DT, f"steer.{axle}.u": command}
+    timeline = cast(Timeline, SimpleNamespace(dt=DT, size=SIZE, get=columns.get))
+    cells = Cells(timeline, cast(Replay, SimpleNamespace()), MACHINE)
+    assert (supply_gone(cells) is not None) is stalls
+
+
 def test_a_moment_is_no_stall() -> None:
     assert supply_gone(driving(when=(T >= 40.0) & (T < 40.6))) is None
 
