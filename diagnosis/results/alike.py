@@ -77,8 +77,9 @@ def or_shifted(finding: Finding, why: str = SHIFTED_SENTENCE) -> Finding:
     """A stuck channel as one that is in no row as well, with the sentence that says why."""
     own, other = (finding.side.value, FaultMode.STUCK.value), (finding.side.value, FaultMode.OUTSIDE_TABLE.value)
     p = {(h.side, h.mode): h.p for h in finding.hypotheses}
-    moved = _SHIFTED * p.get(own, 0.0)
-    p |= {own: p.get(own, 0.0) - moved, other: p.get(other, 0.0) + moved}
+    had = p.get(other, 0.0)
+    moved = max(0.0, _SHIFTED * (p.get(own, 0.0) + had) - had)  # what says so already is not said twice
+    p |= {own: p.get(own, 0.0) - moved, other: had + moved}
     named = sorted((Hypothesis(*row, share) for row, share in p.items()), key=lambda h: -h.p)
     return replace(finding, probability=p[own], hypotheses=tuple(named), evidence=(*finding.evidence, why))
 

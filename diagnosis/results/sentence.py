@@ -21,6 +21,8 @@ class About(StrEnum):
     SAT = "sat"
     #: What the shape of a fault's onset says of the side.
     ONSET = "onset"
+    #: The next best explanation, and its probability.
+    RIVAL = "rival"
     #: The effort by which a drive was judged.
     EFFORT = "effort"
 

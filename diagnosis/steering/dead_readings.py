@@ -25,7 +25,7 @@ def at_rest(axle: AxleFilter, start: int, stop: int, *, command_logged: bool) ->
     """Whether an angle merely stays where nobody asks it to leave: an angle without noise, as servos report it, does that in health.
 
     Where the valve's command is not logged, nothing else tells a dead sensor from an axle that is told to stay; where it is, an angle
-    of few digits may still repeat itself for about as long as it does elsewhere. Blocks [start, stop).
+    of few digits may still repeat itself for about as long as it does elsewhere, or always where it never changes. Blocks [start, stop).
     """
     blocks = axle.blocks
     if asked(axle, start, stop)[2] >= LEAST_ASKED_S:
@@ -40,7 +40,10 @@ def at_rest(axle: AxleFilter, start: int, stop: int, *, command_logged: bool) ->
     stays = bool(np.all(np.abs(blocks.mean[beside] - level) < _STEP * axle.model.stop))
     if not (stays and command_logged):
         return stays
-    return inside.size < _REPEATS * max(_longest_alike(blocks.mean[before]), _longest_alike(blocks.mean[after]))
+    elsewhere = blocks.mean[before], blocks.mean[after]
+    if not any(np.diff(mean).any() for mean in elsewhere):
+        return True  # nothing shows how it reads in health
+    return inside.size < _REPEATS * max(_longest_alike(mean) for mean in elsewhere)
 
 
 def _longest_alike(mean: Array) -> int:

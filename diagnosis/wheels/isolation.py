@@ -260,7 +260,7 @@ def _sentences(
     for other, probability in ranked:
         if other is not None and other != row:
             if probability >= _LEAST_PART:
-                lines.append(f"Next best: {_words(other)} with {100 * probability:.0f} %.")
+                lines.append(Sentence(About.RIVAL, f"Next best: {_words(other)} with {100 * probability:.0f} %."))
             break
     if side is Side.SENSOR_OR_ACTUATOR:
         lines.append(

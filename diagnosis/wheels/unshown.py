@@ -7,16 +7,17 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from diagnosis.results.alike import or_shifted
 from diagnosis.results.assessment import Finding
 from diagnosis.results.limited import limited
 from diagnosis.wheels.inputs import WheelsData
+from diagnosis.wheels.slowing import TURNS, or_held
 from diagnosis.wheels.valve_map import effective
 from replay.arrays.blocks import blocks
 from replay.faults import FaultMode, Side
 
 Array = NDArray[np.float64]
 
-TURNS = 0.02  #: Of the largest speed: a wheel that turns.
 _CHANGING, _CERTAIN, _TREMBLING = 0.1, 0.9, 0.45  # of the readings; a finding as sure stays, others are no surer
 _TREMBLES = "Its last digits go on changing, which those of a stuck sensor rarely do."
 _LEAST_READ, _CREEPS, _MANY = 0.01, 3.0, 200_000  # quantile of so many readings that are none of 0; times it
@@ -27,6 +28,10 @@ _FAR_OFF, _ALREADY = 3.0, 0.5  # times what the others are off each other; of ho
 _OFF_BEFORE = "Its wheel was as far off the others before the reading fell to zero: the wheel may stand, and its sensor read that."
 _FOLLOWS_S, _AS_OTHERS = 0.3, 0.02  # behind its valve a wheel is; of a speed, by which healthy wheels differ
 _ALL_STAY = "Nothing else moves meanwhile, and the others read the same: a speed that stays is what a healthy sensor shows, too."
+_STANDING, _SHUT = 0.9, 0.02  # of the time; of full opening
+_RESTS = "The machine stood nine tenths of that time: a sensor that is off by a constant would read the same."
+_STEADY_S, _REPEATS = 0.5, 0.3  # before; of the readings of a wheel that turns
+_GOES_ON = "Nothing else moves meanwhile, and it reads on what it read before, as its rounding lets it at one speed: a healthy sensor does, too."
 _OPENED, _MOVED = 0.1, 0.05  # of full opening, of the largest speed: something else changes meanwhile
 _STEPS = 4.0  # of the reading, by which others move at least
 
@@ -50,7 +55,7 @@ def as_shown(data: WheelsData, i: int, f: Finding, told: Sequence[Finding]) -> F
     if not np.isfinite(data.y[f.start : f.stop, i]).any():
         return f  # it gives no readings, whatever its wheel does
     f = _may_creep(data, i, _alive(f, data.y[:, i]))
-    return _with_company(data, i, _off_before(data, i, f, told))
+    return _with_company(data, i, or_held(data, i, _off_before(data, i, f, told), told))
 
 
 def _alive(f: Finding, y: Array) -> Finding:
@@ -107,11 +112,41 @@ def _with_company(data: WheelsData, i: int, f: Finding) -> Finding:
     if f.mode is not FaultMode.STUCK or not np.isfinite(own).any() or not np.isfinite(others).any():
         return f
     level = float(np.nanmedian(own))
+    if _rests(data, i, part):
+        return or_shifted(f, _RESTS)
     if moves_on(data, i, part):
         return f
     step = _least_step(data.y[:, i])
     near = max(_STEPS * step if np.isfinite(step) else 0.0, _AS_OTHERS * abs(level))
-    return limited(f, _TREMBLING, _ALL_STAY) if abs(level - float(np.nanmedian(others))) <= near else f
+    if abs(level - float(np.nanmedian(others))) <= near:
+        return limited(f, _TREMBLING, _ALL_STAY)
+    return limited(f, _TREMBLING, _GOES_ON) if _goes_on(data, i, f, near) else f
+
+
+def _goes_on(data: WheelsData, i: int, f: Finding, near: float) -> bool:
+    """Whether a reading whose rounding hides its noise stays at what it was, beside a command that does."""
+    before = slice(max(0, f.start - round(_STEADY_S / data.dt)), f.start)
+    y, u = data.y[:, i], data.u[:, i]
+    outside = np.abs(np.r_[y[: f.start], np.nan, y[f.stop :]])
+    moving = outside[:-1][np.isfinite(np.diff(outside)) & (outside[:-1] > TURNS * data.span)]
+    repeats = np.count_nonzero((np.diff(outside) == 0.0) & (outside[:-1] > TURNS * data.span))
+    if not np.isfinite(y[before]).any() or not moving.size or repeats < _REPEATS * moving.size:
+        return False
+    inside = slice(f.start, f.stop)
+    same = abs(float(np.nanmedian(y[before]) - np.nanmedian(y[inside]))) <= near
+    asked = [float(np.nanmedian(u[part])) if np.isfinite(u[part]).any() else np.nan for part in (before, inside)]
+    return bool(same and abs(asked[0] - asked[1]) <= _SHUT)
+
+
+def _rests(data: WheelsData, i: int, part: slice) -> bool:
+    """Whether the machine stands but for a tenth of the time, its valve shut, while the sensor reads a speed."""
+    others, opening = np.abs(np.delete(data.y[part], i, axis=1)), np.abs(data.u[part, i])
+    known = np.isfinite(others).any(axis=1)
+    fastest = np.max(others[known], axis=1, where=np.isfinite(others[known]), initial=0.0)
+    stands = known.any() and float(np.quantile(fastest, _STANDING)) <= TURNS * data.span
+    opening = opening[np.isfinite(opening)]
+    shut = opening.size > 0 and float(np.quantile(opening, _STANDING)) <= _SHUT
+    return bool(stands and shut and abs(float(np.nanmedian(data.y[part, i]))) > TURNS * data.span)
 
 
 def moves_on(data: WheelsData, i: int, part: slice) -> bool:

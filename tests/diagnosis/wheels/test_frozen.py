@@ -37,14 +37,15 @@ def data(y: np.ndarray, u: np.ndarray | None = None) -> Any:
         plants=PLANTS,
         span=SPAN,
         dt=DT,
+        measured=[False] * 4,
         names=[(f"wheel.{w}.v", "u") for w in "abcd"],
     )
 
 
-def found(y: np.ndarray, *findings: Finding) -> list[Finding]:
+def found(y: np.ndarray, *findings: Finding, u: np.ndarray | None = None) -> list[Finding]:
     """What is told of the first wheel."""
     before = {i: WheelFindings(findings=list(findings) if i == 0 else []) for i in range(4)}
-    after = with_frozen(data(y), before)
+    after = with_frozen(data(y, u), before)
     assert all(after[i].findings == [] for i in range(1, 4))
     return after[0].findings
 
@@ -135,3 +136,48 @@ def test_a_speed_that_stays_as_all_others_do_is_hardly_stuck() -> None:
     assert told.probability < 0.5
     y[2000:2600, 0] = 0.6  # it alone reads something else
     assert found(y, stuck)[0].probability == pytest.approx(0.9)
+
+
+def silent(start: int, stop: int = 2600) -> Finding:
+    rows = (Hypothesis("sensor", FaultMode.NO_SIGNAL, 0.95), Hypothesis("none", "healthy", 0.05))
+    return Finding(start, stop, Side.SENSOR, FaultMode.NO_SIGNAL, 0.95, rows, None, None, (), Tier.MODEL)
+
+
+@pytest.mark.parametrize(("falls", "side"), [(1, Side.SENSOR), (12, Side.SENSOR_OR_ACTUATOR)])
+def test_a_wheel_that_slows_down_before_it_reads_zero_may_be_held(falls: int, side: Side) -> None:
+    """A dead sensor's reading is cut off; what reads zero ever since is told alike."""
+    y = speeds()
+    y[2000:3500, 0] = 0.0
+    y[2000 - falls : 2000, 0] *= np.linspace(1.0, 0.0, falls + 2)[1:-1] if falls > 1 else 1.0
+    first, since = found(y, silent(1998), silent(3000, 3500), u=np.full_like(y, 0.9))
+    assert (first.side, since.side) == (side, side)
+    assert sum(h.p for h in first.hypotheses) == pytest.approx(1.0)
+    assert (first.probability > 0.9) is (side is Side.SENSOR)
+
+
+def test_where_the_machine_stands_a_constant_is_no_stuck_sensor_alone() -> None:
+    """One that is off by a constant reads the same."""
+    y = np.round(speeds(), 3)
+    y[2000:2600] = 0.0
+    y[2000:2600, 0] = 0.5
+    rows = (Hypothesis("sensor", FaultMode.STUCK, 0.9), Hypothesis("none", "healthy", 0.1))
+    stuck = Finding(2000, 2600, Side.SENSOR, FaultMode.STUCK, 0.9, rows, None, None, (), Tier.MODEL)
+    (told,) = found(y, stuck, u=0.0 * y)
+    assert told.probability < 0.6
+    assert {(h.side, h.mode) for h in told.hypotheses} >= {("sensor", "outside_table")}
+
+
+@pytest.mark.parametrize(("step", "sure"), [(0.1, False), (0.001, True)])
+def test_a_coarse_reading_that_goes_on_at_one_speed_is_hardly_stuck(step: float, *, sure: bool) -> None:
+    """Of a fine one, only a dead sensor's reading stays."""
+    slow = 1.0 + 0.6 * np.sin(2 * np.pi * T / 30.0)
+    slow[1900:2600] = slow[1900]
+    noise = 0.004 * np.random.default_rng(1).standard_normal((N, 4))
+    y = np.round((slow[:, np.newaxis] * np.array([1.0, 0.7, 0.75, 0.72]) + noise) / step) * step
+    y[2000:2600, 0] = y[1999, 0]
+    rows = (Hypothesis("sensor", FaultMode.STUCK, 0.9), Hypothesis("none", "healthy", 0.1))
+    stuck = Finding(2000, 2600, Side.SENSOR, FaultMode.STUCK, 0.9, rows, None, None, (), Tier.MODEL)
+    u = 0.3 * np.broadcast_to(slow[:, np.newaxis], y.shape)
+    before = {i: WheelFindings(findings=[stuck] if i == 0 else []) for i in range(4)}
+    told = with_frozen(data(y, np.array(u)), before)[0].findings
+    assert any(f.probability > 0.8 for f in told) is sure

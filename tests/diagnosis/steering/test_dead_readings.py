@@ -1,0 +1,37 @@
+"""Angles that stay where nobody asks them to leave."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from diagnosis.steering.dead_readings import at_rest
+
+N = 1_000
+
+
+def axle(mean: np.ndarray, command: np.ndarray) -> Any:
+    """An axle with readings of .2 mrad steps in blocks of 20 ms [rad], and the rate that its command asks for [rad/s]."""
+    noise = SimpleNamespace(white=1e-8, lsb=2e-4)
+    return SimpleNamespace(
+        blocks=SimpleNamespace(dt=0.02, count=np.ones(N), mean=mean),
+        driven=SimpleNamespace(command=command),
+        model=SimpleNamespace(noise=noise, rate_error=0.01, stop=0.6),
+    )
+
+
+@pytest.mark.parametrize(("first", "asked", "rests"), [(0.0, 0.0, True), (2e-4, 0.0, False), (0.0, 0.3, False)])
+def test_an_angle_that_never_changes_says_nothing_where_nobody_asks_it_to(
+    first: float, asked: float, *, rests: bool
+) -> None:
+    """One that changed before, or that is asked to, may be dead."""
+    mean = np.zeros(N)
+    mean[:20:2] = first
+    command = np.zeros(N)
+    command[500:600] = asked
+    assert at_rest(axle(mean, command), 20, N, command_logged=True) is rests
+    if not first:
+        assert at_rest(axle(mean, command), 0, N, command_logged=True) is rests
