@@ -127,6 +127,12 @@ class Cells:
         return [self.carried.get(wheel, 0.0) for wheel in self.machine.wheels]
 
     @property
+    def ahead(self) -> list[float] | None:
+        """Where each wheel is along the machine [m]; None without geometry."""
+        geometry = self.machine.geometry
+        return None if geometry is None else [geometry.wheels[wheel].x for wheel in self.machine.wheels]
+
+    @property
     def reference(self) -> Array:
         """Commanded speed of every wheel, shape (cells, wheels)."""
         return self.once("reference", lambda: self.of(self.replay.v_ref))

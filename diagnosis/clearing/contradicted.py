@@ -12,7 +12,8 @@ import numpy as np
 
 from diagnosis.clearing.backwards import Part, without_findings
 from diagnosis.clearing.cells import Array, Cells
-from diagnosis.clearing.responses import openings_tell, responses_of
+from diagnosis.clearing.openings import openings_tell
+from diagnosis.clearing.responses import responses_of
 from diagnosis.results.assessment import Assessment, Finding
 from diagnosis.results.vocabulary import Tier
 from replay.faults import FaultMode, Side

@@ -12,7 +12,9 @@ from diagnosis.clearing import axles, wheels, yaw
 from diagnosis.clearing import responses as resp
 from diagnosis.clearing.alone import Rough, Still, Straight
 from diagnosis.clearing.cells import Array, Cells
+from diagnosis.clearing.limits import measured_twice, response_limits
 from diagnosis.clearing.measure import as_followed, compared, late
+from diagnosis.clearing.openings import openings_tell
 from diagnosis.clearing.placements import Overlap, Placements, Ratio, Reference
 from diagnosis.clearing.still import answered, rate_of, still_frame
 from diagnosis.results.detectability import Deviation
@@ -132,8 +134,8 @@ def _wheels(cells: Cells) -> Iterator[Gauges]:
     used = np.where(np.isfinite(opening), opening, command)
     followed = as_followed(cells, opening, command, wheels.OPENING)
     responses = resp.responses_of(cells, speed, used, cells.reference)
-    limits = resp.response_limits(responses, resp.measured_twice(cells), clear_at, cells.carried_shares)
-    tells = resp.openings_tell(cells, responses)
+    limits = response_limits(responses, measured_twice(cells), clear_at, cells.carried_shares, cells.ahead)
+    tells = openings_tell(cells, responses)
     delays, rough = late(speed, cells.reference, cells.dt), wheels.roughness_of(cells, speed)
     for i, name in enumerate(cells.machine.wheels):
         v, u, a, x = (z[:, i] for z in (speed, command, opening, second))

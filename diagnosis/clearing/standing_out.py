@@ -17,7 +17,8 @@ import numpy as np
 from diagnosis.clearing.backwards import without_findings
 from diagnosis.clearing.cells import Cells
 from diagnosis.clearing.jumps import fault_of_jumps
-from diagnosis.clearing.responses import Limits, measured_twice, speeds_follow_openings, usual_limits
+from diagnosis.clearing.limits import Limits, measured_twice, usual_limits
+from diagnosis.clearing.openings import speeds_follow_openings
 from diagnosis.clearing.untold_faults import fault_of_angle, fault_of_axle, fault_of_wheel
 from diagnosis.results.assessment import CODE, Assessment, Finding
 from diagnosis.results.clearing import Check, Checked

@@ -8,18 +8,10 @@ from typing import NamedTuple
 import numpy as np
 
 from diagnosis.clearing.cells import Array, Cells
+from diagnosis.clearing.limits import Limits, measured_twice, response_limits
 from diagnosis.clearing.measure import alone, compared, lasts, late, off_commands, times, worst
-from diagnosis.clearing.responses import (
-    OTHERS,
-    USUAL_TOP,
-    Limits,
-    largest,
-    measured_twice,
-    openings_tell,
-    others_at,
-    response_limits,
-    responses_of,
-)
+from diagnosis.clearing.openings import openings_tell
+from diagnosis.clearing.responses import OTHERS, USUAL_TOP, largest, others_at, responses_of
 from diagnosis.clearing.wild import wild_readings
 from diagnosis.results.clearing import Check, Checked
 from diagnosis.results.vocabulary import Kind
@@ -60,7 +52,7 @@ def wheel_checks(cells: Cells, clear_at: float) -> Iterator[Checked]:
     windows, lasting = responses.windows, responses.usual
     slow = responses_of(cells, speed, used, reference, CREEPING * USUAL_TOP, over_time=False).windows
     slow[np.isfinite(windows)] = np.nan
-    limits = response_limits(responses, twice, clear_at, cells.carried_shares)
+    limits = response_limits(responses, twice, clear_at, cells.carried_shares, cells.ahead)
     tracking, rough = _tracking(cells, speed, reference), _rough_beside_others(roughness_of(cells, speed, reference))
     rough = np.fmax(rough, wild_readings(cells, speed, FLOOR * cells.machine.max_speed))
     worst_tracking = [float(x) for x in largest(tracking)]

@@ -14,7 +14,8 @@ from diagnosis.results.result import Epsilon, Hypothesis, Sat
 from diagnosis.results.vocabulary import Tier
 from diagnosis.wheels.findings import WheelFindings
 from diagnosis.wheels.inputs import WheelsData
-from diagnosis.wheels.unshown import TURNS, as_shown, moves_on
+from diagnosis.wheels.slowing import TURNS
+from diagnosis.wheels.unshown import as_shown, moves_on
 from replay.faults import FaultMode, Side, State
 
 Array = NDArray[np.float64]

@@ -87,4 +87,4 @@ def _slows(data: WheelsData, i: int, f: Finding) -> bool:
     for x in (speed, share):
         levels.append(float(np.nanmedian(x[: cut - start])))
         inside &= (x[cut - start :] > least * levels[-1]) & (x[cut - start :] < most * levels[-1])
-    return levels[-1] > _TURNED and np.count_nonzero(inside) >= max(_FEW, round(_PASSES_S / data.dt))
+    return bool(levels[-1] > _TURNED and np.count_nonzero(inside) >= max(_FEW, round(_PASSES_S / data.dt)))

@@ -12,8 +12,8 @@ from diagnosis.clearing import yaw
 from diagnosis.clearing.axles import _parted
 from diagnosis.clearing.cells import Frame
 from diagnosis.clearing.checks import checks_of
+from diagnosis.clearing.limits import usual_limits
 from diagnosis.clearing.measure import off_commands
-from diagnosis.clearing.responses import usual_limits
 from diagnosis.clearing.still import commanded_still, dead_bands
 from diagnosis.clearing.wheels import ROUGH, beside_ground, most_carried, most_creeping, roughness_of
 from diagnosis.results.clearing import Check, Checked

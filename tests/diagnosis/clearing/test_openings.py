@@ -10,7 +10,7 @@ import pytest
 
 from diagnosis.clearing.cells import Frame
 from diagnosis.clearing.measure import as_followed, compared, lowest_passed
-from diagnosis.clearing.responses import speeds_follow_openings
+from diagnosis.clearing.openings import speeds_follow_openings
 from diagnosis.clearing.wheels import OPENING
 
 DT, SIZE = 0.1, 900

@@ -10,14 +10,9 @@ import pytest
 
 from diagnosis.clearing.axles import _alone
 from diagnosis.clearing.cells import Frame
-from diagnosis.clearing.responses import (
-    Responses,
-    Usual,
-    growth,
-    openings_tell,
-    response_limits,
-    usual_limits,
-)
+from diagnosis.clearing.limits import response_limits, usual_limits
+from diagnosis.clearing.openings import openings_tell
+from diagnosis.clearing.responses import Responses, Usual, growth
 
 ONCE, TWICE, CLEAR_AT = (False, False), (True, True), 0.25
 
@@ -34,7 +29,9 @@ def test_a_wheel_that_deviates_alone_is_held_to_a_lower_limit() -> None:
     of, usual = responses(0.17, 0.01, 0.015, 0.015, changes=(0.15, 0.02, 0.01, None)), usual_limits(ONCE, CLEAR_AT)
     first, second, *_ = response_limits(of, [ONCE] * 4, CLEAR_AT)
     assert first.below == first.above == pytest.approx(0.06)  # no lower than that, however quiet the others are
-    assert first.changed == first.grown == pytest.approx(0.06)
+    assert first.changed == first.grown == pytest.approx(0.044)  # 2.2 times the next
+    still = responses(0.0, 0.0, 0.0, 0.0, changes=(0.15, 0.01, 0.01, None))
+    assert response_limits(still, [ONCE] * 4, CLEAR_AT)[0].changed == pytest.approx(0.035)
     half = response_limits(of, [(True, False)] * 4, CLEAR_AT)[0]
     assert half.below == half.changed == pytest.approx(0.1)  # where openings are measured, less hangs on it
     assert (first.lasting_below, first.lasting_above) == (usual.lasting_below, usual.lasting_above)
@@ -54,6 +51,19 @@ def test_a_change_that_one_wheel_alone_makes_counts_although_it_is_measured_twic
     first, *others = response_limits(of, [TWICE] * 4, CLEAR_AT)
     assert first.changed == pytest.approx(0.16)
     assert all(limit.changed == usual_limits(TWICE, CLEAR_AT).changed for limit in others)
+
+
+@pytest.mark.parametrize(("ahead", "below"), [((1.0, 1.0, -1.0, -1.0), 0.06), ((1.0, -1.0, -1.0, 1.0), 0.18)])
+def test_two_wheels_of_one_axle_that_lose_together_are_held_to_the_others(
+    ahead: tuple[float, ...], below: float
+) -> None:
+    """Two of one side are not, which differ in turns."""
+    of = responses(0.07, 0.06, 0.01, 0.005)
+    limits = response_limits(of, [ONCE] * 4, CLEAR_AT, ahead=ahead)
+    assert limits[0].below == pytest.approx(below)
+    assert response_limits(of, [ONCE] * 4, CLEAR_AT)[0].below == pytest.approx(0.18)
+    single = response_limits(responses(0.07, 0.06), [ONCE] * 2, CLEAR_AT, ahead=ahead[:2])
+    assert single == [usual_limits(ONCE, CLEAR_AT)] * 2
 
 
 def test_where_all_deviate_alike_the_limit_stays() -> None:

@@ -1,0 +1,130 @@
+"""Limits that an all-clear sets to a wheel's speed per opening: lower where the other wheels deviate by much less."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from diagnosis.clearing.cells import Cells
+from diagnosis.clearing.measure import alone
+from diagnosis.clearing.responses import Responses, largest
+
+_CHANGED = 0.88  # a change counts by its limit in windows, not over the mission
+#: A deviation counts from this on, whatever the other wheels do [ln]: tyres hide most of a valve's loss, which is all that
+#: shows of it where neither side is measured twice.
+_LEAST_SEEN, _LEAST_SEEN_TWICE = 0.06, 0.1
+#: A change likewise, where neither is measured twice: healthy wheels of machines that are cleared change alike, by 0.02 where none does by more
+#: (tuning), for what changes of a machine, such as its load or its oil, changes for all of its wheels.
+_LEAST_CHANGED = 0.035
+_ABREAST_M = 0.05  # along the machine
+#: The same where both sides are measured twice, in windows and of a change: what is left to be seen is what lies behind the drive.
+_LEAST_BEHIND, _LEAST_CHANGED_BEHIND = 0.288, 0.16
+_LEAST_LASTING = 0.13  # the same over the mission, of what is measured twice on either side
+#: A deviation counts from so many times the largest of the other wheels' on, a change likewise.
+_ALONE, _CHANGED_ALONE = 3.0, 2.2
+#: Limits of speed per opening below and above the other wheels', in windows and over the mission, as multiples of the loss
+#: that counts, by whether opening and speed are measured twice. What measurements judge need not be judged by its likeness to
+#: others as strictly, but what lies behind a drive neither of them judges; what reads too much is in no row of the tables, so that
+#: nothing else would tell it.
+RESPONSE = {
+    (False, False): ((0.75, 0.65), (0.9, 0.7)),
+    (True, False): ((1.4, 1.15), (1.25, 0.95)),
+    (False, True): ((1.15, 1.0), (1.4, 1.2)),
+    (True, True): ((1.4, 1.15), (2.0, 1.4)),
+}
+
+
+class Limits(NamedTuple):
+    """Limits of a wheel's speed per opening [ln]: in windows below and above, of a change, of one that grows, and over the mission."""
+
+    below: float
+    above: float
+    changed: float
+    grown: float
+    lasting_below: float
+    lasting_above: float
+
+
+def measured_twice(cells: Cells) -> list[tuple[bool, bool]]:
+    """Whether the opening, and the speed, of each wheel are measured twice."""
+    command, opening, second = (
+        [bool(np.isfinite(x).any()) for x in cells.wheels(leaf).T] for leaf in ("u", "u_applied", "v_true")
+    )
+    return [(a and u, x) for u, a, x in zip(command, opening, second, strict=True)]
+
+
+def usual_limits(twice: tuple[bool, bool], clear_at: float) -> Limits:
+    """Limits of a wheel whatever the other wheels do; `twice` as of `measured_twice`, `clear_at` the loss that counts [1]."""
+    share = -float(np.log1p(-clear_at))
+    (below, lasting_below), (above, lasting_above) = RESPONSE[twice]
+    changed = lasting_below / _CHANGED
+    return Limits(*(share * x for x in (below, above, changed, changed, lasting_below, lasting_above)))
+
+
+def response_limits(
+    responses: Responses,
+    twice: Sequence[tuple[bool, bool]],
+    clear_at: float,
+    carried: Sequence[float] | None = None,
+    ahead: Sequence[float] | None = None,
+) -> list[Limits]:
+    """Limits of every wheel [ln], lower where the other wheels deviate by much less.
+
+    Arguments as of `usual_limits`; `carried` is the share of its speed that the ground gives each wheel [1], none by default, and `ahead`
+    where each is along the machine [m]: two abreast that lose together are held to the wheels of other axles. What is usual of a
+    wheel that is measured once may be below the others' by no more than the loss that counts leaves to be seen beside the ground, or above by
+    no more than such an excess does.
+    """
+    return [
+        limit
+        if any(both)
+        else limit._replace(
+            lasting_below=min(limit.lasting_below, _seen(clear_at, held)),
+            lasting_above=min(limit.lasting_above, float(np.log1p(clear_at * (1.0 - held)))),
+        )
+        for limit, both, held in zip(
+            _beside_others(responses, twice, clear_at, ahead), twice, carried or [0.0] * len(twice), strict=True
+        )
+    ]
+
+
+def _beside_axles(below: Sequence[float], i: int, limit: float, least: float, ahead: Sequence[float] | None) -> float:
+    """Limit of a wheel beside those of other axles alone: both of one may lose together; those of one side differ in turns anyway."""
+    if ahead is None:
+        return limit
+    others = [x for j, x in enumerate(below) if j == i or abs(ahead[j] - ahead[i]) > _ABREAST_M]
+    place = sum(abs(ahead[j] - ahead[i]) > _ABREAST_M for j in range(i))
+    return alone(others, place, limit, least, _ALONE)
+
+
+def _seen(clear_at: float, carried: float) -> float:
+    """By how much a wheel's speed falls by a loss of its valve while the ground gives it a share of it [ln]."""
+    return -float(np.log1p(-clear_at * (1.0 - carried)))
+
+
+def _beside_others(
+    responses: Responses, twice: Sequence[tuple[bool, bool]], clear_at: float, ahead: Sequence[float] | None
+) -> list[Limits]:
+    most = [[float(x) for x in largest(sign * responses.windows)] for sign in (-1.0, 1.0)]
+    below = [usual.below for usual in responses.usual]
+    out = []
+    for i, both in enumerate(twice):
+        limit = usual_limits(both, clear_at)
+        seen = _LEAST_BEHIND if all(both) else _LEAST_SEEN_TWICE if any(both) else _LEAST_SEEN
+        changed = _LEAST_CHANGED_BEHIND if all(both) else seen if any(both) else _LEAST_CHANGED
+        limit = limit._replace(
+            below=min(
+                alone(most[0], i, limit.below, seen, _ALONE), _beside_axles(most[0], i, limit.below, seen, ahead)
+            ),
+            changed=alone(responses.changes, i, limit.changed, changed, _CHANGED_ALONE),
+            grown=alone(responses.grown, i, limit.grown, changed, _CHANGED_ALONE),
+        )
+        if not all(both):
+            limit = limit._replace(above=alone(most[1], i, limit.above, seen, _ALONE))
+        if any(both):
+            lasting = alone(below, i, limit.lasting_below, _LEAST_LASTING, _ALONE)
+            limit = limit._replace(lasting_below=lasting)
+        out.append(limit)
+    return out
