@@ -12,7 +12,7 @@ from diagnosis.clearing.cells import Array, Cells
 from diagnosis.clearing.measure import lowest_passed
 
 LAG_S = 0.15  #: Of a valve and its drive [s].
-_SETTLED_S, _SETTLED = 0.6, 0.03  # a command that has changed by less than this [m/s] over this time
+SETTLED_S, SETTLED = 0.6, 0.03  #: a command that has changed by less than this [m/s] over this time
 USUAL_TOP = 0.36  # m/s, of the machine for which speeds here are
 MOVING = 0.08  # m/s, for such a machine
 _LEAST_CELLS = 0.5  # of a window
@@ -76,10 +76,10 @@ def responses_of(
     scale = cells.machine.max_speed / USUAL_TOP
     known = np.isfinite(reference)
     motion = np.where(known, reference, speed)
-    back = max(1, round(_SETTLED_S / cells.dt))
+    back = max(1, round(SETTLED_S / cells.dt))
     before = np.concatenate([np.full((min(back, len(motion)), motion.shape[1]), np.nan), motion[:-back]])
     with np.errstate(invalid="ignore"):
-        settled = (np.abs(motion) > moving * scale) & (np.abs(motion - before) < _SETTLED * scale)
+        settled = (np.abs(motion) > moving * scale) & (np.abs(motion - before) < SETTLED * scale)
     settled &= np.isfinite(speed) & np.isfinite(opening)
     passed = lowest_passed(opening, cells.dt, LAG_S)
     moved, opened = (frame.sums(np.where(settled, np.abs(x), 0.0)) for x in (speed, passed))

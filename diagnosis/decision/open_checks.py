@@ -7,7 +7,14 @@ from collections.abc import Sequence
 from diagnosis.results.clearing import Check, Checked
 
 _STANDS_OUT = 3.0  # times the limit of a check: nobody should have to look for that among what is open
-_BESIDE_OTHERS = (Check.RESPONSE, Check.LASTING_RESPONSE, Check.CHANGE, Check.EXCESS, Check.LASTING_EXCESS)
+_BESIDE_OTHERS = (
+    Check.RESPONSE,
+    Check.LASTING_RESPONSE,
+    Check.CHANGE,
+    Check.EXCESS,
+    Check.LASTING_EXCESS,
+    Check.OPENING_OFFSET,
+)
 
 
 def furthest_first(checks: Sequence[Checked]) -> list[Checked]:

@@ -22,6 +22,7 @@ class Check(StrEnum):
     CHANGE = "change"
     EXCESS = "excess"
     LASTING_EXCESS = "lasting_excess"
+    OPENING_OFFSET = "opening_offset"
     CARRIED = "carried"
     BEHIND = "behind"
     TRACKING = "tracking"
@@ -63,6 +64,10 @@ CHECK_WORDS: dict[Check, tuple[str, str]] = {
     Check.LASTING_EXCESS: (
         "speed per {unit_command} above the other {wheels}', over the mission",
         "the speed of {part} per {unit_command} is {value} the other {wheels}' over the mission",
+    ),
+    Check.OPENING_OFFSET: (
+        "{unit_command} at a speed against the other {wheels}'",
+        "{part} is told {value} of full {unit_command} more or less than the other {wheels} at the same speed",
     ),
     Check.CARRIED: (
         "share of the speed that the ground gives a {wheel} whose {valve} is dead",
