@@ -53,6 +53,8 @@ class Responses(NamedTuple):
     changes, grown : list[float | None]
         By how much each wheel's usual one changes in the mission at most, and over half of it at its usual pace; None where it is not
         known.
+    own : Array, shape (windows, wheels)
+        ln of the speed per opening itself [ln of m/s].
     """
 
     windows: Array
@@ -62,6 +64,7 @@ class Responses(NamedTuple):
     ahead: NDArray[np.bool_]
     changes: list[float | None]
     grown: list[float | None]
+    own: Array
 
 
 def responses_of(
@@ -87,6 +90,7 @@ def responses_of(
     ratio = np.where(enough, moved / np.maximum(opened, 1e-3 * frame.length), np.nan)
     with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
         log = np.log(np.maximum(ratio, 1e-3) / others_at(ratio))
+        alone = np.log(np.maximum(ratio, 1e-3))
     ahead = frame.mean(np.sign(np.nan_to_num(motion))) >= 0.0
     off = np.full(log.shape, np.nan)
     lasting: list[Usual] = []
@@ -118,7 +122,7 @@ def responses_of(
             if usual
             else Usual()
         )
-    return Responses(off, log, lasting, np.where(settled, np.abs(speed), 0.0), ahead, changes, grown)
+    return Responses(off, log, lasting, np.where(settled, np.abs(speed), 0.0), ahead, changes, grown, alone)
 
 
 def largest_change(log: Array, ways: Sequence[NDArray[np.bool_]]) -> float:

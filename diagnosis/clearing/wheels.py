@@ -13,6 +13,7 @@ from diagnosis.clearing.measure import alone, compared, lasts, late, off_command
 from diagnosis.clearing.opening_offsets import opening_offsets
 from diagnosis.clearing.openings import openings_tell
 from diagnosis.clearing.responses import OTHERS, USUAL_TOP, largest, others_at, responses_of
+from diagnosis.clearing.same_side import beside_its_side
 from diagnosis.clearing.wild import wild_readings
 from diagnosis.results.clearing import Check, Checked
 from diagnosis.results.vocabulary import Kind
@@ -60,6 +61,7 @@ def wheel_checks(cells: Cells, clear_at: float) -> Iterator[Checked]:
     tracking, rough = _tracking(cells, speed, reference), _rough_beside_others(roughness_of(cells, speed, reference))
     rough = np.fmax(rough, wild_readings(cells, speed, FLOOR * cells.machine.max_speed))
     worst_tracking = [float(x) for x in largest(tracking)]
+    beside = beside_its_side(cells, responses)
     offsets = opening_offsets(cells, speed, used)
     most_off = [float(x) for x in largest(offsets[0])], [float(x) for x in offsets[1]]
     delays = late(speed, reference, cells.dt)
@@ -100,6 +102,8 @@ def wheel_checks(cells: Cells, clear_at: float) -> Iterator[Checked]:
             if not all(twice[i]):  # of a wheel that is measured twice on both sides, it is the ground's doing
                 yield worst(cells, (*about, either, Check.EXCESS), windows[:, i], own.above, apart=True)
                 yield lasts(cells, (*about, either, Check.LASTING_EXCESS), lasting[i].above, own.lasting_above)
+            if tells and not any(twice[i]) and i in beside:
+                yield worst(cells, (*about, either, Check.SAME_SIDE), *beside[i], apart=True)
             if tells and not any(twice[i]) and np.isfinite(offsets[1][i]):
                 about_opening = (*about, either, Check.OPENING_OFFSET)
                 once, usual = (alone(x, i, 1.0, LEAST_OFFSET, _OFF_ALONE) for x in most_off)

@@ -42,6 +42,7 @@ _BESIDE_WHEELS = (
     Check.CHANGE,
     Check.EXCESS,
     Check.LASTING_EXCESS,
+    Check.SAME_SIDE,
     Check.OPENING_OFFSET,
     Check.TRACKING,
     Check.DELAY,

@@ -13,6 +13,7 @@ _BESIDE_OTHERS = (
     Check.CHANGE,
     Check.EXCESS,
     Check.LASTING_EXCESS,
+    Check.SAME_SIDE,
     Check.OPENING_OFFSET,
 )
 

@@ -22,6 +22,7 @@ class Check(StrEnum):
     CHANGE = "change"
     EXCESS = "excess"
     LASTING_EXCESS = "lasting_excess"
+    SAME_SIDE = "same_side"
     OPENING_OFFSET = "opening_offset"
     CARRIED = "carried"
     BEHIND = "behind"
@@ -64,6 +65,10 @@ CHECK_WORDS: dict[Check, tuple[str, str]] = {
     Check.LASTING_EXCESS: (
         "speed per {unit_command} above the other {wheels}', over the mission",
         "the speed of {part} per {unit_command} is {value} the other {wheels}' over the mission",
+    ),
+    Check.SAME_SIDE: (
+        "speed per {unit_command} against the other {wheel} of its side, for 3 s",
+        "the speed of {part} per {unit_command} departs from that of the other {wheel} of its side by a {value}",
     ),
     Check.OPENING_OFFSET: (
         "{unit_command} at a speed against the other {wheels}'",
@@ -130,7 +135,7 @@ _AFTER_S = (0.5, 3.0)  # of a fault, in which it still shows, at least and at mo
 #: Checks whose values and limits are natural logarithms of a ratio: how far below another it is, how far above, or either.
 _BELOW = (Check.RESPONSE, Check.LASTING_RESPONSE)
 _ABOVE = (Check.EXCESS, Check.LASTING_EXCESS)
-_EITHER_WAY = (Check.CHANGE, Check.RATE, Check.LASTING_RATE, Check.PLANT_RATE)
+_EITHER_WAY = (Check.CHANGE, Check.SAME_SIDE, Check.RATE, Check.LASTING_RATE, Check.PLANT_RATE)
 
 
 @dataclass(frozen=True)
