@@ -21,6 +21,7 @@ _MOVES = 0.95  # ... of the openings at which a wheel moves, so many lie above t
 _WHEELS, _LEAST_S = 3, 1.0  # fewer wheels, or less time, show nothing, ...
 # ... but that much, and half of the drives, where an axle stands as well, which is told to turn by so much; openings as a share of that
 _LEAST_WITH_AXLE_S, _STEERED, _LESS = 0.5, 0.3, 0.5
+_BRIEF_S = 0.2  # for which open drives stood before an axle does: too brief by itself
 _AXLES = 2  # that stand together where the drives are told to rest: one alone has a fault
 _EDGES = 2  # cells, for a rate
 _ELSEWHERE = 5.0  # times as long do wheels move at such openings
@@ -59,6 +60,8 @@ def _nothing_moves(cells: Cells) -> Flags:
     still = _lasting(enough & rests, _cells_in(_LEAST_S, cells))
     half = open_(np.maximum(_OPEN, _LESS * least)) >= 0.5 * count
     still |= _lasting(half & rests & stands, _cells_in(_LEAST_WITH_AXLE_S, cells))
+    stopped = _until(_lasting(enough & rests, _cells_in(_BRIEF_S, cells)), ~rests)
+    still |= _lasting(stopped & rests & stands, _cells_in(_LEAST_WITH_AXLE_S, cells))
     still |= _axles_alone(axles, rests, cells)
     drives = np.count_nonzero(enough & moves[:, known].all(axis=1))
     return _until(still, ~rests | turns) if drives > _ELSEWHERE * np.count_nonzero(still) else none
