@@ -92,7 +92,7 @@ def test_axles_that_stand_together_at_rest_are_the_supplys(
 def test_an_axle_that_stands_after_open_drives_stopped_is_the_supplys(opened_s: float, *, stalls: bool) -> None:
     """Too briefly to tell by themselves; where the drives were shut before, the axle has a fault."""
     rests = (T >= 40.0) & (T < 46.0)
-    openings = dict.fromkeys(WHEELS, np.where(rests & (T >= 40.0 + opened_s), 0.0, DRIVEN))
+    openings = dict.fromkeys(WHEELS, np.where(rests & (40.0 + opened_s <= T), 0.0, DRIVEN))
     command = np.where(rests & (T < 44.0), 0.6, np.where(rests, 0.0, 0.6 * np.sin(0.7 * T)))
     angle = 0.3 * np.cumsum(np.where(rests, 0.0, command)) * DT
     cells = mission(dict.fromkeys(WHEELS, DRIVEN * 0.8 * ~rests), openings, angle, command)
