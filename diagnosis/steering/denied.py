@@ -12,6 +12,7 @@ import numpy as np
 
 from diagnosis.results.assessment import Finding
 from diagnosis.results.limited import limited
+from diagnosis.steering.between_readings import between_readings
 from diagnosis.steering.blocks import SteeringBlocks
 from diagnosis.steering.findings import SideFindings
 from diagnosis.steering.inputs import AxleInputs
@@ -73,6 +74,7 @@ def not_denied(
         kept = tuple(f for f in sensor.findings if f not in denied)
         out[Side.SENSOR] = SideFindings(kept, (*sensor.unexplained, *(_span(f, blocks) for f in denied)))
     valve = _asked(valve, inputs, blocks)
+    valve = valve._replace(findings=tuple(f for f in valve.findings if not between_readings(f, inputs)))
     out[Side.ACTUATOR] = valve
     if not inputs.valve_redundant:
         obeyed = [f for f in valve.findings if f.mode.total and _denies(*_span(f, blocks), blocks, max_steer)]

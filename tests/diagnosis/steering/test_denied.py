@@ -54,11 +54,12 @@ def inputs(
     return SimpleNamespace(
         angle_redundant=angle,
         valve_redundant=valve,
-        timeline=SimpleNamespace(dt=DT),
+        timeline=SimpleNamespace(dt=DT, fresh={"u": ALWAYS, "u_applied": ALWAYS}),
+        channel=lambda leaf: leaf,
         angle=reading,
         fresh=ALWAYS,
         logged=frozenset({"u"} if command is not None else ()),
-        values=lambda leaf: command,
+        values=lambda leaf: np.full(SIZE, np.nan) if command is None else command,
     )
 
 
