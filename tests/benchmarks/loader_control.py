@@ -110,7 +110,7 @@ def drive(
     six = np.zeros((5, n, 6))
     ref, true, read, given, done = six[0], six[1], six[2], six[3], six[4]
     body, source = np.zeros((n, 5)), np.zeros((n, 7))
-    w, x, banks = np.zeros((4, 14)), np.zeros((2, 3)), np.zeros((6, 19))
+    w, x, banks = np.zeros((4, 15)), np.zeros((2, 3)), np.zeros((6, 19))
     w[:, SIZE], w[:, SIGN], w[:, SEEN], banks[:, 0], banks[:, 1] = 1.0, 1.0, 1.0, 1.0, 1.0
     said, refs, held, us, angles, turning, before = (
         np.zeros(6), np.zeros(4), np.zeros(12), np.zeros(2), np.zeros(2), np.zeros(2), np.zeros(2),
@@ -183,14 +183,14 @@ def drive(
         v += H * (fx / total - 9.81 * (hx * math.cos(th) + hy * math.sin(th)) + side * r)
         depth = -work[m, 2] if work[m, 2] <= 0.0 or (m > 0 and work[m - 1, 2] <= 0.0) else depth + H * v
         pile = pile_force(depth, total, b) if work[m, 2] > 0.0 else 0.0
-        if v > 0.0:  # a heap only holds against what comes, and gives way once it is lifted
-            v = max(v - H * pile / total, 0.0)
+        pile = min(pile, max(v, 0.0) * total / H)  # a heap only holds against what comes
+        v -= H * pile / total
         side += H * (fy / total - 9.81 * (hy * math.cos(th) - hx * math.sin(th)) - v * r)
         r += H * moment / (total * (b.base**2 + 4.0 * b.half**2) / 8)
         th += H * r
         px, py = px + H * (v * math.cos(th) - side * math.sin(th)), py + H * (v * math.sin(th) + side * math.cos(th))
-        ax, ay = ax + H / 0.2 * (fx / total - ax), ay + H / 0.2 * (fy / total - ay)
-        ahead = 0.8 * work[m, 0] / (1.0 + work[m, 0]) + 0.15 * lift * pile / (total * 9.81)
+        ax, ay = ax + H / 0.2 * ((fx - pile) / total - ax), ay + H / 0.2 * (fy / total - ay)
+        ahead = 0.8 * work[m, 0] / (1.0 + work[m, 0]) + (0.25 * lift - 0.1) * pile / (total * 9.81)
         front = 0.5 + b.cg / (1.0 + work[m, 0]) + ahead - b.height / b.base * ax / 9.81
         lefts = 0.5 - b.height / (2.0 * b.half) * ay / 9.81
         for i in range(4):

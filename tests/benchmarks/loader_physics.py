@@ -20,8 +20,8 @@ H = 0.0005
 STEPS = 16.0
 #: State of a wheel: pressure across its motor [Pa], size of the motor (share), speed [rad/s], way [rad], deflections of the tyre [m], edge,
 #: times of its last edges [s], size that the teeth tell [m/s], sign that it is given, integral of its law, command, drop at its bank that the
-#: controller measures [of the margin].
-DP, SIZE, TURN, ROLLED, ZX, ZY, EDGE, SINCE, BEFORE, RATE, SIGN, TOTAL, ASKED, SEEN = range(14)
+#: controller measures [of the margin], pressure behind the motor's damper [Pa].
+DP, SIZE, TURN, ROLLED, ZX, ZY, EDGE, SINCE, BEFORE, RATE, SIGN, TOTAL, ASKED, SEEN, CALM = range(15)
 #: What differs between wheels: radius without load [m], flow ahead and back, leakage, friction, time that its motor takes to change
 #: its size [s], eccentricity of the toothed wheel [rad], scale of the reading.
 RADIUS, PLUS, MINUS, LEAK, RUB, SHIFT, WAVE, SCALE = range(8)
@@ -57,6 +57,7 @@ class Build(NamedTuple):
     heard_lag: float
     bleeds: float
     leakage: float
+    damper: float
     friction: float
     stiction: float
     power: float
@@ -144,15 +145,17 @@ def motor(w: Array, part: Array, edge: float, s: Array, size: float, b: Build) -
     load = max(sign * w[DP], 0.0)
     spare = max((s[P] - load) / b.margin, 0.0)
     drop = min(spare, 1.0 + 0.04 * (spare - 1.0)) if b.compensated else spare
-    w[SEEN] += H / 0.4 * (drop - w[SEEN])
+    w[SEEN] += H / 0.08 * (drop - w[SEEN])
     full = (part[PLUS] if edge > 0.0 else part[MINUS]) * b.flow * abs(edge)
     q = full * math.sqrt(drop)
     g = full / (2.0 * math.sqrt(max(drop, 0.02)) * b.margin) if spare < 1.0 or not b.compensated else 0.0
     leak = b.leakage * part[LEAK] * math.exp(0.02 * (s[OIL] - 45.0))
     over, relief = max(abs(w[DP]) - b.most, 0.0), b.flow / (0.04 * b.most)
     stiff = 1.0e9 / (1.5 * b.motor)
-    net = sign * q - d * w[TURN] - leak * w[DP] - math.copysign(relief * over, w[DP])
-    w[DP] += H * stiff * net / (1.0 + H * stiff * (g + leak + (relief if over > 0.0 else 0.0)))
+    w[CALM] += H / 0.1 * (w[DP] - w[CALM])
+    damps = b.damper * b.flow / b.most  # an orifice across the motor, with a volume behind it
+    net = sign * q - d * w[TURN] - leak * w[DP] - damps * (w[DP] - w[CALM]) - math.copysign(relief * over, w[DP])
+    w[DP] += H * stiff * net / (1.0 + H * stiff * (g + leak + damps + (relief if over > 0.0 else 0.0)))
     return d * w[DP], q, load if edge != 0.0 else 0.0
 
 
@@ -189,10 +192,14 @@ def tyre(
 ) -> tuple[float, float]:
     """Forces of a tyre [N], forward and left: deflections that relax with the way rolled, and what grip holds, which falls beyond its peak."""
     rim = w[TURN] * radius
-    slip, rolled, end = rim - along, (abs(rim) + abs(along)) / 2.0 / b.relaxation, 1.2 * b.relaxation
+    slip, rolled, end = (
+        rim - along,
+        (abs(rim) + abs(along)) / 2.0 / b.relaxation,
+        3.0 * grip / b.stiffness * b.relaxation,
+    )
     w[ZX] = min(max(w[ZX] + H * (slip - rolled * w[ZX]), -end), end)
     w[ZY] = min(max(w[ZY] + H * (-across - rolled * w[ZY]), -end), end)
-    kx, ky = w[ZX] / b.relaxation + 0.03 * slip, 0.8 * (w[ZY] / b.relaxation - 0.03 * across)
+    kx, ky = w[ZX] / b.relaxation + 0.06 * slip, 0.8 * (w[ZY] / b.relaxation - 0.06 * across)
     size = math.hypot(kx, ky)
     if size < 1e-9:
         return 0.0, 0.0
