@@ -37,6 +37,7 @@ import flow_sharing
 import forwarder
 import geared_circuit
 import hydrostatic
+import loader
 import numpy as np
 import paver
 import sprayer
@@ -76,6 +77,7 @@ OTHERS = {
         telehandler,
         paver,
         tug,
+        loader,
     )
 }
 _DRIVEN, _STEERED = 0.06, 0.02  # m/s, rad/s
@@ -263,7 +265,7 @@ def main() -> None:
         "--machine",
         nargs="+",
         default=None,
-        help="default, structures, foreign, hydrostatic, electrohydraulic, electric, flow_sharing, closed_circuit, geared_circuit, forwarder, dumper, sprayer, telehandler, paver, tug",
+        help="default, structures, foreign, hydrostatic, electrohydraulic, electric, flow_sharing, closed_circuit, geared_circuit, forwarder, dumper, sprayer, telehandler, paver, tug, loader",
     )
     parser.add_argument("--duration", type=float, default=75.0, help="length of a mission [s]")
     parser.add_argument("--every", type=int, default=1, help="one of so many kinds of trouble")
