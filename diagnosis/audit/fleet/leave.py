@@ -71,6 +71,7 @@ def lists_of(document: FleetDocument) -> tuple[Left, ...]:
     every: dict[int, list[FleetFaultRow]] = defaultdict(list)
     rising: dict[int, set[tuple[str, str]]] = defaultdict(set)
     beyond: dict[int, list[TrendRow]] = defaultdict(list)
+    fast: dict[int, list[TrendRow]] = defaultdict(list)
     for f in document["faults"]:
         every[f["machine"]].append(f)
         if f["status"] not in GONE:
@@ -80,13 +81,16 @@ def lists_of(document: FleetDocument) -> tuple[Left, ...]:
             rising[t["machine"]].add((t["component"], t["side"]))
         if t["points"][-1][2] >= t["limit"]:
             beyond[t["machine"]].append(t)
+        if t.get("halving"):
+            fast[t["machine"]].append(t)
     for k, m in enumerate(document["machines"]):
         untold = [t for t in beyond[k] if _is_untold(t, every[k], document["missions"])]
         lost = any(is_lost(t["points"][-1][3], t["limit"]) for t in untold)
-        leave = leave_of(m["verdict"], m["cleared"], m["unjudged"], lost=lost)
+        leave = leave_of(m["verdict"], m["cleared"], m["unjudged"], lost=lost or bool(fast[k]))
         place, reason = _why(leave, m, standing[k], document["missions"], rising[k])
         reason += _repaired(every[k], m) if leave is Leave.MAY else ""
-        reason = _with_blind(_with_losses(leave, m, reason, untold), m)
+        reason = _with_growth(leave, m, _with_losses(leave, m, reason, untold), fast[k])
+        reason = _with_blind(reason, m)
         if leave is not Leave.MAY and any(f["open"] and f["since"] for f in standing[k]) and _ready(m, document):
             newest = document["missions"][m["missions"][-1]]["name"]
             reason += f"; its newest report ({newest}) finds no fault, but judges its own mission alone"
@@ -124,6 +128,24 @@ def _with_losses(leave: Leave, m: MachineRow, reason: str, untold: Sequence[Tren
     if leave is Leave.CHECK and m["verdict"] in (Verdict.READY, Verdict.WATCH) and not m["unjudged"] and m["cleared"]:
         return f"{losses}, though no fault was stated in it: check the part"
     return f"{reason}; {losses}"
+
+
+def _with_growth(leave: Leave, m: MachineRow, reason: str, fast: Sequence[TrendRow]) -> str:
+    """A reason with the losses that grow towards a half: where nothing else keeps the machine in, they are the reason."""
+    if not fast:
+        return reason
+    words = words_of(m)
+    said = []
+    for t in sorted(fast, key=lambda t: -t["points"][-1][2])[:_FAULTS]:
+        before, now = t["points"][-2][2], t["points"][-1][2]
+        part = words.part_words(t["kind"], t["component"], t["side"])
+        said.append(
+            f"{part} lost {100 * now:.0f} % over its last mission ({100 * before:.0f} % over the one before), and grows so fast that half "
+            "may be lost before two more are over".replace("-", "−")
+        )
+    losses = "; ".join(said)
+    alone = leave is Leave.CHECK and leave_of(m["verdict"], m["cleared"], m["unjudged"]) is Leave.MAY
+    return f"{losses}: check the part; {reason}" if alone else f"{reason}; {losses}"
 
 
 def _ready(m: MachineRow, document: FleetDocument) -> bool:

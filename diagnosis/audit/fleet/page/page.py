@@ -225,7 +225,10 @@ def _machine(
     line = leading["line"] if leading else None
     judged = len(m["missions"]) + len(m["undated"])
     near = any(t["approaching"] for t in trends)
-    words, symbol = machine_words(m, standing, near, leave), m["verdict"].symbol
+    words, symbol = (
+        machine_words(m, standing, near, leave, halving=any(t.get("halving") for t in trends)),
+        m["verdict"].symbol,
+    )
     shows = bool(standing) or near or leave is not Leave.MAY
     if (m["verdict"] is Verdict.WATCH and not standing) or (m["verdict"] is Verdict.READY and shows):
         symbol = "warning"  # a damaged log, or a ready one that shows something
