@@ -27,6 +27,7 @@ GONE = ("past", "repaired")
 _FAULTS = 2
 _PARTS = 4
 _OUTDATED = "this report was written before the repair was recorded, and still says that the fault is open: this page holds the newest state"
+_PREDATES = "this report is of a mission before the repair and tells the machine as it was then: this page holds the newest state"
 _DAMAGE, _BRIEF = "the log is damaged: ", "not judged long enough"
 
 
@@ -97,8 +98,21 @@ def lists_of(document: FleetDocument) -> tuple[Left, ...]:
         name = "" if place is None else document["missions"][place]["name"]
         lead = "– fault found in" if leave is Leave.MUST_NOT and standing[k] and name else ""
         note = _OUTDATED if m.get("outdated") and m["missions"] and place == m["missions"][-1] else ""
+        if not note and place is not None and _predates(document["missions"][place], every[k]):
+            note = _PREDATES
         out.append(Left(leave, k, m["label"], reason, place, name, lead, note))
     return tuple(out)
+
+
+def _predates(mission: MissionRow, faults: Sequence[FleetFaultRow]) -> bool:
+    """Whether a mission found a fault whose part was repaired after it: its report stays as it was written."""
+    at = mission.get("start_ns")
+    mended = {
+        (f["component"], f["side"], f["mode"])
+        for f in faults
+        if f["repaired_ns"] is not None and at is not None and at < f["repaired_ns"]
+    }
+    return any((f["component"], f["side"], f["mode"]) in mended for f in mission.get("faults", ()))
 
 
 def _is_untold(t: TrendRow, faults: Sequence[FleetFaultRow], missions: Sequence[MissionRow]) -> bool:

@@ -314,3 +314,30 @@ def test_a_loss_that_does_not_gives_leave_as_its_reports_do(tmp_path: Path, loss
 def test_a_repair_ends_the_growth(tmp_path: Path) -> None:
     one, words, _ = growing(tmp_path, [0.12, 0.27, 0.42], repaired=True)
     assert "grows" not in one.reason + words
+
+
+def test_the_course_of_a_part_that_is_silent_says_what_it_leaves_out(tmp_path: Path) -> None:
+    part = ("FR", "sensor")
+    silent = [Fault(*part, "no_signal", "high")]
+    missions = [
+        Sample(f"a/{k}", "a", day=float(k), verdict="stop" if k == 5 else "ready", faults=silent if k == 5 else (),
+               epsilon={part: samples.bounds(0.01)})
+        for k in range(6)
+    ]  # fmt: skip
+    page = build_fleet_page(fleet_json(load_fleet(samples.write_store(tmp_path / "fleet.sqlite", missions))))
+    assert "without the time that is told as no signal: not as good as it looks" in page
+
+
+def test_the_report_of_a_mission_before_the_repair_is_said_to_be_so(tmp_path: Path) -> None:
+    missions = [Sample("a", verdict="stop", faults=[Fault("FR", "sensor", "no_signal", "high")])]
+    store = samples.write_store(tmp_path / "fleet.sqlite", missions)
+    (one,) = lists_of(fleet_json(load_fleet(store)))
+    assert (one.leave, one.note) == (Leave.MUST_NOT, "")
+    with Store.open(store) as opened:
+        record_repair(opened, Repair(("HX-1", ""), "FR", "", samples.START_NS + samples.DAY_NS))
+    document = fleet_json(load_fleet(store))
+    (one,), (row,) = lists_of(document), listed_machines(document)
+    assert (one.leave, one.name) == (Leave.CHECK, "a")
+    assert one.note == row.note
+    assert one.note.startswith("this report is of a mission before the repair")
+    assert f"({one.note})" in build_fleet_page(document)
