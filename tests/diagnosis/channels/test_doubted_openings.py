@@ -50,6 +50,7 @@ def test_a_wrong_unit_condemns_no_valve(evidence: EvidenceLevel, scales: Mapping
     assert any(
         "valve openings is in doubt" in row["why"] or "unit of wheel" in row["act"] for row in verdict["to_clear"]
     )
+    assert not any("log steer.front.u (" in row["act"] for row in verdict["to_clear"])  # which is logged
     assert all(row["side"] != "actuator" or row["tier"] == "none" for row in report["coverage"])
 
 
