@@ -134,7 +134,7 @@ def _angle_sensor(has: set[str], yaw: bool, words: MachineWords, commanded: bool
         return False, "not judged: no angle is logged", ("steer.<A>.phi",)
     if "phi_true" in has:
         return True, "told at any time, against its second measurement", ()
-    more = ("steer.<A>.phi_true",) if yaw else ("steer.<A>.phi_true or imu.yaw_rate",)
+    more: tuple[str, ...] = ("steer.<A>.phi_true",) if yaw else ("steer.<A>.phi_true or imu.yaw_rate",)
     if not has & {"u", "u_applied"}:
         if not commanded:
             return False, "not judged: neither a commanded angle nor a {valve} command is logged", (_ASKED, *more)

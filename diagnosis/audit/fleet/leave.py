@@ -88,9 +88,10 @@ def lists_of(document: FleetDocument) -> tuple[Left, ...]:
         untold = [t for t in beyond[k] if _is_untold(t, every[k], document["missions"])]
         lost = any(is_lost(t["points"][-1][3], t["limit"]) for t in untold)
         leave = leave_of(m["verdict"], m["cleared"], m["unjudged"], lost=lost or bool(fast[k]))
-        place, reason = _why(leave, m, standing[k], document["missions"], rising[k])
+        otherwise = leave_of(m["verdict"], m["cleared"], m["unjudged"], lost=lost)  # but for what grows
+        place, reason = _why(otherwise, m, standing[k], document["missions"], rising[k])
         reason += _repaired(every[k], m) if leave is Leave.MAY else ""
-        reason = _with_growth(leave, m, _with_losses(leave, m, reason, untold), fast[k])
+        reason = _with_growth(otherwise, m, _with_losses(leave, m, reason, untold), fast[k])
         reason = _with_blind(reason, m)
         if leave is not Leave.MAY and any(f["open"] and f["since"] for f in standing[k]) and _ready(m, document):
             newest = document["missions"][m["missions"][-1]]["name"]
@@ -144,8 +145,8 @@ def _with_losses(leave: Leave, m: MachineRow, reason: str, untold: Sequence[Tren
     return f"{reason}; {losses}"
 
 
-def _with_growth(leave: Leave, m: MachineRow, reason: str, fast: Sequence[TrendRow]) -> str:
-    """A reason with the losses that grow towards a half: where nothing else keeps the machine in, they are the reason."""
+def _with_growth(otherwise: Leave, m: MachineRow, reason: str, fast: Sequence[TrendRow]) -> str:
+    """A reason with the losses that grow towards a half: where it might go out but for them (`otherwise`), they are the reason."""
     if not fast:
         return reason
     words = words_of(m)
@@ -158,8 +159,7 @@ def _with_growth(leave: Leave, m: MachineRow, reason: str, fast: Sequence[TrendR
             "may be lost before two more are over".replace("-", "−")
         )
     losses = "; ".join(said)
-    alone = leave is Leave.CHECK and leave_of(m["verdict"], m["cleared"], m["unjudged"]) is Leave.MAY
-    return f"{losses}: check the part; {reason}" if alone else f"{reason}; {losses}"
+    return f"{losses}: check the part; {reason}" if otherwise is Leave.MAY else f"{reason}; {losses}"
 
 
 def _ready(m: MachineRow, document: FleetDocument) -> bool:

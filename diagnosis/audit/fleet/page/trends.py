@@ -14,7 +14,7 @@ from diagnosis.audit.fleet.words import count, round_to
 from diagnosis.decision.wording import join_words
 from diagnosis.results.fault_rows import state_label
 from diagnosis.results.machine_words import words_of
-from replay.faults import FaultMode
+from replay.faults import TOTAL
 
 MOST = 48
 
@@ -63,7 +63,7 @@ def dead_words(t: TrendRow, standing: Sequence[FleetFaultRow]) -> str:
     mine = [
         f
         for f in standing
-        if f["component"] == t["component"] and t["side"] in sides_of(f["side"]) and FaultMode(f["mode"]).total
+        if f["component"] == t["component"] and t["side"] in sides_of(f["side"]) and f["mode"] in TOTAL
     ]
     if not mine:
         return ""
