@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass, replace
 
 from diagnosis.channels.liveness import alive_sources
@@ -31,7 +32,12 @@ class ComponentResult:
 
 
 def assess_components(
-    timeline: Timeline, replay: Replay, machine: Machine, wheels: tuple[str, ...], progress: Subscriber
+    timeline: Timeline,
+    replay: Replay,
+    machine: Machine,
+    wheels: tuple[str, ...],
+    progress: Subscriber,
+    logged: Collection[str] | None = None,
 ) -> ComponentResult:
     """Judge wheels and steering axles by the best evidence there is.
 
@@ -43,6 +49,8 @@ def assess_components(
         Wheels to judge; the others only help.
     progress : Subscriber
         Called at the beginning of each stage.
+    logged : Collection[str] or None
+        Signals of the log, by which its parts are named; None: those of the timeline.
     """
     chosen = tuple(w for w in machine.wheels if w in wheels)
     mission = MissionView(timeline, replay, machine, chosen, alive_sources(timeline), progress)
@@ -50,7 +58,7 @@ def assess_components(
         mission = mission.after(family.assess(mission))
     parts = [(component, side) for component in (*chosen, *machine.axles) for side in (SENSOR, ACTUATOR)]
     found = {part: mission.known.get(part) or _without_evidence(mission, *part) for part in parts}
-    words = machine_words(machine, timeline.signals)
+    words = machine_words(machine, timeline.signals if logged is None else logged)
     return ComponentResult(
         {part: worded(believed(a), words) for part, a in found.items()},
         None if mission.model is None else replace(mission.model, note=words.fill(mission.model.note)),

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from diagnosis.assess import ComponentResult, assess_components
 from diagnosis.channels.copied_rows import without_copied_rows
+from diagnosis.channels.doubted_openings import without_openings, without_valves
 from diagnosis.channels.recording_gaps import recording_gaps, without_gaps
 from diagnosis.channels.resting_position import with_zeroed_positions
 from diagnosis.channels.shared_gain import without_shared_gain
@@ -32,6 +33,7 @@ from diagnosis.report_document import Judged, report_of_mission
 from diagnosis.results.assessment import Assessment
 from diagnosis.results.closeups import closeups_of
 from diagnosis.results.document import MachineRow, ReportDocument
+from diagnosis.results.machine_event import openings_doubted
 from diagnosis.results.machine_words import machine_words
 from diagnosis.results.result import MissionResult
 from diagnosis.results.stated_sizes import known_probability, mode_columns, size_columns
@@ -45,6 +47,7 @@ from replay.faults import State
 from replay.machine.config import Machine
 from replay.mission import Mission, load_mission
 from replay.progress import Progress, Stage, Subscriber, silent
+from replay.signals.opening_doubts import OpeningDoubt, opening_doubt
 from replay.signals.signal import Signals
 from replay.signals.timeline import Timeline, align
 
@@ -158,7 +161,9 @@ def _walk(
 ) -> MissionResult:
     """Replay → assess → decide → document; long columns leave memory at every stage until they are read again."""
     shown = without_copied_rows(mission.timeline)
-    timeline = without_shared_gain(with_zeroed_positions(shown, machine), machine)
+    doubt = opening_doubt(shown, mission.signals.items, machine)
+    used = shown if doubt is None else without_openings(shown, machine)
+    timeline = without_shared_gain(with_zeroed_positions(used, machine), machine)
     mission = replace(mission, timeline=timeline)
 
     def publish(stage: Progress) -> None:
@@ -167,7 +172,10 @@ def _walk(
 
     publish(Progress(Stage.REPLAYING_LOOP))
     replay = replay_loop(timeline, machine, bucket_of(timeline.size))
-    found = _outside_gaps(assess_components(timeline, replay, machine, chosen, publish), timeline)
+    found = _outside_gaps(
+        assess_components(timeline, replay, machine, chosen, publish, mission.signals.items), timeline
+    )
+    found = found if doubt is None else _without_valves(found, doubt)
     _require_something(found.assessments, mission, machine)
     publish(Progress(Stage.DECIDING))
     judged = _without_contradicted(_without_backwards(Judged(mission, recorded, machine, replay, found)))
@@ -180,6 +188,12 @@ def _walk(
         near = known_probability(report, windows.step * timeline.dt, timeline.dt, windows.columns)
         windows = replace(windows, columns={**windows.columns, **near})
     return MissionResult(report, _columns(judged, report, shown), windows)
+
+
+def _without_valves(found: ComponentResult, doubt: OpeningDoubt) -> ComponentResult:
+    """The same with no drive judged, and with the reason as what is wrong with the whole machine."""
+    event = openings_doubted(doubt.text, doubt.act).worded(found.words)
+    return replace(found, assessments=without_valves(found.assessments, found.words), events=(*found.events, event))
 
 
 def _outside_gaps(found: ComponentResult, timeline: Timeline) -> ComponentResult:

@@ -37,6 +37,10 @@ class LogError(MfhcaError):
     exit_code = 3
 
 
+class NoLog(LogError):
+    """A table that is no machine's log: nothing of a machine is missing with it."""
+
+
 class NotJudged(LogError):
     """The log is readable, but it holds nothing from which a fault could be judged."""
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Protocol
 
-from replay.errors import LogError
+from replay.errors import LogError, NoLog
 from replay.log.raw_log import LogSummary
 from replay.signals.signal import Signals
 
@@ -60,12 +60,12 @@ def require_use(files: Sequence[ReadFile], signals: Signals) -> None:
         columns = [c for f in files for t in f.summary.topics for c in t.fields if c.strip()]
         shown = f" ({', '.join(columns[:_SHOWN])}{' …' if len(columns) > _SHOWN else ''})" if columns else ""
         if all(_is_slow(f.summary) for f in files):
-            raise LogError(
+            raise NoLog(
                 f"{', '.join(str(f.path) for f in files)}: {NO_LOG}no column{shown} is called like a signal of a machine, and rows are "
                 f"{_SLOWEST_S:g} s and more apart"
             )
         if all(0 < max((t.count for t in f.summary.topics), default=0) < _FEWEST for f in files):
-            raise LogError(
+            raise NoLog(
                 f"{', '.join(str(f.path) for f in files)}: {NO_LOG}no column{shown} is called like a signal of a machine, and there "
                 f"are fewer than {_FEWEST} rows"
             )

@@ -83,7 +83,7 @@ def _write(c: Any, k: int, s: Sample) -> None:
         folder = f"logs/{s.name}".split("/")[-2] if not judged or s.verdict == "not_assessed" else ""
         start = None if s.day is None or not judged else int(START_NS + s.day * DAY_NS)
         c.execute(
-            "INSERT INTO result VALUES (?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?)",
+            "INSERT INTO result VALUES (?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,NULL,NULL,NULL)",
             (k, f"{k:064x}", "c" * 64, "1.0", s.state, s.reason or ("" if s.state == "ok" else "It ends too early."), 1)
             + (
                 s.machine or folder,

@@ -118,15 +118,20 @@ def check(
 
 def _contradictions(signals: Signals, machine: Machine) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """What turns of the machine contradict of the places of its wheels and axles, and doubts about sizes and units."""
+    from diagnosis.results.machine_words import machine_words
     from replay.setup.body_scale import scale_doubts
     from replay.setup.places import place_doubts
+    from replay.signals.opening_doubts import opening_doubt
     from replay.signals.timeline import align
 
     wheels = {n: s for w in machine.wheels if (s := signals.items.get(n := f"wheel.{w}.v")) is not None}
     if not any(len(s.stamps) > 1 for s in wheels.values()):
         return (), ()
     line = align(signals)
-    return place_doubts(line, machine), scale_doubts(line, machine, wheels)
+    openings = opening_doubt(line, signals.items, machine)
+    words = machine_words(machine, signals.items)
+    of_openings = () if openings is None else (words.fill(f"{openings.text}; {openings.act}"),)
+    return place_doubts(line, machine), (*of_openings, *scale_doubts(line, machine, wheels))
 
 
 def show(context: typer.Context, machine: MachineFile = None, quiet: Quiet = False, verbose: Verbose = False) -> None:

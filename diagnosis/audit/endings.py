@@ -15,8 +15,9 @@ from diagnosis.audit.plan import Planned
 from diagnosis.audit.runner import absolute
 from diagnosis.audit.store.folders import holds_report, write_whole
 from diagnosis.audit.store.keys import Key
-from diagnosis.audit.store.outcome import READ, MissionState, limit_met
+from diagnosis.audit.store.outcome import READ, MissionState
 from diagnosis.audit.store.store import Store
+from diagnosis.audit.store.stored import limit_of_row
 from diagnosis.results.vocabulary import Severity, Verdict
 from replay.log.file_types import part_of
 
@@ -64,6 +65,7 @@ class Ending:
     report: str | None
     faults: int
     severity: Severity | Literal[""]
+    limit: tuple[str, float] | None = None
 
 
 def endings(store: Store, missions: Iterable[MissionSource]) -> list[Ending]:
@@ -76,7 +78,19 @@ def _endings(store: Store, wanted: Mapping[str, Sequence[str]]) -> list[Ending]:
     faults: dict[int, list[Severity]] = {}
     for row in store.database.rows("SELECT result, severity FROM fault"):
         faults.setdefault(row[0], []).append(Severity(row[1]))
-    columns = ("state", "reason", "attempts", "machine_id", "machine_name", "verdict", "title", "report")
+    columns = (
+        "state",
+        "reason",
+        "attempts",
+        "machine_id",
+        "machine_name",
+        "verdict",
+        "title",
+        "report",
+        "limit_option",
+        "limit_value",
+        "no_log",
+    )
     query = (
         f"SELECT m.name, r.id, r.log_hash, r.config_hash, r.version, {', '.join(f'r.{c}' for c in columns)} "
         "FROM mission m JOIN result r ON r.id = m.result ORDER BY m.name"
@@ -94,6 +108,7 @@ def _endings(store: Store, wanted: Mapping[str, Sequence[str]]) -> list[Ending]:
                 Ending(
                     name=row["name"],
                     state=MissionState(row["state"]),
+                    limit=limit_of_row(row),
                     reason=reason,
                     attempts=row["attempts"],
                     machine_id=row["machine_id"],
@@ -165,7 +180,7 @@ def write_failures(output: Path, planned: Sequence[Planned], ends: Sequence[Endi
 
 def again(end: Ending, one: Planned, machine: Path | None, output: Path) -> str:
     """Command line that shows how a mission ended; where it met a limit, the audit of that mission with twice as much."""
-    limit = limit_met(end.state, end.reason)
+    limit = end.limit
     if limit is None:
         return command(one, machine)
     option, value = limit

@@ -14,7 +14,7 @@ from diagnosis.audit.discovery.staging import machine_at
 from diagnosis.audit.isolation.limits import Limits
 from diagnosis.audit.store.folders import holds_report
 from diagnosis.audit.store.keys import config_hash
-from diagnosis.audit.store.outcome import TRANSIENT, limit_met
+from diagnosis.audit.store.outcome import TRANSIENT
 from diagnosis.audit.store.store import Store
 from diagnosis.audit.store.stored import StoredResult
 from diagnosis.audit.task import key_of, sizes_of
@@ -224,7 +224,7 @@ def stored_result(planned: Planned, store: Store) -> StoredResult | None:
 
 def allows_more(limits: Limits, result: StoredResult) -> bool:
     """Whether limits are larger than that at which a mission was stopped."""
-    met = limit_met(result.state, result.reason)
+    met = result.limit
     if met is None:
         return False
     now = {"--timeout": limits.wall_s, "--cpu": limits.cpu_s, "--memory": limits.memory_mb}[met[0]]

@@ -11,6 +11,7 @@ from replay.faults import Side
 from replay.machine.config import Machine
 
 _OTHERS = 2
+_ASKED = "steer.<A>.phi_ref or steer.<A>.u"
 
 
 @dataclass(frozen=True)
@@ -62,7 +63,11 @@ def forecast(logged: Collection[str], machine: Machine, words: MachineWords) -> 
             if kind is Kind.WHEEL:
                 sides = _wheel_sensor(has, speeds, words, commanded), _wheel_drive(has, speeds, words, commanded)
             else:
-                sides = _angle_sensor(has, "imu.yaw_rate" in logged, words), _steering_drive(has, words)
+                told_where = "phi_ref" in has or {"cmd.v", "cmd.omega"} <= set(logged)
+                sides = (
+                    _angle_sensor(has, "imu.yaw_rate" in logged, words, told_where),
+                    _steering_drive(has, words, told_where),
+                )
             for side, (told, text, more) in zip((Side.SENSOR, Side.ACTUATOR), sides, strict=True):
                 lacking = tuple(signal for signal in more if "<" not in signal or signal.rpartition(".")[2] not in has)
                 groups.setdefault((kind, side, told, text, lacking), []).append(name)
@@ -124,22 +129,27 @@ def _wheel_drive(has: set[str], speeds: int, words: MachineWords, commanded: boo
     )
 
 
-def _angle_sensor(has: set[str], yaw: bool, words: MachineWords) -> _Told:
+def _angle_sensor(has: set[str], yaw: bool, words: MachineWords, commanded: bool) -> _Told:
     if "phi" not in has:
         return False, "not judged: no angle is logged", ("steer.<A>.phi",)
     if "phi_true" in has:
         return True, "told at any time, against its second measurement", ()
-    more = ("steer.<A>.phi_true",) if yaw else ("steer.<A>.phi_true or imu.yaw_rate",)
+    more: tuple[str, ...] = ("steer.<A>.phi_true",) if yaw else ("steer.<A>.phi_true or imu.yaw_rate",)
     if not has & {"u", "u_applied"}:
-        return False, "not judged: no {valve} command is logged", ("steer.<A>.u", *more)
+        if not commanded:
+            return False, "not judged: neither a commanded angle nor a {valve} command is logged", (_ASKED, *more)
+        more = ("steer.<A>.u", *more)
     offset = "an offset shows by the yaw rate" if yaw else "an offset does not show"
     return False, f"shows while the axle is steered, mostly as one of sensor or {words.drive}; {offset}", more
 
 
-def _steering_drive(has: set[str], words: MachineWords) -> _Told:
+def _steering_drive(has: set[str], words: MachineWords, commanded: bool) -> _Told:
     more = ("steer.<A>.u_applied",)
+    if "u" not in has and (not commanded or "phi" not in has or "u_applied" in has):
+        asked = _ASKED if "phi" in has and "u_applied" not in has else "steer.<A>.u"
+        return False, "not judged: no {valve} command is logged", (asked, *more)
     if "u" not in has:
-        return False, "not judged: no {valve} command is logged", ("steer.<A>.u", *more)
+        return False, "shows while the axle is steered, mostly as one of sensor or {valve}", ("steer.<A>.u", *more)
     if "u_applied" in has:
         return True, "told at any time, by its opening", ()
     if "phi" not in has:

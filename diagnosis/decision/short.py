@@ -22,6 +22,7 @@ Part = tuple[str, str]
 SAID_S = 0.05  # of judged driving: less is nothing
 #: Why a part was not judged where a finding leaves it as probable that it is healthy.
 AS_WELL_HEALTHY = "what was found there may as well be no fault"
+_OPENING_UNIT = "correct the unit of {kind}.{{c}}.u and {kind}.{{c}}.u_applied under [signals] in a machine file"
 _WITH_COMMAND = "record again, with wheel.{c}.u (the {valve} command) in the log all the time"
 
 
@@ -139,9 +140,12 @@ def unjudged_axles(axles: Sequence[Part], assessments: Mapping[Part, Assessment]
     first = assessments[axles[0]]
     state = main_state(first)
     reason = main_reason(first, state)
+    lack = _lack(first, state)
     act = (
-        "log steer.<part>.phi and steer.<part>.u, and steer from stop to stop twice while driving"
-        if _lack(first, state) in (Lack.SIGNALS, Lack.COMMAND)
+        _act_of_axle(axles[0][1], state, lack).replace("{c}", _components(axles))
+        if lack is Lack.OPENING_UNIT
+        else "log steer.<part>.phi and steer.<part>.u, and steer from stop to stop twice while driving"
+        if lack in (Lack.SIGNALS, Lack.COMMAND)
         else "steer from stop to stop twice at standstill and several times while driving, with the log running"
     )
     return ToClear(f"Not judged: {who} ({reason}).", act, tuple(axles), why=reason)
@@ -239,6 +243,8 @@ def _act(
 ) -> str:
     """What somebody does to have a part judged; ``{who}`` and ``{c}`` are filled in by the parts that it holds for."""
     sensor, tier, lack = part[1] == Side.SENSOR, assessment.tier, _lack(assessment, state)
+    if lack is Lack.OPENING_UNIT:
+        return _OPENING_UNIT.format(kind="wheel")
     faster = f"faster than {limits.driving_speed:.3g} {words.speed_unit}"
     if driven is not None and driven < limits.min_assessed and tier is not Tier.NONE:
         return f"move {words.parts_moved} {faster} for at least {limits.min_assessed:g} s, and diagnose that log"
@@ -288,6 +294,8 @@ def _act_of_axle(side: str, state: State | None, lack: Lack | None) -> str:
     """What somebody does to have a part of an axle judged."""
     if state is State.MASKED:
         return "repair the steering sensor first, then record a mission again"
+    if lack is Lack.OPENING_UNIT:
+        return _OPENING_UNIT.format(kind="steer")
     if lack is Lack.SECOND:
         second = (
             "phi_true (a second angle)" if side == Side.SENSOR else "u_applied (the second measurement of its command)"

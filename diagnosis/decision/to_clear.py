@@ -11,7 +11,7 @@ from diagnosis.decision.open_checks import furthest_first
 from diagnosis.decision.short import Part, ToClear, short_parts, sides_of, unjudged_axles
 from diagnosis.decision.wording import count_words, join_words, remedy_words
 from diagnosis.results.assessed import CutKind, is_judged
-from diagnosis.results.assessment import Assessment
+from diagnosis.results.assessment import Assessment, Lack
 from diagnosis.results.clearing import Check, Checked
 from diagnosis.results.left_out import by_its_clock, is_left_out
 from diagnosis.results.machine_words import MachineWords
@@ -135,7 +135,7 @@ def to_clear(
     blamed = {k: by for k, c in enumerate(against.open) if (by := explaining(c, faults)) is not None}
     deviating = _of_faults([(against.open[k], by) for k, by in blamed.items()], faults, words)
     told = {component for component, _ in (*unjudged, *brief)}  # what has them judged lets their checks pass
-    left = [c for k, c in enumerate(against.open) if k not in blamed]
+    left = [c for k, c in enumerate(against.open) if k not in blamed and not _waits_for_unit(c, assessments)]
     deviating += _of_checks([c for c in left if c.component not in told or not _asks_for_steering(c, twice)], twice)
     ranks = {check: k for k, check in enumerate(furthest_first(against.open))}
     out += [point for _, point in sorted(deviating, key=lambda d: ranks[d[0]])]
@@ -146,6 +146,12 @@ def to_clear(
         out
         + short_parts(rested, assessments, decided_s, driven, limits, words, Kind.STEER, open_state=against.open_state)
     )
+
+
+def _waits_for_unit(check: Checked, assessments: Mapping[Part, Assessment]) -> bool:
+    """Whether a check asks for a command that is in the log, in a unit that is in doubt: with the unit it is asked again."""
+    valve = assessments.get((check.component, Side.ACTUATOR.value))
+    return check.check is Check.ANGLE_SCALE and valve is not None and Lack.OPENING_UNIT in valve.lacks.values()
 
 
 def _asks_for_steering(check: Checked, twice: Collection[str]) -> bool:

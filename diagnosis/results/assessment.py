@@ -78,6 +78,8 @@ class Lack(StrEnum):
     COMMAND = "command"
     #: A signal has a wrong unit or is a wrong channel.
     UNIT = "unit"
+    #: The mission contradicts the unit of all valves' openings, or the machine file leaves it open.
+    OPENING_UNIT = "opening_unit"
     #: The wheel seems to have no drive.
     DRIVE = "drive"
     #: Its command is known, and nothing that measures what it measures.

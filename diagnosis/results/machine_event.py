@@ -78,6 +78,12 @@ def turns_otherwise(text: str) -> MachineEvent:
     return MachineEvent("Gyro and odometry contradict each other", text, doubt, act)
 
 
+def openings_doubted(text: str, act: str) -> MachineEvent:
+    """All valves share what can only be a wrong unit of their openings; `text` and `act` without their stops."""
+    doubt = "the unit of the {valve} openings is in doubt, and no {valve} was judged"
+    return MachineEvent("The unit of the {valve} openings is in doubt", f"{text}.", doubt, f"{act}, and diagnose again")
+
+
 def foreign(text: str) -> MachineEvent:
     """Most wheels deviate now and then from a wheel model that does not fit the machine."""
     doubt = "most {wheels} deviate now and then from what the {wheel} model expects"

@@ -36,6 +36,9 @@ UNITS: dict[str, tuple[Quantity, float]] = {
     "mA": ("effort", 1e-3),
     "V": ("effort", 1.0),
 }
+#: Units of openings that `mfhca config init` writes where it cannot tell which one it is; taken as %, and no valve is judged by them.
+DOUBTED_UNITS = ("% or V", "% or mA")
+UNITS.update(dict.fromkeys(DOUBTED_UNITS, ("fraction", 0.01)))
 #: Unit in which every signal of a quantity is kept; a position on the globe stays in degrees.
 SI_UNITS: dict[Quantity, str] = {
     **{quantity: unit for unit, (quantity, factor) in reversed(UNITS.items()) if factor == 1.0},

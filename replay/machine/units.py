@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import Literal
 
 from replay.errors import ConfigError
-from replay.machine.quantities import SI_UNITS, UNITS, Quantity
+from replay.machine.quantities import DOUBTED_UNITS, SI_UNITS, UNITS, Quantity
 from replay.machine.signal_table import quantity_of
 
 #: Other spellings, as logs and people write them in English, German and French; compared without case and spaces.
@@ -117,7 +117,9 @@ def si_factor(
             raise ConfigError(f"[signals] {signal!r}: unit {unit!r} does not fit; expected deg")
         return 1.0
     if not name:
-        raise ConfigError(f"[signals] {signal!r}: unit {unit!r} is not known; expected one of {', '.join(UNITS)}")
+        raise ConfigError(
+            f"[signals] {signal!r}: unit {unit!r} is not known; expected one of {', '.join(u for u in UNITS if u not in DOUBTED_UNITS)}"
+        )
     quantity, factor = UNITS[name]
     if derivative:
         integral: dict[Quantity, Quantity] = {"length": "speed", "angle": "rotation"}
@@ -144,5 +146,5 @@ def si_factor(
                 'machine.part = "joint" where it is the speed of a joint'
             )
         return factor * wheel_radius / (gear_ratio if at == "motor" else 1.0)
-    fitting = ", ".join(u for u, (q, _) in UNITS.items() if q == wanted)
+    fitting = ", ".join(u for u, (q, _) in UNITS.items() if q == wanted and u not in DOUBTED_UNITS)
     raise ConfigError(f"[signals] {signal!r}: unit {unit!r} is a {quantity}; expected a {wanted} ({fitting})")

@@ -5,15 +5,18 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 
+import numpy as np
+
 from replay.log.raw_log import Channel
 from replay.log.source_options import SignalSource
 from replay.machine.config import Machine
+from replay.machine.quantities import DOUBTED_UNITS
 from replay.machine.signal_table import quantity_of
 from replay.setup.draft_notes import Draft
 from replay.signals.candidate import source_of
 from replay.signals.name_parts import first_indices
 from replay.signals.named_units import bare_name
-from replay.signals.signal import Signals
+from replay.signals.signal import Signal, Signals
 from replay.signals.symbol_rules import valve_current
 from replay.signals.to_si import peak_of
 
@@ -24,7 +27,8 @@ _USUAL = {
     "rotation": ("deg/s", 6.3, 400.0, "rad/s"),
 }
 _MOST_VOLTS = 10.5  # what an analogue signal of 10 V may reach
-_VOLTS = ' If they are volts, of which 10 open a valve fully, write unit = "1", gain = 0.1 in each line: taken as %, healthy valves seem to fail.'
+_LEAST_MA, _MOST_MA = 3.5, 21.0  # between which a current of 4 to 20 mA keeps
+_OVER = 1.1  # of full opening, which no command exceeds
 _TOO_FAST = 100.0  # m/s
 _SPEEDS = ("v", "v_ref", "v_true")
 
@@ -94,13 +98,29 @@ def usual_units(draft: Draft, found: Signals) -> Mapping[str, SignalSource]:
             if quantity_of(n) == quantity and not s.origin.unit and not n.endswith(".psi") and not n.startswith("odom")
         }
         peak = max((peak_of(s.values) for s in bare.values()), default=0.0)
-        if not least < peak <= most:
+        commanded = max((peak_of(s.values) for n, s in bare.items() if n.endswith(".u")), default=0.0)
+        if not (least < peak or (quantity == "fraction" and commanded > _OVER)) or peak > most:
             continue
-        out |= {n: replace(s.origin, unit=unit) for n, s in bare.items()}
         named = ", ".join(s.origin.label for s in bare.values())
-        volts = _VOLTS if quantity == "fraction" and peak <= _MOST_VOLTS else ""
-        draft.ask("signals", f"are {named} in {unit}? None is stated; in {si} they would reach {peak:.3g}.{volts}")
+        doubted, asked = _other_unit(bare, peak) if quantity == "fraction" else (None, "")
+        out |= {n: replace(s.origin, unit=doubted or unit) for n, s in bare.items()}
+        draft.ask(
+            "signals", f"are {named} in {unit}{asked or '?'} None is stated; in {si} they would reach {peak:.3g}."
+        )
     return out
+
+
+def _other_unit(bare: Mapping[str, Signal], peak: float) -> tuple[str | None, str]:
+    """Unit of openings that may be % or another one, and how the question goes on; None and nothing where they are %."""
+    answer = "; until then no valve is judged by them."
+    if peak <= _MOST_VOLTS:
+        scale = ', or in volts? Write unit = "%" in each line, or unit = "1", gain = 0.1 where 10 V open a valve fully'
+        return DOUBTED_UNITS[0], f"{scale}{answer}"
+    values = [s.values[np.isfinite(s.values)] for s in bare.values()]
+    if peak <= _MOST_MA and all(np.quantile(x, 0.01) >= _LEAST_MA for x in values if x.size):
+        scale = ', or in mA? Write unit = "%" in each line, or unit = "1", gain = 0.0625, offset = -0.25 where 4 mA close a valve and 20 mA open it fully'
+        return DOUBTED_UNITS[1], f"{scale}{answer}"
+    return None, ""
 
 
 def _millimetres(draft: Draft, found: Signals) -> Mapping[str, SignalSource]:

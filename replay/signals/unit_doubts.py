@@ -26,6 +26,7 @@ from replay.signals.to_si import factor_of, magnitudes, peak_of
 
 _TOO_FAST = 3.0
 _WIDE = 1.5
+_MOST_VOLTS = 10.5  # what an analogue signal of 10 V may reach
 _MOST_OF_IT = 0.2  # of the samples other than zero lie beyond the limit: no spikes
 _ANY_MACHINE = 30.0  # m/s; faster than any machine whose top speed was not given
 _SOUND = 2  # other signals of the kind, recorded in the same unit, that are plausible: then it is a fault of this one
@@ -160,11 +161,13 @@ def _fitting_speed(signal: str, peak: float, origin: SignalSource, machine: Mach
 def _too_open(signal: str, values: NDArray[np.float64], peak: float, origin: SignalSource, machine: Machine) -> Doubt:
     unit = origin.unit or SI_UNITS["fraction"]
     percent = _WIDE < peak <= 150
-    text = f"{signal} reaches {peak:.3g} of full opening with unit {unit!r}{'; it is probably %' if percent else ''}"
+    volts = percent and peak <= _MOST_VOLTS  # nothing tells them from %
+    probably = "; it is in % or in volts" if volts else "; it is probably %" if percent else ""
+    text = f"{signal} reaches {peak:.3g} of full opening with unit {unit!r}{probably}"
     tried = replace(origin, unit="%") if percent else replace(origin, gain=float(f"{origin.gain / peak:.3g}"))
-    return Doubt(
-        signal, f"{text}; check its unit", signal_line(signal, tried), _mostly_beyond(values, machine.control.u_max)
-    )
+    other = f", or where 10 V open it fully {signal_line(signal, replace(origin, unit='1', gain=0.1))}" if volts else ""
+    line = f"{signal_line(signal, tried)}{other}"
+    return Doubt(signal, f"{text}; check its unit", line, _mostly_beyond(values, machine.control.u_max))
 
 
 def _too_far(signal: str, values: NDArray[np.float64], peak: float, origin: SignalSource, machine: Machine) -> Doubt:

@@ -24,7 +24,7 @@ from diagnosis.audit.fleet.news import news, since_runs
 from diagnosis.audit.fleet.read import Mission
 from diagnosis.audit.fleet.runs import sides_of
 from diagnosis.audit.fleet.trend_types import Axis
-from diagnosis.audit.fleet.trends import PartTrend, trends_of, untold_losses
+from diagnosis.audit.fleet.trends import PartTrend, fast_losses, trends_of, untold_losses
 from diagnosis.audit.store.outcome import ENDS, READ
 from diagnosis.results.candidates import UNCLEAR
 from diagnosis.results.vocabulary import Verdict
@@ -75,7 +75,7 @@ def fleet_of(
         m, trends = pair
         soon = min((t.trend.forecast.likely or 0.0 for t in trends if t.approaching), default=np.inf)
         worst = max((f.severity.rank for f in m.faults if f.standing), default=-1)
-        return -m.verdict.rank, -worst, not untold_losses(m, trends), soon, -m.with_faults, m.label
+        return -m.verdict.rank, -worst, not _lost(m, trends), soon, -m.with_faults, m.label
 
     found.sort(key=rank)
     place = {(m.id, "" if m.id else m.name): k for k, (m, _) in enumerate(found)}
@@ -91,6 +91,11 @@ def fleet_of(
     return Fleet(tuple(m for m, _ in found), tuple(t for _, t in found), ordered, axis, tuple(unknown))
 
 
+def _lost(m: Machine, trends: Sequence[PartTrend]) -> bool:
+    """Whether a loss gives a machine no leave whatever its reports say: beyond its limit unsaid, or growing towards a half."""
+    return bool(untold_losses(m, trends) or fast_losses(m, trends))
+
+
 def fleet_document(fleet: Fleet, baseline: BaselineRow | None = None) -> FleetDocument:
     """The document of a fleet; the same fleet gives the same document."""
     owner = {r.result.id: k for k, m in enumerate(fleet.machines) for r in m.runs}
@@ -101,7 +106,8 @@ def fleet_document(fleet: Fleet, baseline: BaselineRow | None = None) -> FleetDo
             first.setdefault(mission.result.id, mission.name)
     results = {m.name: m.result.id if m.result is not None else -1 for m in fleet.missions}
     at = {mission.name: k for k, mission in enumerate(fleet.missions)}
-    lost = [bool(untold_losses(m, own)) for m, own in zip(fleet.machines, fleet.trends, strict=True)]
+    fast = [fast_losses(m, own) for m, own in zip(fleet.machines, fleet.trends, strict=True)]
+    lost = [_lost(m, own) for m, own in zip(fleet.machines, fleet.trends, strict=True)]
     status, tag, title = words.headline(fleet.machines, len(fleet.unknown), lost)
     counts = _counts(fleet, first)
     unread = sum(m.result is not None and m.result.state not in READ for m in fleet.missions)
@@ -131,7 +137,11 @@ def fleet_document(fleet: Fleet, baseline: BaselineRow | None = None) -> FleetDo
             for k, m in enumerate(fleet.machines)
             for f, first_run in zip(m.faults, since_runs(m, fleet.first_runs), strict=True)
         ],
-        "trends": [trend_row(k, t, at, fleet.axis) for k, own in enumerate(fleet.trends) for t in own],
+        "trends": [
+            trend_row(k, t, at, fleet.axis, halving=(t.component, t.side) in fast[k])
+            for k, own in enumerate(fleet.trends)
+            for t in own
+        ],
         "missions": [
             mission_row(
                 m,

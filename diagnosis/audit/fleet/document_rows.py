@@ -21,8 +21,8 @@ from diagnosis.results.vocabulary import Severity
 _POWERS = np.array([float(f"1e{k}") for k in range(17)])  # each of them exact
 
 
-def trend_row(k: int, t: PartTrend, at: Mapping[str, int], axis: Axis) -> TrendRow:
-    """One trend of the machine at place `k`; `at` holds each mission's place."""
+def trend_row(k: int, t: PartTrend, at: Mapping[str, int], axis: Axis, *, halving: bool = False) -> TrendRow:
+    """One trend of the machine at place `k`; `at` holds each mission's place, `halving` whether half may be lost soon."""
     s, f = t.series, t.trend.forecast
     columns = six_digits_of(np.concatenate((s.x, s.value, s.low, s.high))).reshape(4, -1).tolist()
     return {
@@ -38,6 +38,7 @@ def trend_row(k: int, t: PartTrend, at: Mapping[str, int], axis: Axis) -> TrendR
         "first": t.trend.first,
         "direction": t.trend.direction,
         "approaching": t.approaching,
+        "halving": halving,
         "line": _line(t.trend.line, s.now),
         "forecast": {
             "state": f.state,

@@ -27,6 +27,7 @@ GONE = ("past", "repaired")
 _FAULTS = 2
 _PARTS = 4
 _OUTDATED = "this report was written before the repair was recorded, and still says that the fault is open: this page holds the newest state"
+_PREDATES = "this report is of a mission before the repair and tells the machine as it was then: this page holds the newest state"
 _DAMAGE, _BRIEF = "the log is damaged: ", "not judged long enough"
 
 
@@ -71,6 +72,7 @@ def lists_of(document: FleetDocument) -> tuple[Left, ...]:
     every: dict[int, list[FleetFaultRow]] = defaultdict(list)
     rising: dict[int, set[tuple[str, str]]] = defaultdict(set)
     beyond: dict[int, list[TrendRow]] = defaultdict(list)
+    fast: dict[int, list[TrendRow]] = defaultdict(list)
     for f in document["faults"]:
         every[f["machine"]].append(f)
         if f["status"] not in GONE:
@@ -80,21 +82,38 @@ def lists_of(document: FleetDocument) -> tuple[Left, ...]:
             rising[t["machine"]].add((t["component"], t["side"]))
         if t["points"][-1][2] >= t["limit"]:
             beyond[t["machine"]].append(t)
+        if t.get("halving"):
+            fast[t["machine"]].append(t)
     for k, m in enumerate(document["machines"]):
         untold = [t for t in beyond[k] if _is_untold(t, every[k], document["missions"])]
         lost = any(is_lost(t["points"][-1][3], t["limit"]) for t in untold)
-        leave = leave_of(m["verdict"], m["cleared"], m["unjudged"], lost=lost)
-        place, reason = _why(leave, m, standing[k], document["missions"], rising[k])
+        leave = leave_of(m["verdict"], m["cleared"], m["unjudged"], lost=lost or bool(fast[k]))
+        otherwise = leave_of(m["verdict"], m["cleared"], m["unjudged"], lost=lost)  # but for what grows
+        place, reason = _why(otherwise, m, standing[k], document["missions"], rising[k])
         reason += _repaired(every[k], m) if leave is Leave.MAY else ""
-        reason = _with_blind(_with_losses(leave, m, reason, untold), m)
+        reason = _with_growth(otherwise, m, _with_losses(leave, m, reason, untold), fast[k])
+        reason = _with_blind(reason, m)
         if leave is not Leave.MAY and any(f["open"] and f["since"] for f in standing[k]) and _ready(m, document):
             newest = document["missions"][m["missions"][-1]]["name"]
             reason += f"; its newest report ({newest}) finds no fault, but judges its own mission alone"
         name = "" if place is None else document["missions"][place]["name"]
         lead = "– fault found in" if leave is Leave.MUST_NOT and standing[k] and name else ""
         note = _OUTDATED if m.get("outdated") and m["missions"] and place == m["missions"][-1] else ""
+        if not note and place is not None and _predates(document["missions"][place], every[k]):
+            note = _PREDATES
         out.append(Left(leave, k, m["label"], reason, place, name, lead, note))
     return tuple(out)
+
+
+def _predates(mission: MissionRow, faults: Sequence[FleetFaultRow]) -> bool:
+    """Whether a mission found a fault whose part was repaired after it: its report stays as it was written."""
+    at = mission.get("start_ns")
+    mended = {
+        (f["component"], f["side"], f["mode"])
+        for f in faults
+        if f["repaired_ns"] is not None and at is not None and at < f["repaired_ns"]
+    }
+    return any((f["component"], f["side"], f["mode"]) in mended for f in mission.get("faults", ()))
 
 
 def _is_untold(t: TrendRow, faults: Sequence[FleetFaultRow], missions: Sequence[MissionRow]) -> bool:
@@ -124,6 +143,23 @@ def _with_losses(leave: Leave, m: MachineRow, reason: str, untold: Sequence[Tren
     if leave is Leave.CHECK and m["verdict"] in (Verdict.READY, Verdict.WATCH) and not m["unjudged"] and m["cleared"]:
         return f"{losses}, though no fault was stated in it: check the part"
     return f"{reason}; {losses}"
+
+
+def _with_growth(otherwise: Leave, m: MachineRow, reason: str, fast: Sequence[TrendRow]) -> str:
+    """A reason with the losses that grow towards a half: where it might go out but for them (`otherwise`), they are the reason."""
+    if not fast:
+        return reason
+    words = words_of(m)
+    said = []
+    for t in sorted(fast, key=lambda t: -t["points"][-1][2])[:_FAULTS]:
+        before, now = t["points"][-2][2], t["points"][-1][2]
+        part = words.part_words(t["kind"], t["component"], t["side"])
+        said.append(
+            f"{part} lost {100 * now:.0f} % over its last mission ({100 * before:.0f} % over the one before), and grows so fast that half "
+            "may be lost before two more are over".replace("-", "−")
+        )
+    losses = "; ".join(said)
+    return f"{losses}: check the part; {reason}" if otherwise is Leave.MAY else f"{reason}; {losses}"
 
 
 def _ready(m: MachineRow, document: FleetDocument) -> bool:

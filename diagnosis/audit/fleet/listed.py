@@ -9,8 +9,9 @@ from dataclasses import dataclass
 from diagnosis.audit.fleet.fault_types import FleetFaultRow
 from diagnosis.audit.fleet.fleet_types import FleetDocument, MachineRow
 from diagnosis.audit.fleet.leave import GONE, lists_of
+from diagnosis.audit.fleet.may_leave import leave_of
 from diagnosis.audit.fleet.page.rows import fault_words
-from diagnosis.audit.fleet.words import open_words
+from diagnosis.audit.fleet.words import FAST_GROWTH, open_words
 from diagnosis.results.machine_words import words_of
 from diagnosis.results.vocabulary import Leave, Verdict
 
@@ -53,7 +54,14 @@ class ListedMachine:
     note: str = ""
 
 
-def machine_words(m: MachineRow, standing: Sequence[FleetFaultRow], approaching: bool, leave: Leave = Leave.MAY) -> str:
+def machine_words(
+    m: MachineRow,
+    standing: Sequence[FleetFaultRow],
+    approaching: bool,
+    leave: Leave = Leave.MAY,
+    *,
+    halving: bool = False,
+) -> str:
     """Where a machine stands, with what a ready one still shows.
 
     Parameters
@@ -66,9 +74,13 @@ def machine_words(m: MachineRow, standing: Sequence[FleetFaultRow], approaching:
         Whether a trend of its comes near its limit.
     leave : Leave
         Whether it may go out: a machine may be ready by its last report, and yet have lost too much.
+    halving : bool
+        Whether a loss of its grows so fast that half may be lost soon.
     """
     if m["verdict"] == Verdict.READY and leave is not Leave.MAY:
-        return "Ready by its last report, but a loss is beyond its limit"
+        return f"Ready by its last report, but a loss {'grows fast' if halving else 'is beyond its limit'}"
+    if halving and m["verdict"] == Verdict.WATCH and leave_of(m["verdict"], m["cleared"], m["unjudged"]) is Leave.MAY:
+        return FAST_GROWTH
     if m["verdict"] == Verdict.READY and standing:
         often = any(f["status"] == "recurring" for f in standing)
         return f"Ready, fault {'comes and goes' if often else 'seen lately'}"
@@ -85,6 +97,7 @@ def _with_note(words: str, m: MachineRow) -> str:
 def listed_machines(document: FleetDocument) -> tuple[ListedMachine, ...]:
     """Machines of a fleet's document in its order, worst first."""
     near = {t["machine"] for t in document["trends"] if t["approaching"]}
+    fast = {t["machine"] for t in document["trends"] if t.get("halving")}
     out, lists = [], lists_of(document)
     copies: dict[int | None, list[tuple[str, str]]] = defaultdict(list)
     for x in document["missions"]:
@@ -96,7 +109,7 @@ def listed_machines(document: FleetDocument) -> tuple[ListedMachine, ...]:
             ListedMachine(
                 m["label"],
                 Verdict(m["verdict"]),
-                _with_note(machine_words(m, standing, k in near, lists[k].leave), m),
+                _with_note(machine_words(m, standing, k in near, lists[k].leave, halving=k in fast), m),
                 tuple(fault_words(f, words_of(m)) + open_words(f["open"], f["clean"], f["needed"]) for f in standing),
                 m["with_faults"],
                 len(m["missions"]) + len(m["undated"]),

@@ -59,7 +59,8 @@ class FoundFault:
 class Result:
     """What became of one log; see the table ``result``.
 
-    `left_out`: the log lacks nothing but whole files that were left out. `start_ns` is None where the log's clock does not know the date. `order` is its place in the store.
+    `left_out`: the log lacks nothing but whole files that were left out. `no_log`: it is a table that is no machine's
+    log, so that nothing of a machine is missing with it. `start_ns` is None where the log's clock does not know the date. `order` is its place in the store.
     """
 
     id: int
@@ -76,17 +77,13 @@ class Result:
     distance_m: float | None
     open_loop: bool
     left_out: bool
+    no_log: bool
     report: str | None
     version: str
     log_hash: str
     config_hash: str
     faults: tuple[FoundFault, ...]
     parts: Parts
-
-    @property
-    def no_log(self) -> bool:
-        """Whether it is a table that is no machine's log, so that nothing of a machine is missing with it."""
-        return self.state is MissionState.UNREADABLE and f": {NO_LOG}" in self.reason
 
     @property
     def judged(self) -> bool:
@@ -107,7 +104,7 @@ class Mission:
 
 _COLUMNS = (
     "id", "state", "reason", "attempts", "machine_id", "machine_name", "verdict", "title", "start_ns", "duration_s", "driving_s",
-    "distance_m", "open_loop", "left_out", "report", "version", "log_hash", "config_hash",
+    "distance_m", "open_loop", "left_out", "no_log", "report", "version", "log_hash", "config_hash",
 )  # fmt: skip
 _RESULTS = "SELECT {} FROM result WHERE id IN (SELECT result FROM mission) ORDER BY id"
 _FAULTS = (
@@ -157,8 +154,9 @@ def read_missions(store: Path) -> list[Mission]:
             )
             faults[r].append(found)
         parts = read_parts(db)
-        known = db.has_column("result", "left_out")  # a store that is only read may be of an earlier version
-        columns = ", ".join("0" if name == "left_out" and not known else name for name in _COLUMNS)
+        later = {"left_out": "0", "no_log": "NULL"}  # a store that is only read may be of an earlier version
+        lacking = {name: value for name, value in later.items() if not db.has_column("result", name)}
+        columns = ", ".join(lacking.get(name, name) for name in _COLUMNS)
         results = {
             row[0]: _result(row, tuple(faults.get(row[0], ())), parts.get(row[0], NO_PARTS))
             for row in db.rows(_RESULTS.format(columns))
@@ -256,6 +254,9 @@ def _result(row: sqlite3.Row, faults: tuple[FoundFault, ...], parts: Parts) -> R
     values["state"] = _STATES[values["state"]]
     values["verdict"] = _VERDICTS[values["verdict"]]
     values["open_loop"], values["left_out"] = bool(values["open_loop"]), bool(values["left_out"])
+    if values["no_log"] is None:  # an earlier version says it in the reason alone
+        values["no_log"] = values["state"] is MissionState.UNREADABLE and f": {NO_LOG}" in values["reason"]
+    values["no_log"] = bool(values["no_log"])
     return Result(**values, faults=faults, parts=parts)
 
 

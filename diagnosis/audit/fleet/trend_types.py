@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Literal, TypedDict
+from typing import Literal, NotRequired, TypedDict
 
 from diagnosis.audit.fleet.fault_types import BoundsRow
 from diagnosis.audit.trends.kinds import ChangeKind, Direction, ForecastState
@@ -65,6 +65,8 @@ class TrendRow(TypedDict):
         Where the last stretch goes.
     approaching : bool
         Whether it rises for certain and likely reaches the limit within as long as the stretch has lasted.
+    halving : bool
+        Whether it grows so fast that half may be lost before two more missions are over, and the part was not repaired since.
     line : LineRow or None
         Line of the last stretch.
     forecast : ForecastRow
@@ -83,5 +85,6 @@ class TrendRow(TypedDict):
     first: int
     direction: Direction
     approaching: bool
+    halving: NotRequired[bool]  # documents of older versions have none
     line: LineRow | None
     forecast: ForecastRow

@@ -12,10 +12,13 @@ from diagnosis.audit.fleet.machines import Machine
 from diagnosis.audit.fleet.may_leave import is_lost
 from diagnosis.audit.fleet.runs import Run, sides_of
 from diagnosis.audit.fleet.trend_types import Axis
-from diagnosis.audit.trends.trend import REACH, Forecast, Series, Trend, trend_of
+from diagnosis.audit.trends.trend import CONFIDENCE, REACH, Forecast, Series, Trend, trend_of
+from diagnosis.decision.severity import HALF
 
 _DAY_NS = 86_400 * 10**9
 _NONE = np.empty(0, np.intp)
+_GROWTH = 3  # missions that show growth where no line is known yet
+_AHEAD = 2.0  # missions
 _FIRST = 2  # missions whose mean is where a relative loss begins
 
 
@@ -36,6 +39,25 @@ class PartTrend:
         """Whether it rises for certain and likely reaches the limit within as long as the stretch has lasted."""
         f = self.trend.forecast
         return self.trend.direction == "rising" and f.likely is not None and f.likely <= f.horizon / REACH
+
+    @property
+    def halving(self) -> bool:
+        """Whether it grows so fast that half may be lost (ε ≥ `HALF`) before two more missions like the last ones are over.
+
+        By the line of its last stretch where that rises for certain, by its 90 % bound; else by the last three missions, of which
+        each lost more than the one before beyond its bounds.
+        """
+        x = self.series.x[self.trend.first :]
+        value, low, high = (c[self.trend.first :] for c in (self.series.value, self.series.low, self.series.high))
+        if len(x) < _GROWTH:
+            return False
+        line = self.trend.line
+        if line is not None and self.trend.direction == "rising":
+            ahead = _AHEAD * float(np.median(np.diff(x)))
+            return line.crossing(HALF, self.series.now, CONFIDENCE)[0] <= self.series.now + ahead
+        steps = np.diff(value[-_GROWTH:])
+        grows = bool((low[1 - _GROWTH :] > high[-_GROWTH:-1]).all()) and float(steps.min()) > 0.0
+        return grows and float(value[-1]) + _AHEAD * float(steps.mean()) >= HALF
 
 
 def trends_of(machine: Machine, axis: Axis = "hours") -> list[PartTrend]:
@@ -76,6 +98,18 @@ def trends_of(machine: Machine, axis: Axis = "hours") -> list[PartTrend]:
     return out
 
 
+def fast_losses(machine: Machine, trends: Sequence[PartTrend]) -> tuple[tuple[str, str], ...]:
+    """Components and sides that may have lost half before two more missions are over, by how the loss grows, and were not repaired since."""
+    return tuple((t.component, t.side) for t in trends if t.halving and not _repaired_since(machine, t))
+
+
+def _repaired_since(machine: Machine, t: PartTrend) -> bool:
+    """Whether the part of a trend was repaired after the trend's last mission."""
+    at = t.runs[-1].result.start_ns
+    mine = [f for f in machine.faults if f.component == t.component and t.side in sides_of(f.side)]
+    return any(f.repaired_ns is not None and at is not None and at < f.repaired_ns for f in mine)
+
+
 def untold_losses(machine: Machine, trends: Sequence[PartTrend]) -> tuple[tuple[str, str], ...]:
     """Components and sides whose loss in the last mission is beyond the limit for certain, without a fault that stands or a repair since."""
     out = []
@@ -83,9 +117,7 @@ def untold_losses(machine: Machine, trends: Sequence[PartTrend]) -> tuple[tuple[
         if not is_lost(float(t.series.low[-1]), t.limit):
             continue
         mine = [f for f in machine.faults if f.component == t.component and t.side in sides_of(f.side)]
-        at = t.runs[-1].result.start_ns
-        repaired = any(f.repaired_ns is not None and at is not None and at < f.repaired_ns for f in mine)
-        if not repaired and not any(f.standing for f in mine):
+        if not _repaired_since(machine, t) and not any(f.standing for f in mine):
             out.append((t.component, t.side))
     return tuple(out)
 

@@ -7,8 +7,9 @@ from collections.abc import Sequence
 
 from diagnosis.audit.fleet.machines import FleetFault, Machine
 from diagnosis.audit.fleet.may_leave import leave_of
+from diagnosis.audit.fleet.repair_words import since_repair
 from diagnosis.audit.fleet.trend_types import Axis
-from diagnosis.audit.fleet.trends import PartTrend
+from diagnosis.audit.fleet.trends import PartTrend, fast_losses
 from diagnosis.audit.trends.trend import Forecast
 from diagnosis.decision.wording import join_words
 from diagnosis.pages.labels import utc, utc_moment
@@ -18,6 +19,8 @@ from diagnosis.results.machine_words import MachineWords
 from diagnosis.results.vocabulary import Leave, Verdict
 from replay.faults import Side
 
+#: Where a machine with faults to watch stands while a loss of its grows towards a half.
+FAST_GROWTH = "Faults to watch, and a loss that grows fast"
 _SHOWN = 3
 _NAMED = 12
 _WORK = (Verdict.STOP, Verdict.WATCH)  # verdicts that ask for work
@@ -84,7 +87,7 @@ def standing(m: Machine) -> str:
     if m.verdict is Verdict.READY:
         return words
     if m.waiting_ns is not None:
-        return _since_repair(m, m.waiting_ns)
+        return since_repair(m, m.waiting_ns)
     if m.verdict is Verdict.NOT_ASSESSED:
         if m.last_verdict is Verdict.NOT_ASSESSED:
             return words
@@ -105,36 +108,10 @@ def standing(m: Machine) -> str:
     return words + (", and what may be later was not judged" if m.unjudged else "")
 
 
-def _since_repair(m: Machine, repaired_ns: int) -> str:
-    """What is known of a machine since its repairs, where no mission after the last one was judged as a whole."""
-    day = utc_moment(repaired_ns)
-    repaired = [f for f in m.faults if f.status == "repaired" and f.repaired_ns is not None]
-    told = [(f, _judged_since(m, f)) for f in repaired]
-    waiting = [f for f, seen in told if not seen]
-    if len(waiting) == len(repaired):
-        return f"{Verdict.NOT_ASSESSED.short} since the repair on {day}"
-    days: dict[str, list[tuple[FleetFault, int]]] = {}
-    for f, seen in told:
-        if seen:
-            days.setdefault(utc_moment(f.repaired_ns or 0), []).append((f, seen))
-    shown = "; ".join(
-        f"{_parts(m, [f for f, _ in fs])} not found by {count(min(n for _, n in fs), 'mission')} since the repair on {d}"
-        for d, fs in days.items()
-    )
-    if not waiting:
-        return f"{shown}, other parts not judged"
-    since = max(f.repaired_ns or 0 for f in waiting)
-    return f"{shown}; {_parts(m, waiting)} not judged since the repair on {utc_moment(since)}"
-
-
-def _judged_since(m: Machine, f: FleetFault) -> int:
-    """Missions that began after the repair of a part and assessed it."""
-    after = [r for r in m.dated if (r.result.start_ns or 0) >= (f.repaired_ns or 0)]
-    return sum(r.assessed(f.component, f.side, m.limits) for r in after)
-
-
-def _parts(m: Machine, faults: Sequence[FleetFault]) -> str:
-    return join_words(list(dict.fromkeys(m.limits.words.part_words(f.kind, f.component, f.side) for f in faults)))
+def _standing_now(m: Machine, trends: Sequence[PartTrend]) -> str:
+    """Where a machine stands, which is not *ready* while a loss grows towards a half."""
+    ready = m.verdict is Verdict.WATCH and leave_of(m.verdict, m.cleared, m.unjudged) is Leave.MAY
+    return FAST_GROWTH if ready and fast_losses(m, trends) else standing(m)
 
 
 def _is_open(m: Machine) -> bool:
@@ -244,7 +221,7 @@ def sentences(
     for m in bad[:_SHOWN]:
         faults = [_found(m, f) for f in m.faults if f.standing][:2]
         note = f" ({m.note})" if m.note else ""
-        words = standing(m)
+        words = _standing_now(m, trends[machines.index(m)])
         what = f": {join_words(faults)}" if faults else ""
         out.append(f"{m.label} – {_small(words)}{what}{note}.")
     near = [(m, t) for m, own in zip(machines, trends, strict=True) for t in own if t.approaching]

@@ -25,7 +25,7 @@ from diagnosis.audit.store.summary import MissionSummary, ResultFacts, summarise
 from diagnosis.results.json_text import dump_json
 from diagnosis.results.vocabulary import Verdict
 from replay.arrays.processors import use_one
-from replay.errors import ConfigError, LogError, NotJudged, OutputError
+from replay.errors import ConfigError, LogError, NoLog, NotJudged, OutputError
 from replay.log.left_out import FileLeftOut
 from replay.machine.config import Machine
 from replay.readers.common.room import FULL
@@ -57,6 +57,7 @@ class ChildOutcome(TypedDict):
     summary: MissionSummary | None
     passing: NotRequired[bool]
     killed: NotRequired[bool]
+    no_log: NotRequired[bool]
 
 
 @dataclass(frozen=True)
@@ -178,7 +179,8 @@ def attempt(work: Work) -> ChildOutcome:
         return {"state": NOT_KEPT, "reason": _system_reason(error), "summary": None}
     except (LogError, ConfigError) as error:
         number = error.__cause__.errno if isinstance(error.__cause__, OSError) else None
-        return _unread(number, str(error))
+        found = _unread(number, str(error))
+        return {**found, "no_log": isinstance(error, NoLog)}
     except MemoryError as error:
         return {"state": MissionState.OUT_OF_MEMORY, "reason": _where(error), "summary": None}
     except OSError as error:

@@ -74,6 +74,7 @@ def run_isolated(work: Work, limits: Limits, isolation: Isolation, spent_s: floa
         summary=found["summary"],
         passing=found.get("passing", False),
         killed=found.get("killed", False),
+        no_log=found.get("no_log", False),
     )
 
 

@@ -11,7 +11,7 @@ from diagnosis.audit.isolation import child
 from diagnosis.audit.isolation.child import Work
 from diagnosis.audit.isolation.fork_server import Ended
 from diagnosis.audit.isolation.limits import Limits
-from diagnosis.audit.store.outcome import MissionState
+from diagnosis.audit.store.outcome import LimitMet, MissionState
 
 NO_ANSWER = "the process that starts missions does not answer"
 _NO_MEMORY = re.compile(r"bad_alloc|MemoryError|out of memory|cannot allocate memory|LLVM ERROR", re.IGNORECASE)
@@ -64,7 +64,8 @@ def _why(ended: Ended, messages: str, limits: Limits, *, no_memory: bool) -> tup
         return MissionState.CRASHED, f"its process ended with code {ended.code} and left no result{_place(messages)}"
     name = signal_name(-ended.code)
     if limits.cpu_s is not None and (name == "SIGXCPU" or (name == "SIGKILL" and over_cpu)):
-        return MissionState.TIMEOUT, f"took more than {limits.cpu_s:g} s of a processor; allow more with --cpu"
+        text = f"took more than {limits.cpu_s:g} s of a processor; allow more with --cpu"
+        return MissionState.TIMEOUT, LimitMet(text, "--cpu", limits.cpu_s)
     if name == "SIGKILL":
         return (
             (MissionState.OUT_OF_MEMORY, _NO_MEMORY_LEFT) if no_memory else (MissionState.UNREADABLE, _from_outside(9))
@@ -87,14 +88,15 @@ def _from_outside(number: int) -> str:
 
 def over_time(limits: Limits) -> str:
     """Reason of a mission that took longer than it may."""
-    return f"took longer than {limits.wall_s:g} s; allow more with --timeout"
+    return LimitMet(f"took longer than {limits.wall_s:g} s; allow more with --timeout", "--timeout", limits.wall_s)
 
 
 def over_memory(limits: Limits, place: str = "") -> str:
     """Reason of a mission that needed more memory than it may, and where."""
-    return (
+    text = (
         f"needed more than {limits.memory_mb:.0f} MB of memory{f' {place}' if place else ''}; allow more with --memory"
     )
+    return LimitMet(text, "--memory", limits.memory_mb)
 
 
 def signal_name(number: int) -> str:

@@ -25,6 +25,9 @@ _LATER = ("repair",)
 _LATER_COLUMNS = (
     ("fault", "unclear", "INTEGER NOT NULL DEFAULT 0"),
     ("result", "left_out", "INTEGER NOT NULL DEFAULT 0"),
+    ("result", "limit_option", "TEXT"),
+    ("result", "limit_value", "REAL"),
+    ("result", "no_log", "INTEGER"),
 )
 _FULL = ("database or disk is full", "disk I/O error", "unable to open database file")
 

@@ -61,8 +61,21 @@ _LIMITS = (
 )
 
 
-def limit_met(state: str, reason: str) -> tuple[str, float] | None:
-    """Option and value of the limit at which a mission was stopped, as its reason says; None where it was at none."""
+class LimitMet(str):
+    """A reason that says at which limit a mission was stopped: option of the command line, and its value there."""
+
+    option: str
+    value: float
+
+    def __new__(cls, text: str, option: str, value: float) -> LimitMet:
+        """The sentence with option and value."""
+        made = super().__new__(cls, text)
+        made.option, made.value = option, value
+        return made
+
+
+def limit_in_words(state: str, reason: str) -> tuple[str, float] | None:
+    """Option and value of the limit at which a mission was stopped, of a result that an earlier version wrote, which holds them in its reason alone."""
     for of, option, pattern in _LIMITS:
         found = pattern.match(reason) if state == of else None
         if found:
@@ -93,6 +106,10 @@ class Outcome:
     killed : bool
         Whether something outside of the mission ended it: an operator, or the system for want of memory or of room for
         temporary files. It is tried once more in any case, and always again by the next audit.
+    limit : tuple[str, float] or None
+        Option and value of the limit at which it was stopped: that of a reason that is a `LimitMet`; None where it was at none.
+    no_log : bool
+        Whether it is a table that is no machine's log.
     """
 
     state: MissionState
@@ -103,8 +120,12 @@ class Outcome:
     summary: MissionSummary | None = None
     passing: bool = False
     killed: bool = False
+    limit: tuple[str, float] | None = None
+    no_log: bool = False
 
     def __post_init__(self) -> None:
+        if isinstance(self.reason, LimitMet):
+            object.__setattr__(self, "limit", (self.reason.option, self.reason.value))
         if self.state not in ENDS:
             raise ValueError(f"state {self.state!r}: expected one of {', '.join(ENDS)}")
         if (self.state == MissionState.OK) != (not self.reason):

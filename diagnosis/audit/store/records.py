@@ -15,7 +15,8 @@ _KEY = ("log_hash", "config_hash", "version")
 _FROM_REPORT = (
     "machine_name", "verdict", "title", "start_ns", "duration_s", "driving_s", "decided_s", "distance_m", "open_loop", "left_out",
 )  # fmt: skip
-_RESULT = (*_KEY, "state", "reason", "attempts", "machine_id", *_FROM_REPORT, "report")
+_ENDED = ("limit_option", "limit_value", "no_log")
+_RESULT = (*_KEY, "state", "reason", "attempts", "machine_id", *_FROM_REPORT, "report", *_ENDED)
 _ATTEMPT = ("number", "state", "reason", "wall_s", "cpu_s", "peak_mb")
 _FAULT = (
     "id", "component", "kind", "side", "mode", "severity", "start_s", "stop_s", "start_ns",
@@ -62,6 +63,9 @@ class AttemptRecord(TypedDict):
     wall_s: float
     cpu_s: float
     peak_mb: float
+    limit_option: NotRequired[str | None]  # objects of older versions have none of these
+    limit_value: NotRequired[float | None]
+    no_log: NotRequired[bool]
 
 
 class ResultObject(TypedDict):
@@ -86,6 +90,9 @@ def attempt_record(outcome: Outcome, number: int = 0) -> AttemptRecord:
         "wall_s": outcome.wall_s,
         "cpu_s": outcome.cpu_s,
         "peak_mb": outcome.peak_mb,
+        "limit_option": None if outcome.limit is None else outcome.limit[0],
+        "limit_value": None if outcome.limit is None else outcome.limit[1],
+        "no_log": outcome.no_log,
     }
 
 
@@ -143,6 +150,9 @@ def _write_result(
         "attempts": 1,
         "machine_id": facts.get("machine_id") or document.get("machine_id", ""),
         "report": document.get("report"),
+        "limit_option": attempt.get("limit_option"),
+        "limit_value": attempt.get("limit_value"),
+        "no_log": None if "no_log" not in attempt else int(attempt["no_log"]),
     }
     if identity is None:
         identity = connection.execute(

@@ -41,6 +41,9 @@ CREATE TABLE result (
     open_loop INTEGER NOT NULL DEFAULT 0,
     left_out INTEGER NOT NULL DEFAULT 0, -- 1: the log lacks nothing but whole files that were left out
     report TEXT,                    -- folder of the report, relative to the output; NULL where there is none
+    limit_option TEXT,              -- --timeout, --cpu or --memory, where it was stopped at that limit
+    limit_value REAL,
+    no_log INTEGER,                 -- 1: a table that is no machine's log; NULL: of an earlier version, which says both in `reason` alone
     UNIQUE (log_hash, config_hash, version)
 ) STRICT;
 CREATE INDEX result_machine ON result (machine_id, start_ns);

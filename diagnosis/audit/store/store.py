@@ -24,7 +24,7 @@ from diagnosis.audit.store.stored import StoredMission, StoredResult, mission_of
 
 FILE_NAME = "fleet.sqlite"
 RESULTS = "results"
-_STORED = "id, log_hash, config_hash, version, state, reason, attempts, machine_id, verdict, start_ns, report"
+_STORED = "id, log_hash, config_hash, version, state, reason, attempts, machine_id, verdict, start_ns, report, limit_option, limit_value, no_log"
 _BY_KEY = "log_hash = ? AND config_hash = ? AND version = ?"
 
 

@@ -7,7 +7,7 @@ import sqlite3
 from dataclasses import dataclass
 
 from diagnosis.audit.store.keys import Key
-from diagnosis.audit.store.outcome import MissionState
+from diagnosis.audit.store.outcome import MissionState, limit_in_words
 from diagnosis.results.vocabulary import Verdict
 
 
@@ -24,6 +24,7 @@ class StoredResult:
     verdict: Verdict | None
     start_ns: int | None
     report: str | None
+    limit: tuple[str, float] | None = None
 
 
 @dataclass(frozen=True)
@@ -66,7 +67,15 @@ def result_of_row(row: sqlite3.Row) -> StoredResult:
         verdict=Verdict(row["verdict"]) if row["verdict"] is not None else None,
         start_ns=row["start_ns"],
         report=row["report"],
+        limit=limit_of_row(row),
     )
+
+
+def limit_of_row(row: sqlite3.Row) -> tuple[str, float] | None:
+    """Option and value of the limit at which a mission was stopped; of a result of an earlier version those in its reason."""
+    if "no_log" not in row.keys() or row["no_log"] is None:  # noqa: SIM118
+        return limit_in_words(row["state"], row["reason"])
+    return None if row["limit_option"] is None else (row["limit_option"], row["limit_value"])
 
 
 def mission_of_row(row: sqlite3.Row) -> StoredMission:

@@ -407,3 +407,20 @@ def test_the_command_that_the_page_shows_records_the_repair(tmp_path: Path) -> N
         repair(tmp_path, shlex.split(command)[5], 1.0)
     assert {f["status"] for f in document(tmp_path)["faults"]} == {"repaired"}
     assert "<code>mfhca audit" not in build_fleet_page(document(tmp_path))
+
+
+@pytest.mark.parametrize(
+    ("blind", "words"),
+    [
+        ([], "nor a fault of another part, and not cleared by it"),
+        ([("RL", "actuator")], "RL drive valve not judged"),
+        ([(c, s) for c, s in samples.PARTS if (c, s) != PART], "other parts not judged"),
+    ],
+)
+def test_parts_that_were_judged_since_a_repair_are_not_said_to_be_unjudged(
+    tmp_path: Path, blind: list[tuple[str, str]], words: str
+) -> None:
+    stored(tmp_path, [*course("..x"), Sample("m03", day=3.0, verdict="not_assessed", blind=blind)])
+    repair(tmp_path, "HX-1 FR sensor", 2.5)
+    since = f"FR speed sensor not found by 1 mission since the repair on {utc_moment(at(2.5))}"
+    assert standing(tmp_path)[:2] == ("not_assessed", f"{since}, {words}")

@@ -2,12 +2,24 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
+import pytest
+
 from diagnosis.clearing.forecast import Forecast, forecast
+from diagnosis.pipeline import diagnose_signals
+from diagnosis.results.document import ReportDocument
 from diagnosis.results.machine_words import HYDRAULIC, MachineWords
+from diagnosis.results.vocabulary import Kind
 from replay.faults import Side
+from replay.log.source_options import SignalSource
 from replay.machine.config import haulotte
+from replay.signals.signal import Signal, Signals
+from replay.simulation.options import SimulationOptions
+from replay.simulation.run import simulate_mission
+
+PAPER = haulotte()
 
 _BASE = [f"wheel.{w}.{leaf}" for w in ("FR", "FL", "RR", "RL") for leaf in ("v", "u")] + [
     f"steer.{a}.{leaf}" for a in ("front", "rear") for leaf in ("phi", "u")
@@ -49,7 +61,7 @@ def test_what_is_not_logged_is_not_judged() -> None:
     assert "departs from the commanded speed" in found["FR", Side.SENSOR].words
     assert found["FL", Side.SENSOR].words == "not judged: no speed is logged"
     assert found["FL", Side.ACTUATOR].words == "not judged: no speed and no opening is logged"
-    assert found["front", Side.SENSOR].log[0] == "steer.<A>.u"
+    assert found["front", Side.SENSOR].log[0] == "steer.<A>.phi_ref or steer.<A>.u"
     assert "too few wheels" in _by_part(["wheel.FR.v", "wheel.FR.u"])["FR", Side.SENSOR].words
 
 
@@ -69,3 +81,36 @@ def test_one_speed_without_a_command_is_not_judged() -> None:
     sensor, drive = forecast(["wheel.D.v", "wheel.D.v_ref"], one, MachineWords(drive="drive"))
     assert "standstill" in sensor.words
     assert "standstill" in drive.words
+
+
+def _axles(report: ReportDocument) -> set[tuple[str, Side]]:
+    """Sides of axles of which anything was judged."""
+    return {
+        (row["component"], Side(row["side"]))
+        for row in report["coverage"]
+        if row["component"] in PAPER.axles and row["tier"] != "none"
+    }
+
+
+@pytest.mark.parametrize(
+    "left_out",
+    [
+        r"_true|u(_applied)?$",
+        r"_true|u(_applied)?$|phi_ref",
+        r"_true|u(_applied)?$|phi_ref|cmd|_ref",
+        r"_true|\.u$",
+        r"_true|applied",
+        r"phi$|_true|applied",
+    ],
+)
+def test_what_is_said_of_the_steering_is_what_the_diagnosis_does(left_out: str) -> None:
+    mission = simulate_mission(SimulationOptions(scenario="healthy", seed=7, duration_s=40.0, rate_hz=100.0))
+    items = {
+        n: Signal(n, mission.stamps, x, SignalSource(column=n), "a.mcap", guessed=False)
+        for n, x in mission.columns.items()
+        if not re.search(left_out, n)
+    }
+    report = diagnose_signals(Signals(items, {}), PAPER).report
+    foretold = forecast(items, PAPER, HYDRAULIC)
+    told = {(c, f.side) for f in foretold if f.kind is Kind.STEER for c in f.components if "not judged" not in f.words}
+    assert told == _axles(report)

@@ -457,3 +457,27 @@ def test_a_machine_that_ignored_its_commands_is_as_fast_as_they_are(tmp_path: Pa
     pd.DataFrame({"time_s": t, "target_speed": 0.5, "actual_speed": 0.0 * t}).to_csv(tmp_path / "run.csv", index=False)
     draft = draft_machine(read_everything([tmp_path / "run.csv"]))
     assert draft.machine.max_speed == pytest.approx(0.6)
+
+
+@pytest.mark.parametrize(
+    ("scale", "rest", "unit", "asked"),
+    [
+        (10.0, 0.0, "% or V", "or in volts? Write unit"),
+        (5.0, 5.0, "% or V", "or in volts? Write unit"),
+        (1.4, 0.0, "% or V", "or in volts? Write unit"),
+        (8.0, 12.0, "% or mA", "or in mA? Write unit"),
+        (80.0, 0.0, "%", "in %? None is stated"),
+    ],
+)
+def test_openings_that_may_be_volts_or_a_current_are_asked_for_as_such(
+    tmp_path: Path, scale: float, rest: float, unit: str, asked: str
+) -> None:
+    v = np.repeat(np.random.default_rng(1).uniform(-1.0, 1.0, 15), 40)
+    v[0], v[-40:] = -1.0, 1.0
+    columns: dict[str, Any] = {"Zeit": np.arange(600) * 0.05, "Sollgeschwindigkeit": v}
+    for i in range(1, 5):
+        columns |= {f"Rad{i}_v_soll": v, f"Rad{i}_v_ist": v, f"Rad{i}_Ventil": rest + scale * v}
+    pd.DataFrame(columns).to_csv(tmp_path / "run.csv", index=False)
+    draft = read_back(draft_machine(read_everything([tmp_path / "run.csv"])), tmp_path)
+    assert {draft.machine.signals[f"wheel.{w}.u"].unit for w in draft.machine.wheels} == {unit}
+    assert any(asked in q for q in draft.questions)

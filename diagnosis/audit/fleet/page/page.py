@@ -26,7 +26,7 @@ from diagnosis.audit.fleet.page.figures import blind, hours, kpis, of_folders
 from diagnosis.audit.fleet.page.matrix import matrix
 from diagnosis.audit.fleet.page.shown import Context, ShownDocument, fault_address, shown
 from diagnosis.audit.fleet.page.svg import LEGEND, mark, sparkline, sprite
-from diagnosis.audit.fleet.page.trends import MOST, chosen, course, interest, level_words
+from diagnosis.audit.fleet.page.trends import MOST, chosen, course, dead_words, interest, level_words
 from diagnosis.audit.fleet.trend_types import TrendRow
 from diagnosis.audit.fleet.words import count, missions_words, open_words, repair_command
 from diagnosis.pages import labels
@@ -89,7 +89,8 @@ def build_fleet_page(found: FleetDocument) -> str:
     scripts = [asset(SHARED / "theme.js"), asset(_HERE / "fleet.js")]
     present = [f for f in document["faults"] if f["status"] not in GONE]
     past = [f for f in document["faults"] if f["status"] in GONE]
-    drawn, standing, lists = chosen(trends), _by_machine(present), lists_of(found)
+    standing, lists = _by_machine(present), lists_of(found)
+    drawn = chosen(trends, lambda t: bool(dead_words(t, standing[t["machine"]])))
     failed = [k for k, m in enumerate(found["missions"]) if m["verdict"] is None]
     own: dict[int, list[TrendRow]] = defaultdict(list)
     for t in trends:
@@ -118,7 +119,7 @@ def build_fleet_page(found: FleetDocument) -> str:
         "unlisted": max(0, len(present) - _FAULTS),
         "past": [_fault(f, document, directions) for f in past[:_FAULTS]],
         "past_count": len(past),
-        "trends": [course(t, document["machines"], _UNITS[axis]) for t in drawn],
+        "trends": [course(t, document["machines"], _UNITS[axis], standing[t["machine"]]) for t in drawn],
         "quiet": len(trends) - len(drawn),
         "brief": sum(t["forecast"]["state"] == "not_known" for t in trends if all(t is not d for d in drawn)),
         "crowded": len(drawn) == MOST,
@@ -225,7 +226,10 @@ def _machine(
     line = leading["line"] if leading else None
     judged = len(m["missions"]) + len(m["undated"])
     near = any(t["approaching"] for t in trends)
-    words, symbol = machine_words(m, standing, near, leave), m["verdict"].symbol
+    words, symbol = (
+        machine_words(m, standing, near, leave, halving=any(t.get("halving") for t in trends)),
+        m["verdict"].symbol,
+    )
     shows = bool(standing) or near or leave is not Leave.MAY
     if (m["verdict"] is Verdict.WATCH and not standing) or (m["verdict"] is Verdict.READY and shows):
         symbol = "warning"  # a damaged log, or a ready one that shows something
@@ -243,7 +247,7 @@ def _machine(
         "with_faults": m["with_faults"],
         "judged": judged,
         "trend": sparkline(leading) if leading else "",
-        "trend_words": f"{words_of(m).part_words(leading['kind'], leading['component'], leading['side'])}: {level_words(leading)}"
+        "trend_words": f"{words_of(m).part_words(leading['kind'], leading['component'], leading['side'])}: {level_words(leading)}{f', {dead}' if (dead := dead_words(leading, standing)) else ''}"
         if leading and line
         else "",
         "no_trend": "" if leading else "fewer than five missions with an estimate" if trends else "no estimate of ε̂",

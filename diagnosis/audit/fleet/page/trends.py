@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
+from diagnosis.audit.fleet.fault_types import FleetFaultRow
 from diagnosis.audit.fleet.fleet_types import MachineRow
 from diagnosis.audit.fleet.page.shown import Context
 from diagnosis.audit.fleet.page.svg import physical, trend_picture
+from diagnosis.audit.fleet.runs import sides_of
 from diagnosis.audit.fleet.trend_types import TrendRow
 from diagnosis.audit.fleet.words import count, round_to
+from diagnosis.decision.wording import join_words
+from diagnosis.results.fault_rows import state_label
 from diagnosis.results.machine_words import words_of
+from replay.faults import TOTAL
 
 MOST = 48
 
@@ -37,12 +42,13 @@ def _between(t: TrendRow) -> float:
     return (max(at) - min(at)) / max(1, len(at) - 1)
 
 
-def chosen(trends: Sequence[TrendRow]) -> list[TrendRow]:
-    """Trends that rise, change or come near their limit, the most urgent first."""
+def chosen(trends: Sequence[TrendRow], dead: Callable[[TrendRow], bool] = lambda t: False) -> list[TrendRow]:
+    """Trends that rise, change or come near their limit, and those of parts that are stuck or silent (`dead`), the most urgent first."""
     found = [
         t
         for t in trends
         if t["approaching"]
+        or dead(t)
         or t["forecast"]["state"] == "above"
         or t["changes"]
         or t["outliers"]
@@ -52,7 +58,20 @@ def chosen(trends: Sequence[TrendRow]) -> list[TrendRow]:
     return sorted(found, key=interest, reverse=True)[:MOST]
 
 
-def course(t: TrendRow, machines: Sequence[MachineRow], unit: str) -> Context:
+def dead_words(t: TrendRow, standing: Sequence[FleetFaultRow]) -> str:
+    """That a part is stuck or silent at times, of which no loss is made: its course looks as good as what is left; else empty."""
+    mine = [
+        f
+        for f in standing
+        if f["component"] == t["component"] and t["side"] in sides_of(f["side"]) and f["mode"] in TOTAL
+    ]
+    if not mine:
+        return ""
+    rows = join_words(list(dict.fromkeys(state_label(f["mode"], f["side"]).lower() for f in mine)))
+    return f"without the time that is told as {rows}"
+
+
+def course(t: TrendRow, machines: Sequence[MachineRow], unit: str, standing: Sequence[FleetFaultRow] = ()) -> Context:
     """Title, picture and words of one course."""
     title = f"{machines[t['machine']]['label']} · {words_of(machines[t['machine']]).part_words(t['kind'], t['component'], t['side'])}"
     line = t["line"]
@@ -81,7 +100,9 @@ def course(t: TrendRow, machines: Sequence[MachineRow], unit: str) -> Context:
         words = (
             f"above the limit of {round_to(t['limit'])}: ε̂ {t['points'][-1][2]:.2f} over the whole of its last mission"
         )
-    state = "above" if beyond or t["forecast"]["state"] == "above" else "near" if t["approaching"] else "calm"
+    if dead := dead_words(t, standing):
+        words = f"{words}, {dead}: not as good as it looks"
+    state = "above" if beyond or dead or t["forecast"]["state"] == "above" else "near" if t["approaching"] else "calm"
     return {
         "title": title,
         "state": state,

@@ -7,6 +7,8 @@ import sqlite3
 from contextlib import closing
 from pathlib import Path
 
+import pytest
+
 from diagnosis.audit.fleet.leave import Left, lists_of
 from diagnosis.audit.fleet.listed import listed_machines
 from diagnosis.audit.fleet.page.page import build_fleet_page
@@ -16,6 +18,7 @@ from diagnosis.audit.store.repairs import Repair, record_repair
 from diagnosis.audit.store.store import Store
 from diagnosis.results.vocabulary import Leave
 from tests import fleet_samples as samples
+from tests.fleet_contradictions import fleet_contradictions
 from tests.fleet_samples import Fault, Sample
 
 
@@ -259,3 +262,82 @@ def test_of_faults_that_are_not_named_the_newest_is(tmp_path: Path) -> None:
     missions.append(Sample("b", day=3.0, verdict="watch", faults=[Fault("RL", "actuator", "inefficient", "medium")]))
     (one,) = listed(tmp_path, *missions).values()
     assert "and 2 more, the newest RL drive valve inefficient" in one.reason
+
+
+def growing(tmp_path: Path, losses: list[float], repaired: bool = False, half: float = 0.01) -> tuple[Left, str, str]:
+    """A machine whose RL valve loses so much in its missions, each of which may go out alone: its place, words and sentence."""
+    valve = ("RL", "actuator")
+    missions = [
+        Sample(
+            f"a/{k}",
+            "a",
+            day=float(k),
+            verdict="watch",
+            faults=[Fault("RL", "actuator", "inefficient", "medium", epsilon=(x, x - half, x + half))],
+            epsilon={valve: (x, x - half, x + half)},
+        )
+        for k, x in enumerate(losses)
+    ]
+    store = samples.write_store(tmp_path / "fleet.sqlite", missions)
+    for m in missions:
+        samples.write_report(tmp_path, m.name, cleared=True)
+    if repaired:
+        with Store.open(store) as opened:
+            record_repair(opened, Repair(("a", ""), "RL", "actuator", samples.START_NS + len(losses) * samples.DAY_NS))
+    document = fleet_json(load_fleet(store))
+    (one,), (row,) = lists_of(document), listed_machines(document)
+    assert one.leave.value == row.leave
+    assert row.words in build_fleet_page(document)
+    assert [*fleet_contradictions(document)] == []
+    return one, row.words, document["verdict"]["title"]
+
+
+@pytest.mark.parametrize(
+    "losses", [[0.12, 0.2, 0.28, 0.35, 0.42], [0.12, 0.27, 0.42], [0.1, 0.1, 0.1, 0.2, 0.31, 0.42]]
+)
+def test_a_loss_that_grows_towards_a_half_is_checked_first(tmp_path: Path, losses: list[float]) -> None:
+    one, words, title = growing(tmp_path, losses)
+    assert one.leave is Leave.CHECK
+    assert one.reason.startswith("RL drive valve lost 42 % over its last mission (")
+    assert "half may be lost before two more are over: check the part" in one.reason
+    assert words == "Faults to watch, and a loss that grows fast"
+    assert title == "The machine must be checked before it goes out"
+
+
+@pytest.mark.parametrize("losses", [[0.42] * 6, [0.1, 0.12, 0.13, 0.15, 0.16], [0.42, 0.38, 0.35, 0.3, 0.27], [0.42]])
+def test_a_loss_that_does_not_gives_leave_as_its_reports_do(tmp_path: Path, losses: list[float]) -> None:
+    one, words, _ = growing(tmp_path, losses)
+    assert one.leave is Leave.MAY
+    assert "grows" not in one.reason + words
+
+
+def test_a_repair_ends_the_growth(tmp_path: Path) -> None:
+    one, words, _ = growing(tmp_path, [0.12, 0.27, 0.42], repaired=True)
+    assert "grows" not in one.reason + words
+
+
+def test_the_course_of_a_part_that_is_silent_says_what_it_leaves_out(tmp_path: Path) -> None:
+    part = ("FR", "sensor")
+    silent = [Fault(*part, "no_signal", "high")]
+    missions = [
+        Sample(f"a/{k}", "a", day=float(k), verdict="stop" if k == 5 else "ready", faults=silent if k == 5 else (),
+               epsilon={part: samples.bounds(0.01)})
+        for k in range(6)
+    ]  # fmt: skip
+    page = build_fleet_page(fleet_json(load_fleet(samples.write_store(tmp_path / "fleet.sqlite", missions))))
+    assert "without the time that is told as no signal: not as good as it looks" in page
+
+
+def test_the_report_of_a_mission_before_the_repair_is_said_to_be_so(tmp_path: Path) -> None:
+    missions = [Sample("a", verdict="stop", faults=[Fault("FR", "sensor", "no_signal", "high")])]
+    store = samples.write_store(tmp_path / "fleet.sqlite", missions)
+    (one,) = lists_of(fleet_json(load_fleet(store)))
+    assert (one.leave, one.note) == (Leave.MUST_NOT, "")
+    with Store.open(store) as opened:
+        record_repair(opened, Repair(("HX-1", ""), "FR", "", samples.START_NS + samples.DAY_NS))
+    document = fleet_json(load_fleet(store))
+    (one,), (row,) = lists_of(document), listed_machines(document)
+    assert (one.leave, one.name) == (Leave.CHECK, "a")
+    assert one.note == row.note
+    assert one.note.startswith("this report is of a mission before the repair")
+    assert f"({one.note})" in build_fleet_page(document)

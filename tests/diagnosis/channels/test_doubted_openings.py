@@ -1,0 +1,67 @@
+"""A mission whose openings are in a wrong unit condemns no valve, and is not ready."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import pytest
+
+from diagnosis.pipeline import diagnose_mission
+from diagnosis.results.document import ReportDocument
+from replay.faults import FaultMode, FaultSpec, Side
+from replay.log.source_options import SignalSource
+from replay.machine.config import haulotte
+from replay.mission import Mission
+from replay.signals.signal import Signal, Signals
+from replay.signals.timeline import align
+from replay.simulation.options import EvidenceLevel, SimulatedMission, SimulationOptions
+from replay.simulation.run import simulate_mission
+
+PAPER = haulotte()
+STUCK = FaultSpec("FR", Side.SENSOR, FaultMode.STUCK, 20.0, 30.0, 1.0, 0.2)
+
+
+def mission(evidence: EvidenceLevel, faults: tuple[FaultSpec, ...] = ()) -> SimulatedMission:
+    return simulate_mission(
+        SimulationOptions(scenario="healthy", seed=4, duration_s=60.0, rate_hz=100.0, evidence=evidence, faults=faults)
+    )
+
+
+def judged(recorded: SimulatedMission, scales: Mapping[str, float], unit: str = "1") -> ReportDocument:
+    """The mission with openings (by the end of their names) that are so many times what they should be."""
+    items = {}
+    for name, x in recorded.columns.items():
+        leaf = name.rpartition(".")[2]
+        opens = leaf in ("u", "u_applied")
+        source = SignalSource(column=name, unit=unit if opens else "")
+        items[name] = Signal(name, recorded.stamps, x * scales.get(leaf, 1.0), source, "a.csv", guessed=False)
+    signals = Signals(items, {})
+    return diagnose_mission(Mission((), signals, align(signals)), PAPER).report
+
+
+@pytest.mark.parametrize("evidence", ["spool", "direct"])
+@pytest.mark.parametrize("scales", [{"u": 0.1}, {"u_applied": 0.1}, {"u_applied": 0.5}])
+def test_a_wrong_unit_condemns_no_valve(evidence: EvidenceLevel, scales: Mapping[str, float]) -> None:
+    report = judged(mission(evidence), scales)
+    verdict = report["verdict"]
+    assert (verdict["status"], verdict["cleared"], report["intervals"]) == ("not_assessed", False, [])
+    assert verdict["title"] == "The unit of the valve openings is in doubt"
+    assert "unit = " in verdict["to_clear"][0]["act"]
+    assert any(
+        "valve openings is in doubt" in row["why"] or "unit of wheel" in row["act"] for row in verdict["to_clear"]
+    )
+    assert not any("log steer.front.u (" in row["act"] for row in verdict["to_clear"])  # which is logged
+    assert all(row["side"] != "actuator" or row["tier"] == "none" for row in report["coverage"])
+
+
+def test_a_unit_that_is_left_open_condemns_none_and_sensors_are_judged() -> None:
+    report = judged(mission("direct", (STUCK,)), {"u": 0.1, "u_applied": 0.1}, "% or V")
+    assert report["verdict"]["status"] == "stop"
+    assert {(f["component"], str(f["side"])) for f in report["intervals"]} == {("FR", "sensor")}
+    assert not report["verdict"]["cleared"]
+
+
+def test_a_mission_in_its_units_is_judged() -> None:
+    report = judged(mission("direct"), {})
+    assert "unit" not in report["verdict"]["title"]
+    assert any(row["side"] == "actuator" and row["tier"] == "direct" for row in report["coverage"])
