@@ -6,7 +6,6 @@
 
 from __future__ import annotations
 
-import gc
 import os
 import sys
 import traceback
@@ -36,6 +35,7 @@ from cli.commands import (
     simulate,
 )
 from cli.commands import replay as replay_command  # the package of that name is another thing
+from cli.terminal.collecting import collect_little
 from cli.terminal.command import USAGE, App, Command, Quiet, Verbose
 from cli.terminal.console import Terminal, discard
 from cli.terminal.interrupts import asked, check, forget, listen
@@ -45,7 +45,6 @@ from replay.errors import MfhcaError
 from replay.version import __version__
 
 INTERNAL, INTERRUPTED = 70, 130
-_COLLECTED = 50_000, 10, 10  # objects, and rounds of the younger generations, between two searches for cycles
 
 app = typer.Typer(
     name="mfhca",
@@ -182,9 +181,7 @@ def main() -> None:
     """Entry of the installed command."""
     # Products of two or three columns gain nothing from threads of the linear algebra, which spin while they wait.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    # Modules and the compiler make objects by the million, hardly any of them in cycles: looking for those after every 700
-    # took a seventh of a first run.
-    gc.set_threshold(*_COLLECTED)
+    collect_little()
     for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
         if getattr(sys, name) is None:  # closed by the caller
             setattr(sys, name, Path(os.devnull).open(mode, encoding="utf-8"))  # noqa: SIM115 - for the whole run

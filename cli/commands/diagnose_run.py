@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from cli.tables.clips import FOLDER, show_clips
 from cli.terminal.browser import show_page
+from cli.terminal.collecting import all_loaded
 from cli.terminal.console import Terminal
 from cli.terminal.options import FailOn
 from diagnosis.api.inputs import check_output, check_times, check_wheels, machine_of, mission_paths
@@ -147,6 +148,7 @@ def _diagnosed(
 def _judged(request: DiagnoseRequest, checked: _Checked, progress: Subscriber) -> tuple[Mission | None, MissionResult]:
     from diagnosis import pipeline
 
+    all_loaded()
     machine, source, wheels, name = checked.machine, checked.machine_source, checked.wheels, request.machine_id
     start, stop = request.start_s, request.end_s
     if not request.clips:

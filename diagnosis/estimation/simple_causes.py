@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnosis.estimation.lag import low_passed
+from diagnosis.estimation.lag import low_passed_at
 from diagnosis.results.result import Epsilon
 from diagnosis.results.sizes import amount
 from replay.faults import FaultMode
@@ -177,8 +177,7 @@ def _lagged(at: NDArray[np.intp], x: Array, measured: Measured) -> Iterator[tupl
     """The same behind a lag of first order, by its time constant [s]."""
     first = max(0, int(at[0]) - round(_SETTLED * _LAGS_S[-1] / measured.dt))
     reference = measured.x[first : at[-1] + 1]
-    for seconds in _LAGS_S:
-        behind = low_passed(reference, seconds, measured.dt)[at - first]
+    for seconds, behind in zip(_LAGS_S, low_passed_at(reference, _LAGS_S, measured.dt, at - first), strict=True):
         yield seconds, np.where(np.isfinite(behind), behind, x)
 
 

@@ -15,6 +15,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from diagnosis.report.encode_kernel import quantise, split_planes
+
 _LEVELS = 2**24
 _HUGE, _TINY = 1e30, 1e-30
 _RECORDED, _DERIVED = 1024, 512  # least steps within the range of a column without an LSB
@@ -157,28 +159,18 @@ def _blocks(size: int) -> Iterator[slice]:
 def _quantised(values: NDArray[np.floating], step: float, base: float) -> NDArray[np.int32]:
     out = np.empty(len(values), np.int32)
     for part in _blocks(len(values)):
-        y = values[part].astype(np.float64)
-        y[~(np.abs(y) < _HUGE)] = base * step
-        y /= step
-        np.rint(y, out=y)
-        y -= base
-        out[part] = y
+        quantise(values[part].astype(np.float64), _HUGE, step, base, out[part])
     return out
 
 
 def _planes(parts: Sequence[NDArray[np.int32]]) -> tuple[int, bytes]:
     """Bytes of the zigzag differences, lowest bytes of all first, and how many bytes a level takes."""
-    out = [np.zeros((4, len(p)), np.uint8) for p in parts]
-    planes = 1
-    for levels, rows in zip(parts, out, strict=True):
-        last = np.int32(0)
-        for part in _blocks(len(levels)):
-            delta = np.diff(levels[part], prepend=last)
-            last = levels[part][-1]
-            coded = ((delta << 1) ^ (delta >> 31)).view(np.uint32).astype("<u4", copy=False)
-            used = max(1, (int(coded.max()).bit_length() + 7) // 8)
-            rows[:used, part] = coded.view(np.uint8).reshape(-1, 4).T[:used]
-            planes = max(planes, used)
+    out = [np.empty((4, len(p)), np.uint8) for p in parts]
+    bits = max(split_planes(levels, rows, 0, 1) for levels, rows in zip(parts, out, strict=True))
+    planes = max(1, (bits.bit_length() + 7) // 8)
+    if planes > 1:
+        for levels, rows in zip(parts, out, strict=True):
+            split_planes(levels, rows, 1, planes)
     return planes, b"".join(rows[:planes].tobytes() for rows in out)
 
 

@@ -11,6 +11,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from replay.arrays.scipy_parts import part_of
+
 Array = NDArray[np.float64]
 
 _SMALL = 8  # windows that a start is drawn from
@@ -78,11 +80,9 @@ def normal_equations(x: Array, y: Array, use: NDArray[np.bool_], length: int) ->
 
 def solve(w: Normal, penalty: Array, prior: Array | None = None) -> Array:
     """Coefficients that are not negative, by ridge regression towards `prior`; `penalty` (p, p) per sample."""
-    from scipy.optimize import nnls
-
     A, b = _system(w, penalty, prior)
     L = np.linalg.cholesky(A)
-    return np.asarray(nnls(L.T, np.linalg.solve(L, b))[0])
+    return np.asarray(part_of("scipy.optimize", "_nnls").nnls(L.T, np.linalg.solve(L, b))[0])
 
 
 def _system(w: Normal, penalty: Array, prior: Array | None) -> tuple[Array, Array]:

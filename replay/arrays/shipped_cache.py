@@ -23,6 +23,7 @@ from numba.core.caching import (
     UserProvidedCacheLocator,
 )
 
+from replay.arrays.lazy_linking import link_lazily
 from replay.progress import compiling_begins
 
 SHIPPED = Path(__file__).parents[1] / "compiled"
@@ -63,6 +64,7 @@ class ShippedCache(FunctionCache):  # type: ignore[misc]
     """numba's cache of one kernel, which looks into the wheel's kernels too where there is nothing for this processor."""
 
     def _load_overload(self, sig: Any, target_context: Any) -> Any:
+        link_lazily(target_context.codegen())
         found = super()._load_overload(sig, target_context)
         if found is None and self._enabled:
             found = self._shipped(sig, target_context)
