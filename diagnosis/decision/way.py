@@ -80,11 +80,9 @@ def way_of(timeline: Timeline, machine: Machine) -> Way:
     )
     note = ""
     if distance is not None and "wheels" in dead and alive:
-        by = alive[0]
-        distance = float(np.nansum(_anchored(*positions[by], width, _JITTER_M if by == "GNSS" else 0.0)))
-        note = (
-            f"by {_NAMES[by]}, from positions {_STEP_S:g} s apart: the wheels' speeds do not change where it shows way"
-        )
+        first = alive[0]
+        distance = sum(_anchored(*positions[first], width, _JITTER_M if first == "GNSS" else 0.0))
+        note = f"by {_NAMES[first]}, from positions {_STEP_S:g} s apart: the wheels' speeds do not change where it shows way"
     return Way(alive[0] if alive else "", path_note, distance, note)
 
 

@@ -50,7 +50,7 @@ from diagnosis.response.spells import until_back, where_asked
 from diagnosis.response.states import judge
 from diagnosis.response.turning import turning_of, turns_other_way, turns_with, unasked_turn, wrong_yaw_rate
 from diagnosis.response.uphill import lower_by_a_load
-from diagnosis.response.witness import contradicted, denied, witness_of
+from diagnosis.response.witness import witness_of, witnessed
 from diagnosis.results.assessment import Assessment, Finding, Reason
 from replay.machine.config import Limits
 from replay.machine.geometry import Geometry
@@ -126,10 +126,8 @@ def assess_response(
     if not found:
         stood = standstills(idle, dt)
         ignored = () if stood or seen else unexplained(drives, limits, dt)
-        wrong = ignored if witness.mostly else ()
-        other = contradicted(speeds, drives, width, limits) if ignored and not wrong else ""
-        said = (other,) if other else denied(witness, seen, drives, wrong, dt)
-        return Judgement({}, stood or (() if wrong or other else ignored), (), said)
+        ignored, said = witnessed(ignored, witness, seen, drives, speeds, (width, limits, dt))
+        return Judgement({}, stood or ignored, (), said)
     rest = {w: samples_of(d.y, d.fresh) for w, d in data.items() if w not in found}
     found = by_each_other(found, width * dt, rest)
     holds = {w: holds_of(j.wheel.samples, MOVES * limits.driving_speed, dt) for w, j in found.items()}
@@ -251,9 +249,8 @@ def assess_response(
     stood = standstills(idle, dt) or (
         paused([f for side in parts.values() for f in side[0].findings], dt) if len(data) == 1 else ()
     )
-    wrong = ignored if witness.mostly else ()
-    events = (*stood, *(astray if lasts else ()), *(() if wrong else ignored))
-    return Judgement(parts, events, gyro, denied(witness, seen, drives, wrong, dt))
+    ignored, said = witnessed(ignored, witness, seen, drives, speeds, (width, limits, dt))
+    return Judgement(parts, (*stood, *(astray if lasts else ()), *ignored), gyro, said)
 
 
 def _turned_by(wheel: str, found: Mapping[str, Judged]) -> bool:
