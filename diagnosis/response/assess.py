@@ -35,6 +35,7 @@ from diagnosis.response.models import (
     Beside,
     Blocks,
 )
+from diagnosis.response.pairs import by_leaps
 from diagnosis.response.power import powers_of, unshown
 from diagnosis.response.ramps import only_a_ramp
 from diagnosis.response.rivals import (
@@ -156,7 +157,7 @@ def assess_response(
     }
     names = {w: j.data.name for w, j in found.items()}
     beside, by_motion, left_notes = views(names, {w: j.wheel.blocks for w, j in found.items()}, geometry, bodies)
-    judged = {w: judge(j, beside.get(w), dt, width) for w, j in found.items()}
+    judged = by_leaps({w: judge(j, beside.get(w), dt, width) for w, j in found.items()}, mates)
     turned = {w: [s for s in j.spells if unasked_turn(w, s, judged, geometry, yaw)] for w, j in judged.items()}
     slips = {w: [s for s in j.spells if by_slip(s, w, judged, bodies.yaw)] for w, j in judged.items()}
     kept = {
