@@ -105,8 +105,8 @@ def _gnss(timeline: Timeline) -> tuple[Array, Array] | None:
 
 
 def _held(x: Array, width: int) -> Array:
-    """The value at the start and at the end of each step of `width` samples, or the last one known."""
-    ends = np.r_[x[0:1], x[width::width], x[-1:]] if x.size % width != 1 else np.r_[x[0:1], x[width::width]]
+    """The value at the start and at the end of each step of `width` samples, or the last one known, shape (steps + 1,)."""
+    ends = np.r_[x[:1], x[width::width], x[-1:]]
     at = np.maximum.accumulate(np.where(np.isfinite(ends), np.arange(ends.size), -1))
     return np.where(at < 0, np.nan, ends[np.maximum(at, 0)])
 

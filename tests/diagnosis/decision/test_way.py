@@ -87,3 +87,11 @@ def test_speeds_that_are_dead_do_not_tell_the_distance() -> None:
 def test_a_pivot_turn_is_no_way() -> None:
     turning = {"wheel.A.v": np.full(N, -0.5), "wheel.B.v": np.full(N, 0.5)}
     assert way_of(timeline(turning | DEAD), MACHINE).positions == "odometry"
+
+
+@pytest.mark.parametrize("size", [1, 2, 49, 50, 51, 52, 599, 551])
+def test_any_length_is_cut_into_the_same_steps(size: int) -> None:
+    whole = {n: x[:size] for n, x in (DEAD | GNSS | SPEEDS).items()}
+    way = way_of(timeline(whole), MACHINE)
+    assert way.positions == ("GNSS" if size > 40 else "odometry")
+    assert way.distance_m == pytest.approx(0.05 * size)
