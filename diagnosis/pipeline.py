@@ -25,9 +25,10 @@ from diagnosis.clearing.beside import (
 from diagnosis.clearing.contradicted import without_contradicted
 from diagnosis.clearing.nothing_moves import supply_gone
 from diagnosis.clearing.standing_out import what_stands_out, with_findings, without_explained, without_followers
-from diagnosis.decision import metrics, quality
+from diagnosis.decision import quality
 from diagnosis.decision.episodes import with_episodes
 from diagnosis.decision.second_onsets import with_second_onsets
+from diagnosis.decision.way import path_of
 from diagnosis.recording_rows import machine_row
 from diagnosis.report_document import Judged, report_of_mission
 from diagnosis.results.assessment import Assessment
@@ -285,5 +286,5 @@ def _columns(judged: Judged, report: ReportDocument, timeline: Timeline) -> dict
     columns.update(size_columns(report, columns["t"], timeline.dt, parts))
     columns.update(mode_columns(report, columns["t"], timeline.dt, _without_modes(parts, columns)))
     columns.update(known_probability(report, columns["t"], timeline.dt, columns))
-    columns.update(metrics.path_of(timeline))
+    columns.update(path_of(timeline, judged.machine))
     return columns

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from diagnosis.decision import quality
 from diagnosis.decision.assumed import assumed_words
+from diagnosis.decision.way import way_of
 from diagnosis.results.document import FileRow, LogRow, MachineRow, WheelPlace
 from diagnosis.results.left_out import is_left_out
 from diagnosis.results.machine_words import machine_words
@@ -14,7 +15,6 @@ from replay.arrays.envelope import bucket_of
 from replay.machine.config import Machine
 from replay.mission import Mission, MissionFile
 from replay.readers.machine_identity import stated_machine
-from replay.signals.timeline import Timeline
 
 
 def log_row(mission: Mission, moving: NDArray[np.bool_], machine: Machine) -> LogRow:
@@ -30,17 +30,22 @@ def log_row(mission: Mission, moving: NDArray[np.bool_], machine: Machine) -> Lo
         The machine.
     """
     timeline = mission.timeline
+    way = way_of(timeline, machine)
     row: LogRow = {
         "files": [_file(f) for f in mission.files],
         "start_ns": timeline.start_ns,
         "open_loop": mission.open_loop,
         "duration_s": timeline.size * timeline.dt,
         "rate_hz": 1e9 / timeline.step_ns,
-        "distance_m": _distance(timeline, machine),
+        "distance_m": way.distance_m,
         "driving_s": float(np.count_nonzero(moving.any(axis=1))) * timeline.dt,
     }
     if (bucket := bucket_of(timeline.size)) > 1:
         row["samples_per_bucket"] = bucket
+    if way.path_note:
+        row["path_note"] = way.path_note
+    if way.distance_note:
+        row["distance_note"] = way.distance_note
     return row
 
 
@@ -57,19 +62,6 @@ def _file(file: MissionFile) -> FileRow:
     if left_out := [str(text) for text in file.summary.damage if is_left_out(text)]:
         row["left_out"] = left_out
     return row
-
-
-def _distance(timeline: Timeline, machine: Machine) -> float | None:
-    """Distance by the mean of the wheels' speeds [m]; None where no wheel speed is logged."""
-    speeds = [timeline.signals[n] for w in machine.wheels if (n := f"wheel.{w}.v") in timeline.signals]
-    if not speeds:
-        return None
-    distance = 0.0
-    for part in timeline.blocks():
-        near = [v[part] for v in speeds]
-        mean = np.nansum(np.abs(near), axis=0) / np.maximum(np.isfinite(near).sum(axis=0), 1)
-        distance += float(mean.sum()) * timeline.dt
-    return distance
 
 
 def machine_row(machine: Machine, mission: Mission, source: str, machine_id: str | None) -> MachineRow:

@@ -15,6 +15,7 @@ from replay.signals.timeline import Timeline
 _LEAST_S, _LEAST_ROWS = 1.0, 10
 _BEYOND = 3.0  # times longer than the source's own longest repeats
 _MOST = 0.25  # of the moving time: what is more common is the source's habit
+_ONCE = 0.5  # the same of a single time, which is none
 _ZERO, _EXTREME = 0.02, 0.98  # of a channel's largest value: what stands there may well stand still
 _CHANNELS = 2  # that must stand still at a value of their own
 _MOVING = ("v", "v_true", "u", "u_applied", "effort", "phi")
@@ -83,7 +84,8 @@ def copied_rows(timeline: Timeline, names: Sequence[str]) -> list[Span]:
     rows = max(timeline.periods_ns.get(n, 0) for n in moving) // timeline.step_ns * _LEAST_ROWS
     long = length >= max(_LEAST_S / timeline.dt, rows)
     alone = length > _BEYOND * np.r_[length[1:], 0]
-    rare = np.cumsum(length) <= _MOST * max(int(length.sum()), 1)
+    share = np.cumsum(length) / max(int(length.sum()), 1)
+    rare = (share <= _MOST) | ((np.arange(length.size) == 0) & (share <= _ONCE))
     taken = np.flatnonzero(long & alone & rare)
     if not taken.size:
         return []

@@ -1,4 +1,4 @@
-"""Figures of a mission: tracking error and control effort beside the paper's table, coverage, phases, path."""
+"""Figures of a mission: tracking error and control effort beside the paper's table, coverage, phases."""
 
 from __future__ import annotations
 
@@ -12,7 +12,6 @@ from diagnosis.results.document import CoverageRow, PhaseRow
 from diagnosis.results.loop_rows import LoopRow, MeanRow, MetricsRow, PaperRow
 from diagnosis.results.vocabulary import Tier
 from replay.arrays.blocks import blocks
-from replay.arrays.envelope import shown
 from replay.arrays.numeric import without_nan
 from replay.control.loop import Replay, any_finite, stack
 from replay.faults import DECIDED, Side, State
@@ -31,7 +30,6 @@ PAPER_TABLE = (
 _DECIDED = np.array([s in DECIDED for s in STATES])
 _AS_WELL = 0.5  # probability of a healthy part, from which on a finding decides nothing
 _RESTS = STATES.index(State.NOT_EXCITED)
-_EARTH_RADIUS = 6_371_008.8
 
 
 def driving(replay: Replay, timeline: Timeline, machine: Machine) -> NDArray[np.bool_]:
@@ -206,20 +204,3 @@ def phases(timeline: Timeline, replay: Replay, machine: Machine) -> list[PhaseRo
         else:
             out.append({"name": name, "start_s": float(a) * timeline.dt, "stop_s": float(b) * timeline.dt})
     return out
-
-
-def path_of(timeline: Timeline) -> dict[str, Array]:
-    """The machine's path [m] for pictures, from odometry, else from GNSS on a local plane; empty where neither is logged.
-
-    Each of the rows of its envelope, shape (rows,).
-    """
-    x, y = timeline.get("odom.x"), timeline.get("odom.y")
-    if x is not None and y is not None and np.isfinite(x).any():
-        return {"path.x": shown(x), "path.y": shown(y)}
-    lat, lon = timeline.get("gnss.lat"), timeline.get("gnss.lon")
-    if lat is None or lon is None or not np.isfinite(lat).any():
-        return {}
-    k = int(np.flatnonzero(np.isfinite(lat) & np.isfinite(lon))[0])
-    north = np.radians(lat - lat[k]) * _EARTH_RADIUS
-    east = np.radians(lon - lon[k]) * _EARTH_RADIUS * np.cos(np.radians(lat[k]))
-    return {"path.x": shown(east), "path.y": shown(north)}

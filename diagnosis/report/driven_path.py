@@ -14,6 +14,8 @@ from replay.faults import FaultMode, Side
 
 _AXLE_GAP_M = 0.1
 _POINTS = 200_000  # enough for a picture
+_NO_POSITIONS = "neither odometry nor GNSS was logged."
+_NOTHING = "Not shown: neither odometry nor GNSS nor a wheel's speed was logged."
 _SKIPPED = ("replay.", "evidence.")
 Array = NDArray[np.float64]
 
@@ -42,34 +44,43 @@ def driven_path(report: ReportDocument, columns: Columns, step: float) -> Path:
     Returns
     -------
     Path
-        From odometry or GNSS where they were logged, else integrated from the wheels' speeds and the yaw rate: measured,
+        From odometry or GNSS where they were logged and moved with the machine, else integrated from the wheels' speeds and the yaw rate: measured,
         given by the steering angles, or commanded.
     """
+    note = report["log"].get("path_note", "")
     if {"path.x", "path.y"} <= set(columns):
-        logged = "odom.x" in columns
+        logged = "odom.x" in columns and not note
         source = "odometry" if logged else "GNSS" if "gnss.lat" in columns else "logged positions"
-        return Path(columns["path.x"], columns["path.y"], f"from {source}, in metres")
+        return Path(columns["path.x"], columns["path.y"], f"from {source}, in metres{_after(note)}")
     machine = report["machine"]
     rows = max((len(v) for v in columns.values()), default=0)
     every = max(1, rows // _POINTS)
     columns, step = {k: v[::every] for k, v in columns.items() if not k.startswith(_SKIPPED)}, step * every
     speed = _speed(machine, report["intervals"], columns, step)
     if speed is None:
-        return Path(None, None, "Not shown: neither odometry nor GNSS nor a wheel's speed was logged.")
+        return Path(None, None, f"Not shown: {note} No wheel's speed was logged." if note else _NOTHING)
     turning = _turning(machine, columns, speed)
     if turning is None:
         return Path(
             None,
             None,
-            "Not shown: neither odometry nor GNSS was logged, and neither a yaw rate nor steering angles with the "
-            "machine's geometry show how it turned.",
+            f"Not shown: {note or _NO_POSITIONS} Neither a yaw rate nor steering angles with the machine's "
+            "geometry show how it turned.",
         )
     rate, slip, source = turning
     yaw = np.cumsum(np.nan_to_num(rate)) * step
     forward = np.nan_to_num(speed) * step
     x, y = np.cumsum(forward * np.cos(yaw + slip)), np.cumsum(forward * np.sin(yaw + slip))
     x, y = (np.repeat(v, every)[:rows] for v in (x, y))
-    return Path(x, y, f"integrated from wheel speeds and {source}: its shape drifts, no position was logged")
+    return Path(
+        x,
+        y,
+        f"integrated from wheel speeds and {source}: its shape drifts, no position was {'used' if note else 'logged'}{_after(note)}",
+    )
+
+
+def _after(note: str) -> str:
+    return f". {note}" if note else ""
 
 
 def _speed(machine: MachineRow, faults: Sequence[IntervalRow], columns: Columns, step: float) -> Array | None:

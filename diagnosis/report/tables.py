@@ -270,7 +270,8 @@ def _facts(report: ReportDocument, duration: float) -> list[tuple[str, str]]:
         (words_of(machine).moving.capitalize(), clock(log["driving_s"])),
     ]
     if log["distance_m"] is not None and words_of(machine).speed_unit == "m/s":
-        facts.append(("Distance", f"{number(log['distance_m'])} m"))
+        note = log.get("distance_note", "")
+        facts.append(("Distance", f"{number(log['distance_m'])} m{f', {note}' if note else ''}"))
     facts.append(("Sample rate", f"{number(log['rate_hz'])} Hz"))
     faulty = {(f["component"], f["side"]) for f in report["intervals"] if f["severity"] != Severity.INFO}
     if faulty:

@@ -35,6 +35,7 @@ from diagnosis.response.models import (
     Beside,
     Blocks,
 )
+from diagnosis.response.pairs import by_leaps
 from diagnosis.response.power import powers_of, unshown
 from diagnosis.response.ramps import only_a_ramp
 from diagnosis.response.rivals import (
@@ -50,7 +51,7 @@ from diagnosis.response.spells import until_back, where_asked
 from diagnosis.response.states import judge
 from diagnosis.response.turning import turning_of, turns_other_way, turns_with, unasked_turn, wrong_yaw_rate
 from diagnosis.response.uphill import lower_by_a_load
-from diagnosis.response.witness import contradicted, denied, witness_of
+from diagnosis.response.witness import witness_of, witnessed
 from diagnosis.results.assessment import Assessment, Finding, Reason
 from replay.machine.config import Limits
 from replay.machine.geometry import Geometry
@@ -126,10 +127,8 @@ def assess_response(
     if not found:
         stood = standstills(idle, dt)
         ignored = () if stood or seen else unexplained(drives, limits, dt)
-        wrong = ignored if witness.mostly else ()
-        other = contradicted(speeds, drives, width, limits) if ignored and not wrong else ""
-        said = (other,) if other else denied(witness, seen, drives, wrong, dt)
-        return Judgement({}, stood or (() if wrong or other else ignored), (), said)
+        ignored, said = witnessed(ignored, witness, seen, drives, speeds, (width, limits, dt))
+        return Judgement({}, stood or ignored, (), said)
     rest = {w: samples_of(d.y, d.fresh) for w, d in data.items() if w not in found}
     found = by_each_other(found, width * dt, rest)
     holds = {w: holds_of(j.wheel.samples, MOVES * limits.driving_speed, dt) for w, j in found.items()}
@@ -158,7 +157,7 @@ def assess_response(
     }
     names = {w: j.data.name for w, j in found.items()}
     beside, by_motion, left_notes = views(names, {w: j.wheel.blocks for w, j in found.items()}, geometry, bodies)
-    judged = {w: judge(j, beside.get(w), dt, width) for w, j in found.items()}
+    judged = by_leaps({w: judge(j, beside.get(w), dt, width) for w, j in found.items()}, mates)
     turned = {w: [s for s in j.spells if unasked_turn(w, s, judged, geometry, yaw)] for w, j in judged.items()}
     slips = {w: [s for s in j.spells if by_slip(s, w, judged, bodies.yaw)] for w, j in judged.items()}
     kept = {
@@ -251,9 +250,8 @@ def assess_response(
     stood = standstills(idle, dt) or (
         paused([f for side in parts.values() for f in side[0].findings], dt) if len(data) == 1 else ()
     )
-    wrong = ignored if witness.mostly else ()
-    events = (*stood, *(astray if lasts else ()), *(() if wrong else ignored))
-    return Judgement(parts, events, gyro, denied(witness, seen, drives, wrong, dt))
+    ignored, said = witnessed(ignored, witness, seen, drives, speeds, (width, limits, dt))
+    return Judgement(parts, (*stood, *(astray if lasts else ()), *ignored), gyro, said)
 
 
 def _turned_by(wheel: str, found: Mapping[str, Judged]) -> bool:

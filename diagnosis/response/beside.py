@@ -7,7 +7,7 @@ Wheels with rollers go sideways: each of them is what the three others make it b
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -148,6 +148,8 @@ def _by_wheels(
         blame = np.ones(speed.size)
     elif all(o in by_body for o in (w, *others)):
         blame = blame_of([_off_body(blocks[o], by_body[o]) for o in (w, *others)])
+    elif speeds and (away := _off_ground((w, *others), wheels, blocks, (geometry, yaw, by_body))):
+        blame = blame_of(away)
     else:
         blame, nobody = blame_by_commands(blocks[w], [blocks[o] for o in others], speed)
     rough = np.asarray(np.max([blocks[o].rough for o in others], axis=0))
@@ -155,6 +157,23 @@ def _by_wheels(
     alone = not speeds and len(wheels) == 2 and turns_by_wheels(blocks[w].mean, blocks[others[0]].mean)
     compared = " and ".join(wheels[o] for o in others)
     return Beside(speed, noise, blame, rough, compared, alone, across, nobody)
+
+
+def _off_ground(
+    side: Sequence[str],
+    wheels: Mapping[str, str],
+    blocks: Mapping[str, Blocks],
+    body: tuple[Geometry | None, Array | None, Mapping[str, View]],
+) -> list[Array]:
+    """How far wheels of one side are off what the ground does under them, in usual misfits; none where commands say more, or it is not known."""
+    if any(np.isfinite(blocks[o].low).any() for o in side):
+        return []
+    seen = [_by_motion(o, wheels, blocks, body) for o in side]
+    return (
+        [np.abs(blocks[o].mean - m.speed) / m.noise for o, m in zip(side, seen, strict=True) if m is not None]
+        if all(seen)
+        else []
+    )
 
 
 def turns_by_wheels(y: Array, x: Array) -> bool:

@@ -274,7 +274,7 @@ def _finding(
     }.get(mode)
     p = _ALONE_P if one.alone else _P[sum(much > least for least in _MUCH_S) - 1]
     texts: tuple[str, ...] = (
-        f"{one.data.name} is {size:.2g} {{speed_unit}} (median) for {(stop - start) * block_s:.1f} s, where its command makes it "
+        f"{one.data.name} is {round(size, 6):.2g} {{speed_unit}} (median) for {(stop - start) * block_s:.1f} s, where its command makes it "
         f"{float(np.median(np.abs(asked))):.2g} {{speed_unit}} otherwise.",
         f"{view.compared} and the measured motion of the body show the same speed as the sensor, so that the sensor is right and the "
         "{valve} does not do what it is told.",

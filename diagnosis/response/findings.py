@@ -158,9 +158,17 @@ def _by_body(spell: Spell, sensor: float, texts: list[str]) -> float:
 
 
 def _pulls_as_usual(wheel: Wheel, part: slice) -> bool:
-    """Whether a drive has its usual share of the load in most of some blocks."""
-    share = np.zeros(0) if wheel.pull is None else wheel.pull[part][np.isfinite(wheel.pull[part])]
-    return share.size >= _LEAST_PULLS and bool(_AS_USUAL[0] < np.median(share) < _AS_USUAL[1])
+    """Whether a drive has its usual share of the load in most of some blocks: also beside all others, for what lasts is the usual itself."""
+    if wheel.pull is None:
+        return False
+    apart = np.ones(wheel.pull.size, np.bool_)
+    apart[part] = False
+    known = np.isfinite(wheel.pull)
+    share, rest = wheel.pull[known & ~apart], wheel.pull[known & apart]
+    if min(share.size, rest.size) < _LEAST_PULLS:
+        return False
+    whole, other = float(np.median(share)), float(np.median(rest))
+    return _AS_USUAL[0] < whole < _AS_USUAL[1] and _AS_USUAL[0] * other < whole < _AS_USUAL[1] * other
 
 
 def _by_jumps(wheel: Wheel, jumps: int) -> float:

@@ -12,6 +12,7 @@ from diagnosis.response.inputs import cells
 from diagnosis.response.lasting_noise import quiet_level
 from diagnosis.response.machine import Judged
 from diagnosis.response.models import Beside, Blocks, held_long
+from diagnosis.response.pairs import anothers
 from diagnosis.response.spells import Spell
 from replay.faults import FaultMode
 
@@ -30,6 +31,7 @@ _TURNS = 0.05  # of the usual speed
 _ALSO_HELD = 0.05  # of the driving in which another wheel stays at one value for long: then it is a habit
 _WITHIN, _LONGER = 0.9, 2.0  # of a spell, and times its length: what lies so within another wheel's is its consequence
 _STEADIER = 1.3  # times the misfit beside one gain: the wheel whose gain is the steadier one is at fault
+_EXACT = 0.03  # by its size: a misfit beside one gain that is smaller says no more
 _SAME_ASKED, _MOSTLY, _CLOSE = 0.05, 0.5, 0.5  # of what is asked; of a spell; of the misfit beside the command
 _CLEARLY = 2.0  # times the misfit of another wheel beside its command: then it is clear whose fault it is
 
@@ -117,6 +119,11 @@ def others_fault(spell: Spell, wheel: str, judged: Mapping[str, Judged]) -> bool
                 if jumps[1]:
                     return True
                 continue
+            theirs = anothers(spell, one, s, j)
+            if theirs is not None:
+                if theirs:
+                    return True
+                continue
             if overlap >= _WITHIN * (spell.stop - spell.start) and s.stop - s.start > _LONGER * (
                 spell.stop - spell.start
             ):
@@ -196,7 +203,7 @@ def _off_a_share(one: Judged, spell: Spell) -> float:
         return 1.0
     made = x[known] * float(x[known] @ y[known]) / float(x[known] @ x[known])
     size = float(np.sqrt(np.mean(y[known] ** 2)))
-    return min(float(np.sqrt(np.mean((y[known] - made) ** 2))) / size, 1.0) if size > 0.0 else 1.0
+    return float(np.clip(np.sqrt(np.mean((y[known] - made) ** 2)) / size, _EXACT, 1.0)) if size > 0.0 else 1.0
 
 
 def _misfit_of(one: Judged, spell: Spell) -> float:

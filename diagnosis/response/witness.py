@@ -144,3 +144,29 @@ def denied(
         f"For {total:.1f} s {names} stood still together (longest {start * dt:.1f}–{stop * dt:.1f} s), while the {witness.name} shows that the "
         "machine went as it was told: what they have in common failed, such as their supply, a controller or a driver; no {wheel} is blamed for it.",
     )
+
+
+def witnessed(
+    ignored: Sequence[str],
+    witness: Witness,
+    idle: Sequence[tuple[int, int]],
+    drives: Sequence[FollowerData],
+    speeds: Sequence[BodySpeed],
+    steps: tuple[int, Limits, float],
+) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """What stays of *did not follow its commands*, and what is said of speeds that do not show it, one sentence each.
+
+    Parameters
+    ----------
+    ignored : Sequence[str]
+        What would be said of drives of which no answer to any command was found, judged or not.
+    witness, idle, drives, speeds
+        As for `denied` and `witness_of`.
+    steps : tuple[int, Limits, float]
+        Steps of a block, ``driving_speed``, step [s].
+    """
+    width, limits, dt = steps
+    wrong = tuple(ignored) if witness.mostly else ()
+    other = contradicted(speeds, drives, width, limits) if ignored and not wrong else ""
+    said = (other,) if other else denied(witness, idle, drives, wrong, dt)
+    return () if wrong or other else tuple(ignored), said

@@ -59,7 +59,11 @@ class FileRow(TypedDict):
 
 
 class LogRow(TypedDict):
-    """The recording."""
+    """The recording.
+
+    `path_note`: which source of positions stood still while others showed way, and was not used; `distance_note`: what the distance is from
+    where it is not from the wheels' speeds, and why.
+    """
 
     files: list[FileRow]
     start_ns: int
@@ -68,6 +72,8 @@ class LogRow(TypedDict):
     rate_hz: float
     samples_per_bucket: NotRequired[int]
     distance_m: float | None
+    distance_note: NotRequired[str]
+    path_note: NotRequired[str]
     driving_s: Seconds
 
 

@@ -18,7 +18,7 @@ from replay.setup.asked_columns import asked_columns, motions_of_body, where_com
 from replay.setup.by_the_body import radius_by_body
 from replay.setup.contradictions import in_turn_with_commands, units_by_positions
 from replay.setup.draft_notes import Draft
-from replay.setup.given import given_signals, odometry, table_sources
+from replay.setup.given import ask_about_odometry, given_signals, odometry, table_sources
 from replay.setup.lengths import largest_angle, limits_for, wheel_places, wheel_radius, with_speeds, without_size
 from replay.setup.motion import WheelMotion, backwards, wheel_motion
 from replay.setup.numbered_wheels import ask_for_numbers, ordered_by_turns
@@ -99,6 +99,7 @@ def draft_machine(logs: Sequence[RawLog], preset: Preset | None = None) -> Draft
         return _haulotte_draft(draft, logs)
     empty = unfilled(channels)
     given = given_signals(structure, {n: c for n, c in channels.items() if n not in empty}, logs)
+    ask_about_odometry(structure, channels, draft)
     for array in dict.fromkeys(empty.values()):
         draft.say("signals", f"Not used: {unfilled_note(array)}.")
     raw = replace(structure.machine(1.0), signals=given)

@@ -12,6 +12,7 @@ from replay.log.source_options import SignalSource, SourceOptions
 from replay.log.time_zone import NO_ZONE
 from replay.machine.geometry import own_axle
 from replay.setup.draft_notes import Draft
+from replay.setup.odometry_frame import along_the_ground
 from replay.setup.one_clock import Lag
 from replay.setup.structure import ONE, Structure
 from replay.signals.candidate import message_field, source_of
@@ -23,9 +24,25 @@ _JOINT_TYPES = ("JointState", "DynamicJointState")
 
 
 def odometry(channels: Mapping[str, Channel]) -> Channel | None:
-    """Speed of the body by odometry."""
+    """Speed of the body by odometry: of several topics not one whose speed is along an axis of the ground, nor one that is filtered."""
     found = [c for c in channels.values() if message_field(c) == "twist.twist.linear.x" and len(c.values) > 1]
-    return min(found, key=lambda c: ("filter" in c.topic, len(c.topic)), default=None)
+    return min(found, key=lambda c: (along_the_ground(c, channels), "filter" in c.topic, len(c.topic)), default=None)
+
+
+def ask_about_odometry(structure: Structure, channels: Mapping[str, Channel], draft: Draft) -> None:
+    """Ask for another speed of a drive as a whole, where the only one is along an axis of the ground."""
+    whole = odometry(channels)
+    if (
+        structure.wheels == ONE
+        and "odometry" in structure.how
+        and whole is not None
+        and along_the_ground(whole, channels)
+    ):
+        draft.ask(
+            "signals",
+            f"where is the speed along the machine? That of {whole.topic} is along an axis of the ground (x of its positions), whatever way the "
+            "machine heads; it is not the drive's, and what is said of it is wrong wherever the machine turns.",
+        )
 
 
 def given_signals(

@@ -16,7 +16,7 @@ N = 3000
 HOLD = slice(1000, 1250)
 
 
-def timeline(*held: str) -> Timeline:
+def timeline(*held: str, hold: slice = HOLD) -> Timeline:
     """Thirty seconds at 100 Hz of a drive's speed, effort and command, some of them held for 2.5 s."""
     rng = np.random.default_rng(1)
     signals = {
@@ -25,7 +25,7 @@ def timeline(*held: str) -> Timeline:
         "wheel.M.v_ref": np.repeat([2.0, 2.2, 1.9], N // 3),
     }
     for name in held:
-        signals[name][HOLD] = signals[name][HOLD.start]
+        signals[name][hold] = signals[name][hold.start]
     names = list(signals)
     fresh = {n: np.ones(N, np.bool_) for n in names}
     groups = {n: f"log.csv t wheel.{n.rsplit('.', 1)[-1]}" for n in names}
@@ -44,6 +44,14 @@ def test_rows_repeated_as_a_whole_are_no_data() -> None:
         assert np.isfinite(found.signals[name][HOLD.stop :]).all()
     assert "repeated the same values" in found.notes[0]
     assert "10.0–12.5 s" in found.notes[0]
+
+
+def test_a_single_time_is_no_habit_however_short_the_log_is() -> None:
+    long = slice(1000, 2200)
+    found = without_copied_rows(timeline("wheel.M.v", "wheel.M.u", hold=long))
+    assert np.isnan(found.signals["wheel.M.v"][long.start + 2 : long.stop - 200]).all()
+    most = timeline("wheel.M.v", "wheel.M.u", hold=slice(1000, 2700))
+    assert without_copied_rows(most) is most
 
 
 def test_a_speed_that_repeats_itself_alone_stays() -> None:

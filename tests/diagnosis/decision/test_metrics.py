@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from diagnosis.decision.metrics import body_motion, coverage, driving, loop_metrics, open_states, path_of, phases
+from diagnosis.decision.metrics import body_motion, coverage, driving, loop_metrics, open_states, phases
 from diagnosis.decision.short import AS_WELL_HEALTHY, main_reason
 from diagnosis.results.assessment import CODE, Assessment, Finding
 from diagnosis.results.result import Hypothesis
@@ -169,15 +169,6 @@ def test_body_motion_without_a_command_is_the_wheels_mean() -> None:
     assert_array_equal(omega, 0.0)
     commanded = replace(line, signals={**line.signals, "cmd.v": np.array([0.5, 0.5, 0.5])})
     assert_array_equal(body_motion(commanded, loop(line), MACHINE)[0], 0.5)
-
-
-def test_path_from_odometry_then_gnss() -> None:
-    odometry = timeline(odom__x=[0.0, 1.0], odom__y=[0.0, 2.0], gnss__lat=[61.0, 61.0], gnss__lon=[24.0, 24.0])
-    assert_array_equal(path_of(odometry)["path.y"], [0.0, 2.0])
-    gnss = path_of(timeline(gnss__lat=[np.nan, 61.0, 61.001], gnss__lon=[np.nan, 24.0, 24.001]))
-    assert_allclose(gnss["path.y"], [np.nan, 0.0, 111.195], atol=0.01)
-    assert_allclose(gnss["path.x"], [np.nan, 0.0, 111.195 * np.cos(np.radians(61))], atol=0.01)
-    assert path_of(timeline(wheel__A__v=[0.0])) == {}
 
 
 def test_a_drive_that_is_commanded_to_rest_is_not_asked_for_anything() -> None:

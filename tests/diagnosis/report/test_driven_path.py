@@ -22,7 +22,7 @@ SPEEDS = {f"wheel.{w}.v": 0.5 * ONE for w in GEOMETRY}
 
 
 def report(**changes: Any) -> dict[str, Any]:
-    return {"machine": MACHINE, "intervals": [], **changes}
+    return {"machine": MACHINE, "intervals": [], "log": {}, **changes}
 
 
 def test_logged_positions_come_first() -> None:
@@ -31,6 +31,16 @@ def test_logged_positions_come_first() -> None:
     assert path.x is logged["path.x"]
     assert path.words == "from GNSS, in metres"
     assert driven_path(report(), {**logged, "odom.x": ONE}, STEP).words == "from odometry, in metres"
+
+
+def test_what_was_left_out_is_told() -> None:
+    note = "Odometry stands still where GNSS shows 35 m of way, and is not used."
+    columns = {"odom.x": 0.0 * ONE, "odom.y": 0.0 * ONE, **SPEEDS, "cmd.omega": 0.1 * ONE}
+    left = report(log={"path_note": note})
+    assert driven_path(left, columns, STEP).words.endswith(f"no position was used. {note}")
+    assert note in driven_path(left, SPEEDS, STEP).words
+    columns |= {"path.x": ONE, "path.y": ONE, "gnss.lat": ONE}
+    assert driven_path(left, columns, STEP).words == f"from GNSS, in metres. {note}"
 
 
 @pytest.mark.parametrize(
@@ -61,7 +71,7 @@ def test_a_stuck_sensor_does_not_move_the_machine() -> None:
 
 
 def test_what_cannot_be_drawn_says_why() -> None:
-    for columns, words in (({}, "nor a wheel's speed"), (SPEEDS, "neither a yaw rate nor steering angles")):
+    for columns, words in (({}, "nor a wheel's speed"), (SPEEDS, "Neither a yaw rate nor steering angles")):
         path = driven_path(report(), columns, STEP)
         assert path.x is None
         assert words in path.words

@@ -84,3 +84,18 @@ def test_a_slow_machine_whose_speeds_contradict_the_receiver_did_not_ignore_its_
     seen = over_ground > 0.1
     assert any("went at" in e for e in j.unshown) is seen
     assert bool(j.events) is not seen
+
+
+@pytest.mark.parametrize("over_ground", [0.4, 0.01])
+def test_so_of_drives_that_were_judged_but_did_not_answer(over_ground: float) -> None:
+    """Their readings are of something else, and vary enough to be judged."""
+    measured, asked, body = speeds(8)
+    rng = np.random.default_rng(8)
+    slow = np.repeat(rng.uniform(0.0, 0.2, body.shape[0] // 100 + 1), 100)[: body.shape[0]]
+    measured = {w: slow + rng.normal(0.0, 0.005, slow.size) for w in measured}
+    asked = {w: np.full(c.size, 0.8) for w, c in asked.items()}
+    j = judged(measured, asked, body, receiver(np.full(body.shape[0], over_ground)))
+    seen = over_ground > 0.1
+    assert j.parts
+    assert any("went at" in e for e in j.unshown) is seen
+    assert bool(j.events) is not seen
