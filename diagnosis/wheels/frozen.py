@@ -15,7 +15,7 @@ from diagnosis.results.vocabulary import Tier
 from diagnosis.wheels.findings import WheelFindings
 from diagnosis.wheels.inputs import WheelsData
 from diagnosis.wheels.slowing import TURNS
-from diagnosis.wheels.unshown import as_shown, moves_on
+from diagnosis.wheels.unshown import as_shown, followed, moves_on
 from replay.faults import FaultMode, Side, State
 
 Array = NDArray[np.float64]
@@ -104,7 +104,7 @@ def with_frozen(data: WheelsData, found: Mapping[int, WheelFindings]) -> dict[in
     held = {i: frozen_of(data.y[:, i], data.span, data.dt) for i in found}
     out = {}
     for i, wheel in found.items():
-        own = [r for r in held[i] if moves_on(data, i, slice(r.start, r.stop)) and not _all_held(held, i, r)]
+        own = [r for r in held[i] if moves_on(data, i, followed(data, r.start, r.stop)) and not _all_held(held, i, r)]
         kept = [
             as_shown(data, i, f, wheel.findings)
             for f in wheel.findings

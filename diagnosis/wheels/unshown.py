@@ -106,7 +106,7 @@ def _off_before(data: WheelsData, i: int, f: Finding, told: Sequence[Finding]) -
 
 def _with_company(data: WheelsData, i: int, f: Finding) -> Finding:
     """A stuck sensor is less sure where nothing else moves either, and it reads what the others do."""
-    part = slice(f.start, max(f.start + 1, f.stop - round(_FOLLOWS_S / data.dt)))
+    part = followed(data, f.start, f.stop)
     others = np.delete(data.y[part], i, axis=1)
     own = data.y[part, i]
     if f.mode is not FaultMode.STUCK or not np.isfinite(own).any() or not np.isfinite(others).any():
@@ -147,6 +147,11 @@ def _rests(data: WheelsData, i: int, part: slice) -> bool:
     opening = opening[np.isfinite(opening)]
     shut = opening.size > 0 and float(np.quantile(opening, _STANDING)) <= _SHUT
     return bool(stands and shut and abs(float(np.nanmedian(data.y[part, i]))) > TURNS * data.span)
+
+
+def followed(data: WheelsData, start: int, stop: int) -> slice:
+    """Of samples [start, stop), those whose valve's doings a healthy wheel shows before they end."""
+    return slice(start, max(start + 1, stop - round(_FOLLOWS_S / data.dt)))
 
 
 def moves_on(data: WheelsData, i: int, part: slice) -> bool:
