@@ -53,6 +53,8 @@ def require_use(files: Sequence[ReadFile], signals: Signals) -> None:
 
     Raises
     ------
+    NoLog
+        Where tables that hold no signal are no machine's log.
     LogError
         With the columns of tables that hold no signal, or the file that adds none.
     """

@@ -112,8 +112,17 @@ def check(
         terminal.note(f"to be checked: {doubt}")
     count = len(machine.signals)
     still = open_questions(file)
-    open_ = f" {still} of its comments are questions; remove each when it is answered." if still else ""
+    open_ = _still_asked(still)
     terminal.show(f"{file}: valid. {machine.name}, wheels {', '.join(machine.wheels)}, {count} signals given.{open_}")
+
+
+def _still_asked(questions: int) -> str:
+    """How many of a machine file's comments are questions, a sentence after others; empty where none is."""
+    if not questions:
+        return ""
+    if questions == 1:
+        return " One of its comments is a question; remove it when it is answered."
+    return f" {questions} of its comments are questions; remove each when it is answered."
 
 
 def _contradictions(signals: Signals, machine: Machine) -> tuple[tuple[str, ...], tuple[str, ...]]:

@@ -92,6 +92,8 @@ def _wheel_sensor(has: set[str], speeds: int, words: MachineWords, commanded: bo
             return False, "only a speed that is frozen, wild or noisy shows: no command is logged", ("cmd.v", *more)
         if words.drive == "valve":
             more = ("wheel.<W>.u", *more)
+        if not commanded:
+            return False, "what departs from the other {wheels} shows: no command is logged", ("cmd.v", *more)
         return (
             False,
             "what departs from the commanded speed or from the other {wheels} shows, a standstill as a fault of either side",
