@@ -10,7 +10,10 @@ from replay.arrays.compiling import njit
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def quantise(y: NDArray[np.float64], huge: float, step: float, base: float, out: NDArray[np.int32]) -> None:
-    """Write the level of each value, both of shape (n,): round(y/step) − base; 0 where it is NaN or not below `huge`."""
+    """Write the level of each value, both of shape (n,): round(y/step) − base [1]; 0 where it is NaN or not below `huge`.
+
+    `huge`, `step` in the unit of `y`, `base` in steps.
+    """
     for i in range(y.size):
         x = y[i] if abs(y[i]) < huge else base * step
         out[i] = np.int32(np.rint(x / step) - base)
