@@ -17,6 +17,7 @@ from diagnosis.direct.low_speed import without_low_speed_habit
 from diagnosis.direct.second_is_off import without_second_speeds_own
 from diagnosis.direct.small_deviations import without_small_deviations
 from diagnosis.direct.stays import without_stays
+from diagnosis.direct.switching import without_switching
 from diagnosis.direct.uncertainty import most_noise_of_kind, usual_of_kind
 from diagnosis.estimation.lag import low_passed
 from diagnosis.evidence import ACTUATOR, SENSOR, Array, Contribution, Flags, MissionView, Part
@@ -65,7 +66,7 @@ class DirectEvidence:
         told = without_second_speeds_own(sensors, told, _openings(mission))
         valves = {wheel: found for (wheel, side), found in identified.items() if side == ACTUATOR}
         small = without_small_deviations(valves, {wheel: parts[wheel, ACTUATOR] for wheel in valves})
-        own = without_stays(valves, small)
+        own = without_switching(valves, without_stays(valves, small))
         parts |= {(wheel, SENSOR): a for wheel, a in told.items()} | {(wheel, ACTUATOR): a for wheel, a in own.items()}
         return Contribution(parts)
 
