@@ -18,12 +18,8 @@ from replay.faults import FaultMode
 
 _SPIKES, _OUTLIER, _EXPLAINED = 0.15, 6.0, 0.8  # of the samples; times the usual deviation; of the power
 _ALIKE, _VALVES = 2.0, 2  # times as large at most; so many
-_BRIEF_S, _LATEST_S, _STEP_S, _LEAVES = (
-    3.0,
-    0.3,
-    0.02,
-    0.5,
-)  # of noise; of a motion; of the root mean square, which lateness leaves
+_BRIEF_S, _LATEST_S, _STEP_S = 3.0, 0.3, 0.02  # of noise; of a motion; from trial to trial
+_LEAVES = 0.7  # of the root mean square, which lateness leaves: 0.85 and more of true noise (six machines, tuning)
 
 
 def without_switching(
