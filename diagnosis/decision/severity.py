@@ -25,6 +25,7 @@ from replay.machine.config import Limits
 _LIKELY = 0.6  # probability of any fault from which on one is worth a check
 _MARKED_EPSILON = 0.3
 _SHORT_NOISE_S = 1.0
+_MOMENT_S = 0.15  # of which a row must be likely, to be worth a check
 _CERTAIN = 0.99  # probability of any fault from which on even brief noise is worth a check
 _LOST = 0.9  # ε̂ from which on so little is left that the part is as good as without signal
 _EVEN = 0.5  # that a part delivers nothing usable, from which on that is what is said
@@ -46,6 +47,11 @@ def severity_of(
     if brief and (finding.tier is Tier.MODEL or faulty < _CERTAIN):
         by = ", and shown by a model alone" if finding.tier is Tier.MODEL else ", and not certain"
         return Severity.INFO, f"Too short to act on{by}. Compare with the next mission."
+    if seconds < _MOMENT_S and finding.probability < _LIKELY:
+        return (
+            Severity.INFO,
+            "A moment, of a kind that is not clear: too little to act on. Compare with the next mission.",
+        )
     total = finding.mode.total or risk_of(finding) >= _MAY_BE_TOTAL
     halved = halved_words(finding.side, finding.mode, finding.epsilon)
     if faulty < limits.min_probability:

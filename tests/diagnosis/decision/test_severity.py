@@ -174,3 +174,12 @@ def test_a_brief_sensor_fault_of_unclear_kind_waits_for_the_next_service(seconds
     rows = tuple(Hypothesis("sensor", mode, 0.48) for mode in ("stuck", "inefficient"))
     stuck = replace(finding(Side.SENSOR, FaultMode.STUCK, p=0.48), hypotheses=rows, epsilon=Epsilon(1.0, 0.01, 1.0))
     assert severity_of(stuck, seconds, LIMITS, HYDRAULIC)[0] == expected
+
+
+@pytest.mark.parametrize(("seconds", "expected"), [(0.14, "info"), (0.15, "medium")])
+def test_a_moment_of_a_kind_that_is_not_clear_is_a_remark(seconds: float, expected: str) -> None:
+    """A valve that is stuck for a moment, surely, still stops the machine."""
+    rows = tuple(Hypothesis("actuator", mode, 0.48) for mode in (FaultMode.STUCK.value, FaultMode.OUTSIDE_TABLE.value))
+    unclear = replace(finding(Side.ACTUATOR, FaultMode.OUTSIDE_TABLE, epsilon=-0.5), probability=0.48, hypotheses=rows)
+    assert severity_of(unclear, seconds, LIMITS, HYDRAULIC)[0] == expected
+    assert severity_of(finding(Side.ACTUATOR, FaultMode.STUCK), seconds, LIMITS, HYDRAULIC)[0] == "high"
