@@ -72,6 +72,7 @@ def fault_of_wheel(check: Checked, cells: Cells, *, alone: bool) -> Finding | No
     used = np.where(np.isfinite(opening), opening, command)
     responses = responses_of(cells, speed, used, cells.reference, over_time=False)
     beside = responses.beside[:, cells.machine.wheels.index(check.component)]
+    beside = np.where(np.isfinite(beside), beside, np.nan)  # beside wheels that all stand there is no share
     lost, gained = (float(np.nansum(np.maximum(x - check.limit, 0.0))) for x in (-beside, beside))
     below = lost >= gained
     shown = _Shown(cells.frame, -beside if below else beside)

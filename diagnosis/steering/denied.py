@@ -40,6 +40,8 @@ _HABIT_S, _OFTEN, _HABIT = 1.0, 3, 0.4  # pauses no longer than this, more than 
 _LASTS = 0.99  # a share that says nothing of a finding's length
 _PAUSE = "As brief as this, it may be a reading that did not change, or what the model leaves out, which makes it less probable."
 _BURST = "Noise as brief as this may be what the model leaves out of a motion, which makes it less probable."
+_ENDS = "It stays at the largest angle of the mission, which it came to step by step: the axle may be at its end stop."
+_APPROACH_S, _STEP = 0.5, 0.02  # before a stay, and how far the angle is then from where it stays, at most [of it]
 _UNSEEN = "Where no opening is logged, a disturbance of the {valve} looks like what the model leaves out, which makes it less probable."
 
 
@@ -72,6 +74,7 @@ def not_denied(
             or (f.mode.total and _trembles(f, inputs))
         ]
         kept = tuple(f for f in sensor.findings if f not in denied)
+        kept = tuple(limited(f, _HABIT, _ENDS) if _ends_at_stop(f, inputs, max_steer) else f for f in kept)
         out[Side.SENSOR] = SideFindings(kept, (*sensor.unexplained, *(_span(f, blocks) for f in denied)))
     valve = _asked(valve, inputs, blocks)
     valve = valve._replace(findings=tuple(f for f in valve.findings if not between_readings(f, inputs)))
@@ -141,6 +144,22 @@ def _trembles(finding: Finding, inputs: AxleInputs) -> bool:
     known = np.isfinite(inputs.angle[part])
     y = inputs.angle[part][known & inputs.fresh[part]]
     return bool(y.size > 1 and np.mean(known) > _READ and np.mean(np.diff(y) != 0.0) > _RESTLESS)
+
+
+def _ends_at_stop(f: Finding, inputs: AxleInputs, max_steer: float) -> bool:
+    """Whether an angle that seems stuck came to the mission's largest one by and by, as an axle that runs against its end stop."""
+    if f.mode is not FaultMode.STUCK or f.side is not Side.SENSOR:
+        return False
+    y, before = inputs.angle, round(_APPROACH_S / inputs.timeline.dt)
+    inside, lead = y[f.start : f.stop], y[max(0, f.start - before) : f.start]
+    inside, lead = inside[np.isfinite(inside)], lead[np.isfinite(lead)]
+    if not inside.size or not lead.size:
+        return False
+    level = float(np.median(inside))
+    largest = float(np.nanmax(np.sign(level) * y))
+    moving = abs(lead[0] - level) > 0.0 and bool(np.all(np.sign(level) * np.diff(lead) >= -_STEP * abs(level)))
+    ends = abs(level) >= max(_AT_END * largest, _REACHED * max_steer)
+    return ends and moving and abs(lead[-1] - level) <= _STEP * abs(level)
 
 
 def _denies(a: int, b: int, blocks: SteeringBlocks, max_steer: float) -> bool:

@@ -164,3 +164,12 @@ def test_a_wheel_whose_speed_per_opening_no_window_shows_has_no_fault_of_a_size(
     deaf = replace(cells, timeline=replace(cells.timeline, signals=still), _kept={})
     check = Checked(Kind.WHEEL, "FR", Side.SENSOR_OR_ACTUATOR, Check.RESPONSE, 1.0, 0.2)
     assert fault_of_wheel(check, deaf, alone=False) is None
+
+
+def test_a_wheel_beside_others_that_all_stand_has_no_share_of_their_speed() -> None:
+    """Their speed per opening is 0, and nothing is a multiple of that."""
+    cells = in_cells(simulated(), base=True)
+    others = {f"wheel.{w}.v": np.zeros(cells.timeline.size) for w in cells.machine.wheels[1:]}
+    standing = replace(cells.timeline, signals={**cells.timeline.signals, **others})
+    check = Checked(Kind.WHEEL, cells.machine.wheels[0], Side.SENSOR_OR_ACTUATOR, Check.EXCESS, 3.0, 0.2)
+    assert fault_of_wheel(check, replace(cells, timeline=standing, _kept={}), alone=True) is None

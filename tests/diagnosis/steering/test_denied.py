@@ -154,3 +154,23 @@ def test_many_brief_pauses_of_a_reading_are_its_habit() -> None:
         )
         assert all(f.probability <= most for f in out[Side.SENSOR].findings)
         assert len(out[Side.SENSOR].findings) == len(pauses)
+
+
+@pytest.mark.parametrize(("runs", "largest", "kept"), [(True, 0.5, 0.4), (False, 0.5, 0.99), (True, 0.7, 0.99)])
+def test_an_angle_that_runs_to_the_largest_of_the_mission_may_be_at_its_end_stop(
+    runs: bool, largest: float, kept: float
+) -> None:
+    """One that is held where it was, or elsewhere, is stuck."""
+    reading = np.full(SIZE, 0.1)
+    reading[900:1000] = np.linspace(0.1, 0.5, 100) if runs else 0.5
+    reading[1000:2000] = 0.5
+    reading[3000:3100] = largest
+    reading[2000:] = np.where(reading[2000:] == largest, largest, 0.0)
+    if not runs:
+        reading[900:1000] = 0.45 + 0.05 * np.sin(np.arange(100))
+    stuck = replace(
+        noise(Side.SENSOR).findings[0], mode=FaultMode.STUCK, hypotheses=(Hypothesis("sensor", "stuck", 0.99),)
+    )
+    claimed = {Side.SENSOR: SideFindings((stuck,), ()), Side.ACTUATOR: NOTHING}
+    (told,) = not_denied(claimed, inputs(reading=reading), axle(None), MOST)[Side.SENSOR].findings
+    assert told.probability == pytest.approx(kept)
