@@ -14,7 +14,7 @@ from diagnosis.clearing.checks import cells_of, checks_of
 from diagnosis.clearing.detectable import detectable
 from diagnosis.clearing.mapping import Hint, mapping_hints
 from diagnosis.decision import metrics, quality
-from diagnosis.decision.caveats import more_caveats
+from diagnosis.decision.caveats import more_caveats, without_speed
 from diagnosis.decision.decide import Decision, decide
 from diagnosis.decision.intervals import intervals_of, spans_of
 from diagnosis.decision.missing import is_commanded
@@ -37,6 +37,7 @@ from replay.setup.places import place_doubts
 from replay.version import __version__
 
 _CUT_S = 0.5  # of a log, not judged
+_EMPTY_S = 10.0  # without any speed of a wheel: a fault may have come and gone
 _MISSING = 0.2  # of a mission, in which a part of the steering may have no data
 
 
@@ -210,6 +211,9 @@ def _scope(judged: Judged) -> tuple[Cut, ...]:
         many = len(left_out) > 1
         text = f"the {machine.part}{'s' if many else ''} {', '.join(left_out)} {'were' if many else 'was'} not judged"
         out.append(Cut(CutKind.WHEELS, tuple(left_out), text))
+    if more := judged.mission.signals.other_wheels:
+        text = f"the log names {len(more)} more {machine.part}s than this machine has ({', '.join(more)}), which were not judged"
+        out.append(Cut(CutKind.OTHERS, (), text))
     unjudged = [axle for axle in machine.axles if _unjudged(judged.found, axle)]
     if unjudged:
         names = join_words([axle.removesuffix("_steer") for axle in unjudged])
@@ -224,6 +228,11 @@ def _scope(judged: Judged) -> tuple[Cut, ...]:
         for axle in machine.axles
         if not _unjudged(judged.found, axle) and (missing := _without_data(judged.found, axle)) > _MISSING * line.size
     ]
+    empty, whole_s = without_speed(line, machine), line.size * line.dt
+    if empty > min(_MISSING * whole_s, _EMPTY_S):
+        out.append(
+            Cut(CutKind.DATA, (), f"for {empty:.1f} s of {whole_s:.1f} s no speed of any {machine.part} was recorded")
+        )
     cut = (line.start_ns - judged.recorded.first_ns) * 1e-9
     rest = (judged.recorded.last_ns - line.start_ns) * 1e-9 - line.size * line.dt
     if max(cut, rest) > _CUT_S:

@@ -25,6 +25,7 @@ from replay.readers.registry import read_log, summarise_log
 from replay.signals.file_names import named_channels
 from replay.signals.mapping import NO_CHANNEL, map_signals, plan_topics
 from replay.signals.near_misses import near_misses
+from replay.signals.other_wheels import other_wheels
 from replay.signals.rules import candidates
 from replay.signals.signal import Signals
 from replay.signals.timeline import Timeline, align, check_overlap
@@ -148,7 +149,9 @@ def read_signals(
         for i, file in enumerate(files)
     )
     missing = near_misses(signals.missing, [file.summary for file in files], NO_CHANNEL)
-    return dated, replace(signals, missing=missing, notes=notes, open_loop=bool(marked))
+    every = {name: channel for channels in named_channels(logs) for name, channel in channels.items()}
+    more = other_wheels(every, machine)
+    return dated, replace(signals, missing=missing, notes=notes, open_loop=bool(marked), other_wheels=more)
 
 
 def _joined(file: MissionFile) -> MissionFile:

@@ -47,6 +47,9 @@ _LOOK = (
 )
 
 
+_ALL, _ONE_FACTOR = 3, 0.15  # signals that differ by one factor, and by how much it may differ [ln]
+
+
 class Hint(NamedTuple):
     """A signal that fits another sign, unit or place better.
 
@@ -134,6 +137,8 @@ def _hints(
     pairs = {i: pair for i in rest if len((pair := _moving(signals[:, i], follows[:, i]))[0]) * cells.dt >= _LEAST_S}
     ratios = {i: _ratio(*pair) for i, pair in pairs.items()}
     usual = float(np.median([r for r in ratios.values() if np.isfinite(r)] or [0.0]))
+    known = [r for r in ratios.values() if np.isfinite(r)]
+    all_alike = len(known) >= _ALL and len(known) == len(names) and float(np.ptp(known)) < _ONE_FACTOR
     for i, (y, x) in pairs.items():
         if _against(y, x):
             text = f"{names[i]} runs against {what} throughout: {_LOOK}"
@@ -141,7 +146,10 @@ def _hints(
         elif sizes and (
             words := _factor(ratios[i] - (usual if abs(usual) < _TRACKS else 0.0), cells.machine.gear_ratio)
         ):
-            yield Hint(_part(names[i]), backwards=False, text=f"{names[i]} is {words} {what} throughout: {_LOOK}")
+            # one factor of all of them is a unit's or a size's, and no part's fault
+            own = (_part(names[i]),) if all_alike else ()
+            text = f"{names[i]} is {words} {what} throughout: {_LOOK}"
+            yield Hint(_part(names[i]), backwards=False, text=text, exchanged=own)
 
 
 def _moving(y: Array, x: Array) -> tuple[Array, Array]:

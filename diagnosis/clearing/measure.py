@@ -25,6 +25,8 @@ _LOSSES = (Check.RESPONSE, Check.LASTING_RESPONSE, Check.CHANGE, Check.RATE, Che
 def lowest_passed(x: Array, dt: float, lag_s: float) -> Array:
     """Columns behind a lag of first order, shape as x; gaps are bridged. In the unit of x; `dt` and `lag_s` in s."""
     columns = x[:, np.newaxis] if x.ndim == 1 else x
+    if not columns.shape[1]:
+        return x
     passed = [low_passed(np.append(column, 0.0), lag_s, dt)[1:] for column in columns.T]
     return np.column_stack(passed).reshape(x.shape)
 

@@ -266,7 +266,7 @@ def more_caveats(mission: Mission, first_ns: int, machine: Machine) -> list[str]
             "Faults were injected into this recording. Its controller did not react to them, so evidence from the closed "
             "loop and from controller consistency is not used."
         )
-    empty = _without_speed(mission.timeline, machine)
+    empty = without_speed(mission.timeline, machine)
     if empty > _EMPTY_S:
         out.append(f"No speed of any {machine.part} was recorded for {empty:.1f} s. That time is not assessed.")
     absent = [name for name in machine.signals if name not in mission.signals.items]
@@ -307,8 +307,8 @@ def _alike(names: Sequence[str]) -> list[str]:
     ]
 
 
-def _without_speed(timeline: Timeline, machine: Machine) -> float:
-    """Time in which no wheel speed is valid [s]."""
+def without_speed(timeline: Timeline, machine: Machine) -> float:
+    """Time in which no wheel speed is valid [s]; `timeline` and `machine` as of the mission."""
     names = [f"wheel.{w}.{x}" for w in machine.wheels for x in ("v", "v_true")]
     speeds = [timeline.signals[n] for n in names if n in timeline.signals]
     steps = sum(

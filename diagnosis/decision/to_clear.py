@@ -114,7 +114,18 @@ def to_clear(
                 "diagnose the whole log, with every part (no --start, --end, --wheel)",
             )
         )
-    gaps = [cut for cut in against.scope if cut.kind is CutKind.DATA]
+    others = [cut.text for cut in against.scope if cut.kind is CutKind.OTHERS]
+    if others:
+        out.append(
+            ToClear(
+                f"{_sentence(join_words(others))}.",
+                "write a machine file from this log (`mfhca config init --log LOG -o machine.toml`), and diagnose with it",
+            )
+        )
+    empty = [cut.text for cut in against.scope if cut.kind is CutKind.DATA and not cut.components]
+    if empty:
+        out.append(ToClear(f"{_sentence(join_words(empty))}.", "record another mission, without gaps"))
+    gaps = [cut for cut in against.scope if cut.kind is CutKind.DATA and cut.components]
     if gaps:
         out.append(
             ToClear(

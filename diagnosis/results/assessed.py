@@ -18,6 +18,8 @@ class CutKind(StrEnum):
     LOG = "log"
     #: Wheels or joints were left out.
     WHEELS = "wheels"
+    #: The log names wheels or joints that the machine does not have.
+    OTHERS = "others"
     #: Nothing judged the steering of axles.
     STEERING = "steering"
     #: The steering of an axle has no data for some time.

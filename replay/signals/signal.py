@@ -76,6 +76,8 @@ class Signals:
         before they are answered.
     open_loop : bool
         Whether faults were written into the recording, so that its controller never met them.
+    other_wheels : tuple[str, ...]
+        Wheels that the log names and the machine does not have.
     store : ColumnStore
         Where long columns stand.
     """
@@ -85,6 +87,7 @@ class Signals:
     notes: tuple[str, ...] = ()
     questions: tuple[str, ...] = ()
     open_loop: bool = False
+    other_wheels: tuple[str, ...] = ()
     store: ColumnStore = field(default_factory=ColumnStore, repr=False, compare=False)
 
     @property

@@ -109,3 +109,18 @@ def test_a_reading_that_stays_where_it_is_runs_against_nothing(value: float) -> 
     asked = mission.columns["steer.front.phi_ref"]
     columns = {**mission.columns, "steer.front.phi": np.full(asked.size, value), "steer.front.phi_ref": np.abs(asked)}
     assert not [h for h in mapping_hints(in_cells(replace(mission, columns=columns), base=True)) if h.backwards]
+
+
+def test_one_factor_of_all_wheels_is_no_fault_of_any() -> None:
+    """A wheel's size or a unit that is wrong ten times: four speed sensors were to be replaced."""
+    mission = simulated()
+    wrong = {f"wheel.{w}.v": 0.09 * mission.columns[f"wheel.{w}.v"] for w in haulotte().wheels}
+    edited = replace(mission, columns={**mission.columns, **wrong})
+    hints = mapping_hints(in_cells(edited, base=True))
+    assert {h.exchanged for h in hints} == {(w,) for w in haulotte().wheels}
+    report = diagnose_signals(signals_of(edited, base=True), haulotte()).report
+    assert report["verdict"]["title"] == "The machine's settings do not fit the log"
+    assert not [f for f in report["intervals"] if f["severity"] != "info" and f["component"] in haulotte().wheels]
+    one = {"wheel.FR.v": wrong["wheel.FR.v"]}
+    alone = mapping_hints(in_cells(replace(mission, columns={**mission.columns, **one}), base=True))
+    assert [h.exchanged for h in alone if h.component == "FR"] == [()]

@@ -143,3 +143,9 @@ def test_an_axle_that_rests_now_and_then_has_a_fault() -> None:
 
 def test_an_axle_that_never_turns_has_a_fault() -> None:
     assert not opens_late(steering(np.zeros(SIZE), _command()), 0)
+
+
+def test_a_machine_without_steered_axles_may_stall_as_well() -> None:
+    cells = replace(driving(), machine=replace(MACHINE, geometry=None), _kept={})
+    assert cells.machine.axles == ()
+    assert supply_gone(cells) is not None
