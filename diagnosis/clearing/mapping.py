@@ -62,7 +62,8 @@ class Hint(NamedTuple):
     text : str
         A sentence.
     exchanged : tuple[str, ...]
-        Parts whose measured openings follow each other's commands: nothing that is found of them is theirs.
+        Parts whose measured openings follow each other's commands, or whose signal is off by the factor of all: nothing that is found of them
+        is theirs.
     """
 
     component: str
