@@ -26,8 +26,10 @@ from diagnosis.clearing.contradicted import without_contradicted
 from diagnosis.clearing.nothing_moves import supply_gone
 from diagnosis.clearing.standing_out import what_stands_out, with_findings, without_explained, without_followers
 from diagnosis.decision import quality
+from diagnosis.decision.changing_rows import with_chains_as_one
 from diagnosis.decision.episodes import with_episodes
 from diagnosis.decision.second_onsets import with_second_onsets
+from diagnosis.decision.valve_noise import with_doubted_noise
 from diagnosis.decision.way import path_of
 from diagnosis.recording_rows import machine_row
 from diagnosis.report_document import Judged, report_of_mission
@@ -202,7 +204,8 @@ def _outside_gaps(found: ComponentResult, timeline: Timeline) -> ComponentResult
     gaps = recording_gaps(timeline)
     told = with_silent_sensors(found.assessments, timeline)
     seen = {key: without_gaps(a, gaps, timeline) for key, a in told.items()}
-    joined = with_episodes(seen, timeline.dt)
+    joined = with_doubted_noise(with_episodes(seen, timeline.dt), timeline.dt)
+    joined = with_chains_as_one(joined, timeline.dt)
     return replace(found, assessments=with_second_onsets(joined, timeline.dt))
 
 

@@ -210,8 +210,12 @@ def _slope(x: Array, y: Array) -> float | None:
 
 
 def _tick(runs: _Runs) -> float:
-    """Step on which the inverse of the held values lies; 0 where most parts of the mission show none."""
+    """Step on which the inverse of the held values lies; 0 where most parts of the mission show none.
+
+    Only of the faster half of the values: their own rounding blurs the inverse of a slow one.
+    """
     held = np.abs(runs.value[(runs.length > 1) & (runs.value != 0.0)])
+    held = held[held >= np.median(held)] if held.size else held
     parts = np.array_split(held, max(1, held.size // _TICK_RUNS))
     some = np.linspace(0, len(parts) - 1, min(len(parts), _TICK_PARTS)).round().astype(np.intp)
     steps = np.array([rounding_step(1.0 / parts[k]) for k in some])
