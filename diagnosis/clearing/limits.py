@@ -24,6 +24,9 @@ _LEAST_BEHIND, _LEAST_CHANGED_BEHIND = 0.288, 0.16
 _LEAST_LASTING = 0.13  # the same over the mission, of what is measured twice on either side
 #: A deviation counts from so many times the largest of the other wheels' on, a change likewise.
 _ALONE, _CHANGED_ALONE = 3.0, 2.2
+#: The same over the mission of what is measured once: of 112 healthy logs (14 machines, tuning) one wheel was above it, of a machine not cleared.
+_LASTING_ALONE = 5.0
+_STRICT = 0.3  # loss that counts, from which on a machine file asks for no more than that
 #: Limits of speed per opening below and above the other wheels', in windows and over the mission, as multiples of the loss
 #: that counts, by whether opening and speed are measured twice. What measurements judge need not be judged by its likeness to
 #: others as strictly, but what lies behind a drive neither of them judges; what reads too much is in no row of the tables, so that
@@ -123,8 +126,8 @@ def _beside_others(
         )
         if not all(both):
             limit = limit._replace(above=alone(most[1], i, limit.above, seen, _ALONE))
-        if any(both):
-            lasting = alone(below, i, limit.lasting_below, _LEAST_LASTING, _ALONE)
-            limit = limit._replace(lasting_below=lasting)
+        least, times = (_LEAST_LASTING, _ALONE) if any(both) else (_LEAST_SEEN, _LASTING_ALONE)
+        if any(both) or clear_at <= _STRICT:
+            limit = limit._replace(lasting_below=alone(below, i, limit.lasting_below, least, times))
         out.append(limit)
     return out

@@ -138,7 +138,7 @@ def _alone(checks: Sequence[Checked], cells: Cells) -> Checked | None:
     worst: dict[str, Checked] = {}
     twice = dict(zip(cells.machine.wheels, measured_twice(cells), strict=True))
     for check in checks:
-        if check.kind is Kind.WHEEL and check.check in _BESIDE_OTHERS and check.worst is not None:
+        if check.kind is Kind.WHEEL and check.check in _BESIDE_OTHERS and _known(check):
             c = _by_usual_limit(check, usual_limits(twice[check.component], cells.machine.limits.clear_at))
             worst[c.component] = max(worst.get(c.component, c), c, key=_times)
     if len(worst) < _WHEELS or not speeds_follow_openings(cells):
@@ -148,6 +148,11 @@ def _alone(checks: Sequence[Checked], cells: Cells) -> Checked | None:
         _FAR, _ALONE * _times(second)
     )
     return first if alone else None
+
+
+def _known(check: Checked) -> bool:
+    """Whether it is known by how much a wheel deviates: beside wheels that all stand there is no share."""
+    return check.worst is not None and np.isfinite(check.worst)
 
 
 def without_followers(

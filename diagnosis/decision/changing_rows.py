@@ -72,9 +72,7 @@ def _one(chain: Sequence[Finding], dt: float) -> Finding | None:
     pieces = "; ".join(f"{_name(f.mode)} {f.start * dt:.1f}–{f.stop * dt:.1f} s" for f in chain[:_NAMED])
     more = f" and {len(chain) - _NAMED} more" if len(chain) > _NAMED else ""
     longest = max(chain, key=lambda f: f.stop - f.start)
-    said = (
-        f"{len(chain)} pieces that touch look like {_count(chain)} rows in turn ({pieces}{more}): rather one fault that none of them describes."
-    )
+    said = f"{len(chain)} pieces that touch look like {_count(chain)} rows in turn ({pieces}{more}): rather one fault that none of them describes."
     return replace(
         longest,
         start=chain[0].start,

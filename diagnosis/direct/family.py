@@ -14,6 +14,7 @@ from diagnosis.direct.at_once import without_shared_moments
 from diagnosis.direct.identification import IdentifiedPair, identify, usual_spread
 from diagnosis.direct.inputs import Pair, make_pair
 from diagnosis.direct.low_speed import without_low_speed_habit
+from diagnosis.direct.one_value import with_frozen_readings
 from diagnosis.direct.second_is_off import without_second_speeds_own
 from diagnosis.direct.small_deviations import without_small_deviations
 from diagnosis.direct.stays import without_stays
@@ -64,6 +65,7 @@ class DirectEvidence:
         told = without_low_speed_habit(sensors, {wheel: parts[wheel, SENSOR] for wheel in sensors})
         told = without_shared_moments(sensors, told)
         told = without_second_speeds_own(sensors, told, _openings(mission))
+        told = with_frozen_readings(sensors, told)
         valves = {wheel: found for (wheel, side), found in identified.items() if side == ACTUATOR}
         small = without_small_deviations(valves, {wheel: parts[wheel, ACTUATOR] for wheel in valves})
         own = without_switching(valves, without_stays(valves, small))

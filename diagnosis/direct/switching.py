@@ -1,4 +1,4 @@
-"""How valves switch is no noise of one of them: spikes of as large a size on several valves, and a brief motion that comes late.
+"""How valves switch is no noise of one of them: spikes of as large a size on several valves, or at one opening, and a motion that comes late.
 
 A bank of on/off valves that open and close unequally fast passes through another opening from one step to the next, for some milliseconds,
 and one that shuts before it reverses is late then.
@@ -19,13 +19,18 @@ from replay.faults import FaultMode
 _SPIKES, _OUTLIER, _EXPLAINED = 0.15, 6.0, 0.8  # of the samples; times the usual deviation; of the power
 _ALIKE, _VALVES = 2.0, 2  # times as large at most; so many
 _BRIEF_S, _LATEST_S, _STEP_S = 3.0, 0.3, 0.02  # of noise; of a motion; from trial to trial
+_ONE, _PART, _MOMENT_S = (
+    0.02,
+    0.5,
+    1.0,
+)  # of full opening; of the time, that its command is there; shorter findings need not show that
 _LEAVES = 0.7  # of the root mean square, which lateness leaves: 0.85 and more of true noise (six machines, tuning)
 
 
 def without_switching(
     found: Mapping[str, IdentifiedPair], assessments: Mapping[str, Assessment]
 ) -> dict[str, Assessment]:
-    """Assessments of valves without brief noise that is a late motion, and noise of few spikes where several valves have such of about one size.
+    """Assessments of valves without brief noise that is a late motion, and noise of few spikes that several valves have of about one size, or that come at one opening.
 
     Parameters
     ----------
@@ -49,7 +54,9 @@ def without_switching(
         return len(alike) >= _VALVES
 
     return {
-        w: left_open(a, [f for f in a.findings if shared(w, f) or _is_late(found[w], f)])
+        w: left_open(
+            a, [f for f in a.findings if shared(w, f) or _is_late(found[w], f) or _at_one_opening(found[w], f)]
+        )
         for w, a in assessments.items()
     }
 
@@ -69,6 +76,26 @@ def _is_late(one: IdentifiedPair, f: Finding) -> bool:
         off = (y[part] - x[part - late])[use]
         left.append(float(np.mean(off * off)) if off.size else np.inf)
     return len(left) > 1 and min(left[1:]) < _LEAVES**2 * left[0]
+
+
+def _at_one_opening(one: IdentifiedPair, f: Finding) -> bool:
+    """Whether all spikes of a position's noise, of one size, come while its command passes one opening, at which its valves take turns."""
+    y, x, status, *_ = one.samples.part(f.start, f.stop)
+    use = (status == PAIR) & np.isfinite(y) & np.isfinite(x)
+    if f.mode is not FaultMode.NOISY or not use.any():
+        return False
+    off, asked = (y - x)[use], x[use]
+    centred = off - np.median(off)
+    spikes = np.abs(centred) > max(_OUTLIER * 1.4826 * float(np.median(np.abs(centred))), 1e-9)
+    if not spikes.any():
+        return False
+    explained = float(np.sum(centred[spikes] ** 2)) > _EXPLAINED * float(np.sum(centred**2))
+    sizes = np.abs(centred[spikes])
+    if not explained or float(np.max(sizes)) > _ALIKE * float(np.min(sizes)):
+        return False
+    low, high = (float(z) for z in (np.min(asked[spikes]), np.max(asked[spikes])))
+    there = float(np.mean((asked >= low) & (asked <= high)))
+    return high - low <= _ONE * one.pair.span and (there <= _PART or (f.stop - f.start) * one.pair.dt < _MOMENT_S)
 
 
 def _spikes(one: IdentifiedPair, f: Finding) -> float | None:

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from diagnosis.channels.one_value import TURNS
 from diagnosis.results.assessment import Finding
 from diagnosis.results.limited import limited
 from diagnosis.results.result import Hypothesis
@@ -14,7 +15,6 @@ from diagnosis.results.sentence import About, is_about
 from diagnosis.wheels.inputs import WheelsData
 from replay.faults import FaultMode, Side, State
 
-TURNS = 0.02  #: Of the largest speed: a wheel that turns.
 _PASS_S, _SLOWED_S, _PASSED_S = 0.8, 0.5, 0.3  # before the onset, likewise, and after it
 _PASSES_S, _FEW = 0.06, 3  # for so long; readings
 _BETWEEN, _TURNED = (0.15, 0.7), 0.4  # of what it read before, by itself and beside the others; of what they did

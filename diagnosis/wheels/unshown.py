@@ -7,11 +7,12 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from diagnosis.channels.one_value import TURNS
 from diagnosis.results.alike import or_shifted
 from diagnosis.results.assessment import Finding
 from diagnosis.results.limited import limited
 from diagnosis.wheels.inputs import WheelsData
-from diagnosis.wheels.slowing import TURNS, or_held
+from diagnosis.wheels.slowing import or_held
 from diagnosis.wheels.valve_map import effective
 from replay.arrays.blocks import blocks
 from replay.faults import FaultMode, Side

@@ -132,3 +132,9 @@ def test_a_gap_of_the_reference_is_no_standstill() -> None:
     whole, held = held_reference(x, window, DT).mean, held_reference(known, window, DT).mean
     assert np.isnan(held[4000:4020]).all()
     assert held[4020:4040] == pytest.approx(whole[4020:4040], abs=0.02)
+
+
+def test_a_tick_is_found_although_slow_readings_are_rounded_as_well() -> None:
+    """A pole sensor timed in milliseconds, whose speed is recorded to three digits."""
+    found = habit(np.round(between_poles(speed()) / 1e-3) * 1e-3)
+    assert found.tick == pytest.approx(DT / POLE, rel=0.03)

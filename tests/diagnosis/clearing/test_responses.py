@@ -124,3 +124,11 @@ def test_a_second_speed_makes_no_limit_of_what_lies_behind_a_drive_wider() -> No
     assert both.below <= valve.below
     assert both.changed <= valve.changed
     assert both.lasting_below <= valve.lasting_below
+
+
+def test_a_loss_over_the_mission_of_one_wheel_alone_counts_where_nothing_is_measured_twice() -> None:
+    of, usual = responses(*[0.05] * 4), usual_limits(ONCE, CLEAR_AT)
+    alone = of._replace(usual=[Usual(0.07), Usual(0.004), Usual(0.0), Usual(0.0)])
+    alike = of._replace(usual=[Usual(0.07), Usual(0.04), Usual(0.0), Usual(0.0)])
+    assert response_limits(alone, [ONCE] * 4, CLEAR_AT)[0].lasting_below == pytest.approx(0.06)
+    assert response_limits(alike, [ONCE] * 4, CLEAR_AT)[0].lasting_below == usual.lasting_below

@@ -173,3 +173,15 @@ def test_a_wheel_beside_others_that_all_stand_has_no_share_of_their_speed() -> N
     standing = replace(cells.timeline, signals={**cells.timeline.signals, **others})
     check = Checked(Kind.WHEEL, cells.machine.wheels[0], Side.SENSOR_OR_ACTUATOR, Check.EXCESS, 3.0, 0.2)
     assert fault_of_wheel(check, replace(cells, timeline=standing, _kept={}), alone=True) is None
+
+
+def test_no_wheel_stands_out_by_others_that_stand() -> None:
+    """Beside wheels that stand, two others are infinitely quick: neither is alone, nor is a multiple of that anything."""
+    cells = in_cells(simulated(), base=True)
+    wheels = cells.machine.wheels
+    checks = [
+        Checked(Kind.WHEEL, w, Side.SENSOR_OR_ACTUATOR, kind, worst, 0.2)
+        for w, above in zip(wheels, (np.inf, np.inf, 0.1, 0.1), strict=True)
+        for kind, worst in ((Check.EXCESS, above), (Check.RESPONSE, 0.1))
+    ]
+    assert what_stands_out(checks, cells, HYDRAULIC) == {}

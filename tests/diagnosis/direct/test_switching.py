@@ -68,3 +68,18 @@ def test_a_brief_motion_that_comes_late_is_no_noise(mode: FaultMode, span: tuple
 
 def test_noise_stays_noise_however_brief() -> None:
     assert left({"FR": shaken(), "FL": shaken()}) == {"FR": 1, "FL": 1}
+
+
+def at_level(level: float, size: float) -> Array:
+    """An opening with a spike whenever its command passes a level."""
+    out = COMMAND + 0.003 * RNG.standard_normal(SIZE)
+    out[np.abs(COMMAND - level) < 0.008] += size
+    return out
+
+
+def test_spikes_that_come_at_one_opening_are_how_the_valves_of_a_bank_take_turns() -> None:
+    assert left({"FR": at_level(0.25, 0.5)}) == {"FR": 0}
+    anywhere = at_level(0.25, 0.5)
+    anywhere[810:1_000:60] += 0.5
+    assert left({"FR": anywhere}) == {"FR": 1}
+    assert left({"FR": spiky(0.5)}) == {"FR": 1}

@@ -8,11 +8,12 @@ from typing import Any
 import numpy as np
 import pytest
 
+from diagnosis.channels.one_value import frozen_of
 from diagnosis.results.assessment import Finding
 from diagnosis.results.result import Hypothesis
 from diagnosis.results.vocabulary import Tier
 from diagnosis.wheels.findings import WheelFindings
-from diagnosis.wheels.frozen import frozen_of, with_frozen
+from diagnosis.wheels.frozen import with_frozen
 from replay.faults import FaultMode, Side
 from replay.machine.config import WheelPlant
 

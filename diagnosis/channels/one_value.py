@@ -1,0 +1,75 @@
+"""Readings of one value to the last digit, far longer than the channel ever repeats another one."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+TURNS = 0.02  #: Of the largest speed: a wheel that turns.
+_LEAST_S, _READINGS = 0.5, 20  # of one value, and readings at the channel's usual rate
+_LONGER = 2.5  # times the longest other run of one value, that is not this value
+_OF_MOST = 0.97  # of its own largest: an end of its range
+
+
+class Frozen(NamedTuple):
+    """Samples [start, stop) in which a speed stays at a value [m/s], and the longest other run of one value [s]."""
+
+    start: int
+    stop: int
+    value: float
+    usual_s: float
+
+
+def frozen_of(y: Array, span: float, dt: float) -> list[Frozen]:
+    """Runs of one value that are far longer than the channel's own.
+
+    Parameters
+    ----------
+    y : Array, shape (n,)
+        Speed [m/s]; NaN where unknown.
+    span : float
+        Largest plausible speed [m/s].
+    dt : float
+        Step [s].
+    """
+    same = y[1:] == y[:-1]
+    edge = np.flatnonzero(np.diff(np.r_[False, same, False].astype(np.int8)))
+    starts, stops = edge[::2], edge[1::2] + 1
+    if not starts.size:
+        return []
+    value, length = y[starts], (stops - starts) * dt
+    turns = np.abs(value) > TURNS * span
+    usual = _usual(starts, stops, same.size) * dt
+    out = []
+    for k in np.flatnonzero(turns & (length >= max(_LEAST_S, _READINGS * usual))):
+        beside = max(_largest(y[: starts[k]]), _largest(y[stops[k] :]))
+        if np.abs(value[k]) >= _OF_MOST * beside >= 0.0:
+            continue  # the end of its range
+        longest = float(np.max(length[turns & (value != value[k])], initial=usual))
+        if length[k] >= _LONGER * longest:
+            out.append(Frozen(int(starts[k]), int(stops[k]), float(value[k]), longest))
+    return out
+
+
+def _usual(starts: NDArray[np.intp], stops: NDArray[np.intp], steps: int) -> float:
+    """Median number of steps from one change to the next, where samples [start, stop) repeat one value; 1 where fewer than two change."""
+    inside = (starts > 0) & (stops <= steps)  # a change on either side
+    changes = steps - int((stops - starts - 1).sum())
+    if changes < 2:
+        return 1.0
+    longer = np.sort((stops - starts)[inside])
+    ones = changes - 1 - longer.size
+
+    def at(k: int) -> int:
+        return 1 if k < ones else int(longer[k - ones])
+
+    return 0.5 * (at((changes - 2) // 2) + at((changes - 1) // 2))
+
+
+def _largest(y: Array) -> float:
+    """Largest size of what is known, without a copy; -1 where nothing is."""
+    return max(float(np.fmax.reduce(y, initial=-1.0)), -float(np.fmin.reduce(y, initial=1.0)))

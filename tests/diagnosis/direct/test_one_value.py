@@ -1,0 +1,70 @@
+"""A speed that repeats one value while all others tremble is stuck, though the second sensor reads nearly the same."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import cast
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from diagnosis.direct.identification import IdentifiedPair
+from diagnosis.direct.one_value import with_frozen_readings
+from diagnosis.results.assessment import CODE, Assessment, Finding
+from diagnosis.results.vocabulary import Tier
+from replay.faults import FaultMode, Side, State
+
+Array = NDArray[np.float64]
+DT, SIZE, STEP = 0.05, 1_500, 0.002
+WHEELS = ("FR", "FL", "RR", "RL")
+TRUE = np.where(np.arange(SIZE) < 1_000, -0.88, 1.3)
+
+
+def speeds(noise: float = 0.005, step: float = STEP) -> dict[str, Array]:
+    rng = np.random.default_rng(3)
+    return {w: np.asarray(np.round((TRUE + noise * rng.standard_normal(SIZE)) / step) * step) for w in WHEELS}
+
+
+def told(y: dict[str, Array], *findings: Finding) -> dict[str, Assessment]:
+    fresh = np.ones(SIZE, np.bool_)
+    pairs = {
+        w: SimpleNamespace(
+            pair=SimpleNamespace(y=v, fresh=fresh, dt=DT, span=5.0, y_name=f"wheel.{w}.v"),
+            samples=SimpleNamespace(x=TRUE),
+        )
+        for w, v in y.items()
+    }
+    healthy = np.full(SIZE, CODE[State.HEALTHY])
+    before = {w: Assessment(healthy, findings=findings if w == "RR" else (), tier=Tier.DIRECT) for w in y}
+    return with_frozen_readings(cast(dict[str, IdentifiedPair], pairs), before)
+
+
+def held(y: dict[str, Array], start: int = 400, stop: int = 640) -> dict[str, Array]:
+    out = y["RR"].copy()
+    out[start:stop] = -0.874
+    return {**y, "RR": out}
+
+
+def test_one_value_among_trembling_ones_is_stuck() -> None:
+    after = told(held(speeds()))
+    (f,) = after["RR"].findings
+    assert (f.side, f.mode, f.probability) == (Side.SENSOR, FaultMode.STUCK, 0.96)
+    assert f.start == pytest.approx(400, abs=1)
+    assert f.stop == pytest.approx(640, abs=1)
+    assert np.count_nonzero(after["RR"].states == CODE[State.STUCK]) == f.stop - f.start
+    assert all(not after[w].findings for w in ("FR", "FL", "RL"))
+
+
+def test_where_readings_are_coarse_one_value_is_how_they_look_at_one_speed() -> None:
+    assert not told(held(speeds(noise=0.0005, step=0.05)))["RR"].findings
+
+
+def test_two_sensors_show_no_habit() -> None:
+    y = held(speeds())
+    assert not told({w: y[w] for w in ("FR", "RR")})["RR"].findings
+
+
+def test_what_is_told_already_is_not_told_twice() -> None:
+    known = Finding(405, 635, Side.SENSOR, FaultMode.STUCK, 0.9, (), None, None, (), Tier.DIRECT)
+    assert told(held(speeds()), known)["RR"].findings == (known,)
