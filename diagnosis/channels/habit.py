@@ -25,6 +25,7 @@ _FALLING = -0.35  # exponent of the hold over the speed: −1 between poles, 0 i
 _APART = 0.3  # least distance of two log-speeds that say something about it
 _LEAST_PAIRS = 20
 _TICK_RUNS, _TICK_PARTS = 60, 100  # runs in a part, and parts that are looked at
+_COUNTS = 0.5  # of the distance of two values
 _ALIKE, _PASSED, _MOSTLY, _SLOWER = 1.6, 3.0, 0.6, 1.3
 _LONG_HOLD = 2.5  # periods
 _TIMEOUT_S, _LONGEST_S = 0.25, 1.0
@@ -119,7 +120,7 @@ def identify_habit(y: Array, fresh: NDArray[np.bool_], dt: float) -> Habit:
     speed = _medians(parts.following, parts.window)
     slope = _slope(np.log(speed), np.log(shortest))
     if slope is not None and slope > _FALLING:
-        return Habit(window, 0.0, window, stepwise=True)
+        return Habit(window, 0.0, window, stepwise=True, tick=_tick(runs))
     travel = float(np.median(distance))
     return Habit(period, travel, _timeout(runs, travel, dt), stepwise=True, tick=_tick(runs))
 
@@ -212,10 +213,14 @@ def _slope(x: Array, y: Array) -> float | None:
 def _tick(runs: _Runs) -> float:
     """Step on which the inverse of the held values lies; 0 where most parts of the mission show none.
 
-    Only of the faster half of the values: their own rounding blurs the inverse of a slow one.
+    Only of the faster half of the values: their own rounding blurs the inverse of a slow one. Values that lie on a step themselves
+    are counts of poles in a window, and no times.
     """
     held = np.abs(runs.value[(runs.length > 1) & (runs.value != 0.0)])
     held = held[held >= np.median(held)] if held.size else held
+    apart = np.diff(np.unique(held))
+    if not apart.size or rounding_step(held) > _COUNTS * float(np.median(apart)):
+        return 0.0
     parts = np.array_split(held, max(1, held.size // _TICK_RUNS))
     some = np.linspace(0, len(parts) - 1, min(len(parts), _TICK_PARTS)).round().astype(np.intp)
     steps = np.array([rounding_step(1.0 / parts[k]) for k in some])
