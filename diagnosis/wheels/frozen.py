@@ -11,6 +11,7 @@ from diagnosis.results.result import Epsilon, Hypothesis, Sat
 from diagnosis.results.vocabulary import Tier
 from diagnosis.wheels.findings import WheelFindings
 from diagnosis.wheels.inputs import WheelsData
+from diagnosis.wheels.slowing import or_held_together
 from diagnosis.wheels.unshown import as_shown, followed, moves_on
 from replay.faults import FaultMode, Side, State
 
@@ -47,7 +48,8 @@ def with_frozen(data: WheelsData, found: Mapping[int, WheelFindings]) -> dict[in
         for r, fs in told.items():
             findings += [_surer(f, _told(data, i, r)) for f in fs] or [_told(data, i, r)]
         out[i] = replace(wheel, findings=sorted(findings, key=lambda f: f.start))
-    return out
+    told_of_all = or_held_together([wheel.findings for wheel in out.values()], data.dt)
+    return {i: replace(wheel, findings=fs) for (i, wheel), fs in zip(out.items(), told_of_all, strict=True)}
 
 
 def _all_held(held: Mapping[int, list[Frozen]], i: int, r: Frozen) -> bool:

@@ -20,6 +20,8 @@ _PASSES_S, _FEW = 0.06, 3  # for so long; readings
 _BETWEEN, _TURNED = (0.15, 0.7), 0.4  # of what it read before, by itself and beside the others; of what they did
 _OTHERS = 2  # wheels beside this one
 _PASSED = "Its reading passed through the speeds between before it fell to zero, as that of a wheel that is held does; a sensor's is cut off."
+_TOGETHER_S, _MOST_TOGETHER = 0.3, 0.6  # from one onset, and one end, to another; set by hand
+_BOTH = "Another wheel slows down and comes back in the same moments: what holds both, such as the ground, may be neither's fault."
 _MOST = 0.45  # of a sensor, where the valve's position tells that its wheel was driven
 #: Of any fault: the sensor is silent, the valve is, or it is stuck nearly closed.
 _SHARES = (
@@ -50,6 +52,28 @@ def or_held(data: WheelsData, i: int, f: Finding, told: Sequence[Finding]) -> Fi
     if not any(_slows(data, i, g) for g in (f, *since)):
         return f
     return limited(f, _MOST, _PASSED) if data.measured[i] else _of_either(f)
+
+
+def or_held_together(found: Sequence[Sequence[Finding]], dt: float) -> list[list[Finding]]:
+    """Findings of wheels that slow down to zero, less sure where another one does so from the same moment to the same.
+
+    Parameters
+    ----------
+    found : Sequence[Sequence[Finding]]
+        Of each wheel.
+    dt : float
+        Step [s].
+    """
+    held = [[f for f in own if _PASSED in f.evidence] for own in found]
+
+    def together(i: int, f: Finding) -> bool:
+        others = (g for j, own in enumerate(held) if j != i for g in own)
+        return any(max(abs(f.start - g.start), abs(f.stop - g.stop)) * dt <= _TOGETHER_S for g in others)
+
+    return [
+        [limited(f, _MOST_TOGETHER * f.probability, _BOTH) if f in held[i] and together(i, f) else f for f in own]
+        for i, own in enumerate(found)
+    ]
 
 
 def _of_either(f: Finding) -> Finding:
