@@ -12,6 +12,7 @@ Array = NDArray[np.float64]
 TURNS = 0.02  #: Of the largest speed: a wheel that turns.
 _LEAST_S, _READINGS = 0.5, 20  # of one value, and readings at the channel's usual rate
 _LONGER = 2.5  # times the longest other run of one value, that is not this value
+_FREEZES, _PARTED = 12, 4.0  # other runs that may be a frozen sensor's, too; times the next one
 _OF_MOST = 0.97  # of its own largest: an end of its range
 
 
@@ -49,10 +50,23 @@ def frozen_of(y: Array, span: float, dt: float) -> list[Frozen]:
         beside = max(_largest(y[: starts[k]]), _largest(y[stops[k] :]))
         if np.abs(value[k]) >= _OF_MOST * beside >= 0.0:
             continue  # the end of its range
-        longest = float(np.max(length[turns & (value != value[k])], initial=usual))
-        if length[k] >= _LONGER * longest:
+        longest = _habit(length[turns & (value != value[k])], float(length[k]), usual)
+        if longest is not None:
             out.append(Frozen(int(starts[k]), int(stops[k]), float(value[k]), longest))
     return out
+
+
+def _habit(others: Array, length: float, usual: float) -> float | None:
+    """Longest run of other values that is none of a frozen sensor; None where a run of this length [all s] is no longer than the habit.
+
+    A sensor that freezes again and again has a few such runs, and far shorter ones after them.
+    """
+    ranked = np.r_[np.sort(others)[::-1][: _FREEZES + 1], usual]
+    for k, longest in enumerate(ranked):
+        parted = k == 0 or ranked[k - 1] >= max(_LEAST_S, _PARTED * longest)
+        if parted and length >= (_LONGER if k == 0 else _PARTED) * max(longest, usual):
+            return float(max(longest, usual))
+    return None
 
 
 def _usual(starts: NDArray[np.intp], stops: NDArray[np.intp], steps: int) -> float:

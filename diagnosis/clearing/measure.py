@@ -19,7 +19,15 @@ _LAGS_S = (0.0, 0.03, 0.06, 0.1, 0.15, 0.2)  # of healthy valves, motors and the
 _FOLLOWED = 0.8  # quantile of the windows: lag shows where a command is quick
 _EARLIEST_S, _LATEST_S = 0.3, 1.0
 _SURE = 0.95
-_LOSSES = (Check.RESPONSE, Check.LASTING_RESPONSE, Check.CHANGE, Check.RATE, Check.LASTING_RATE, Check.PLANT_RATE)
+_LOSSES = (
+    Check.RESPONSE,
+    Check.LASTING_RESPONSE,
+    Check.CHANGE,
+    Check.RATE,
+    Check.LASTING_RATE,
+    Check.PLANT_RATE,
+    Check.PLANT_RESPONSE,
+)
 
 
 def lowest_passed(x: Array, dt: float, lag_s: float) -> Array:

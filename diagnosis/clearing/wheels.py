@@ -12,6 +12,7 @@ from diagnosis.clearing.limits import Limits, measured_twice, response_limits
 from diagnosis.clearing.measure import alone, compared, lasts, late, off_commands, times, worst
 from diagnosis.clearing.opening_offsets import opening_offsets
 from diagnosis.clearing.openings import openings_tell
+from diagnosis.clearing.plant_response import LIMIT, beside_plant
 from diagnosis.clearing.responses import OTHERS, USUAL_TOP, largest, others_at, responses_of
 from diagnosis.clearing.same_side import beside_its_side
 from diagnosis.clearing.wild import wild_readings
@@ -63,6 +64,7 @@ def wheel_checks(cells: Cells, clear_at: float) -> Iterator[Checked]:
     worst_tracking = [float(x) for x in largest(tracking)]
     beside = beside_its_side(cells, responses)
     offsets = opening_offsets(cells, speed, used)
+    by_file = beside_plant(cells, used, responses)
     most_off = [float(x) for x in largest(offsets[0])], [float(x) for x in offsets[1]]
     delays = late(speed, reference, cells.dt)
     either = Side.SENSOR_OR_ACTUATOR
@@ -88,6 +90,9 @@ def wheel_checks(cells: Cells, clear_at: float) -> Iterator[Checked]:
             most = max(cells.carried[wheel], cells.may_carry)
             limits[i] = beside_ground(limits[i], most, clear_at)
             yield Checked(*about, Side.ACTUATOR, Check.CARRIED, most, most_carried(clear_at))
+        if by_file[i] is not None:
+            about_plant = (*about, either, Check.PLANT_RESPONSE)
+            yield lasts(cells, about_plant, abs(by_file[i] or 0.0), -LIMIT * float(np.log1p(-clear_at)))
         # where an opening is no speed, what it gives says nothing of a wheel whose sides are both measured twice
         if _known(used[:, i]) and speed.shape[1] > OTHERS and (tells or not all(twice[i])):
             own = limits[i]

@@ -22,6 +22,7 @@ class Check(StrEnum):
     CHANGE = "change"
     EXCESS = "excess"
     LASTING_EXCESS = "lasting_excess"
+    PLANT_RESPONSE = "plant_response"
     SAME_SIDE = "same_side"
     OPENING_OFFSET = "opening_offset"
     CARRIED = "carried"
@@ -65,6 +66,10 @@ CHECK_WORDS: dict[Check, tuple[str, str]] = {
     Check.LASTING_EXCESS: (
         "speed per {unit_command} above the other {wheels}', over the mission",
         "the speed of {part} per {unit_command} is {value} the other {wheels}' over the mission",
+    ),
+    Check.PLANT_RESPONSE: (
+        "speed per {unit_command} against that of the machine file's [plant], over the mission",
+        "the speed of {part} per {unit_command} is off that of [plant] in the machine file by a {value} over the mission",
     ),
     Check.SAME_SIDE: (
         "speed per {unit_command} against the other {wheel} of its side, for 3 s",
@@ -135,7 +140,7 @@ _AFTER_S = (0.5, 3.0)  # of a fault, in which it still shows, at least and at mo
 #: Checks whose values and limits are natural logarithms of a ratio: how far below another it is, how far above, or either.
 _BELOW = (Check.RESPONSE, Check.LASTING_RESPONSE)
 _ABOVE = (Check.EXCESS, Check.LASTING_EXCESS)
-_EITHER_WAY = (Check.CHANGE, Check.SAME_SIDE, Check.RATE, Check.LASTING_RATE, Check.PLANT_RATE)
+_EITHER_WAY = (Check.CHANGE, Check.SAME_SIDE, Check.RATE, Check.LASTING_RATE, Check.PLANT_RATE, Check.PLANT_RESPONSE)
 
 
 @dataclass(frozen=True)

@@ -182,3 +182,12 @@ def test_a_coarse_reading_that_goes_on_at_one_speed_is_hardly_stuck(step: float,
     before = {i: WheelFindings(findings=[stuck] if i == 0 else []) for i in range(4)}
     told = with_frozen(data(y, np.array(u)), before)[0].findings
     assert any(f.probability > 0.8 for f in told) is sure
+
+
+def test_a_sensor_that_freezes_again_and_again_makes_no_habit_of_it() -> None:
+    y = speeds()
+    for k in range(5):
+        y[500 + 1_000 * k : 700 + 1_000 * k, 0] = y[500 + 1_000 * k, 0] + 0.005 * k
+    runs = frozen_of(y[:, 0], SPAN, DT)
+    assert [r.start for r in runs] == [pytest.approx(500 + 1_000 * k, abs=2) for k in range(5)]
+    assert max(r.usual_s for r in runs) < 0.3
