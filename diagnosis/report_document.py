@@ -59,6 +59,8 @@ class Judged:
         Assessments of all parts.
     named_by : tuple[Checked, ...]
         Checks that alone name a fault of `found`: which part of it fails is not known, so that they stay open.
+    factor : float
+        By what the speeds of all wheels were multiplied before they were judged [1].
     kept : dict[str, Any]
         What the checks computed of the mission, whatever is found in it.
     """
@@ -69,6 +71,7 @@ class Judged:
     replay: Replay
     found: ComponentResult
     named_by: tuple[Checked, ...] = ()
+    factor: float = 1.0
     kept: dict[str, Any] = field(default_factory=dict, repr=False, compare=False)
 
     @cached_property
@@ -103,7 +106,8 @@ class Judged:
     def scale(self) -> Scale | None:
         """What is known of the scale of the wheels' speeds."""
         names = {f"wheel.{w}.v" for w in self.machine.wheels}
-        return scale_of(self.cells, {row["recorded_unit"] for row in self.recorded.rows if row["name"] in names})
+        units = {row["recorded_unit"] for row in self.recorded.rows if row["name"] in names}
+        return scale_of(self.cells, units, factor=self.factor)
 
     @cached_property
     def detectable(self) -> Detectability:

@@ -131,6 +131,7 @@ def _contradictions(signals: Signals, machine: Machine) -> tuple[tuple[str, ...]
     from replay.setup.body_scale import scale_doubts
     from replay.setup.places import place_doubts
     from replay.signals.opening_doubts import opening_doubt
+    from replay.signals.speed_doubts import speed_doubt
     from replay.signals.timeline import align
 
     wheels = {n: s for w in machine.wheels if (s := signals.items.get(n := f"wheel.{w}.v")) is not None}
@@ -140,7 +141,9 @@ def _contradictions(signals: Signals, machine: Machine) -> tuple[tuple[str, ...]
     openings = opening_doubt(line, signals.items, machine)
     words = machine_words(machine, signals.items)
     of_openings = () if openings is None else (words.fill(f"{openings.text}; {openings.act}"),)
-    return place_doubts(line, machine), (*of_openings, *scale_doubts(line, machine, wheels))
+    speeds = speed_doubt(line, signals.items, machine)
+    of_speeds = () if speeds is None else (f"{speeds.text.partition(':')[0]}; {speeds.act}",)
+    return place_doubts(line, machine), (*of_openings, *of_speeds, *scale_doubts(line, machine, wheels))
 
 
 def show(context: typer.Context, machine: MachineFile = None, quiet: Quiet = False, verbose: Verbose = False) -> None:

@@ -84,6 +84,12 @@ def openings_doubted(text: str, act: str) -> MachineEvent:
     return MachineEvent("The unit of the {valve} openings is in doubt", f"{text}.", doubt, f"{act}, and diagnose again")
 
 
+def speeds_doubted(text: str, act: str) -> MachineEvent:
+    """All wheels share what can only be a wrong size or unit of their speeds; `text` and `act` without their stops."""
+    doubt = "the scale of the {wheel} speeds is in doubt"
+    return MachineEvent("The machine's settings do not fit the log", f"{text}.", doubt, f"{act}, and diagnose again")
+
+
 def foreign(text: str) -> MachineEvent:
     """Most wheels deviate now and then from a wheel model that does not fit the machine."""
     doubt = "most {wheels} deviate now and then from what the {wheel} model expects"
