@@ -34,6 +34,7 @@ from replay.faults import State
 from replay.machine.config import Machine
 from replay.mission import Mission
 from replay.setup.places import place_doubts
+from replay.signals.like_wheels import WHICH
 from replay.version import __version__
 
 _CUT_S = 0.5  # of a log, not judged
@@ -217,6 +218,9 @@ def _scope(judged: Judged) -> tuple[Cut, ...]:
         out.append(Cut(CutKind.WHEELS, tuple(left_out), text))
     if more := judged.mission.signals.other_wheels:
         text = f"the log names {len(more)} more {machine.part}s than this machine has ({', '.join(more)}), which were not judged"
+        out.append(Cut(CutKind.OTHERS, (), text))
+    if asked := next((q for q in machine.questions if q.startswith(WHICH)), ""):
+        text = f"the machine file still asks {asked.rstrip('?')}: not judged"
         out.append(Cut(CutKind.OTHERS, (), text))
     unjudged = [axle for axle in machine.axles if _unjudged(judged.found, axle)]
     if unjudged:

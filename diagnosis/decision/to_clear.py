@@ -119,7 +119,8 @@ def to_clear(
         out.append(
             ToClear(
                 f"{_sentence(join_words(others))}.",
-                "write a machine file from this log (`mfhca config init --log LOG -o machine.toml`), and diagnose with it",
+                "write a machine file from this log (`mfhca config init --log LOG -o machine.toml`) in which every wheel has its lines, and diagnose "
+                "with it",
             )
         )
     empty = [cut.text for cut in against.scope if cut.kind is CutKind.DATA and not cut.components]
