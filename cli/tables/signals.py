@@ -155,8 +155,13 @@ _NAMED = (
 )
 
 
-def signals_parts(signals: Signals, machine: Machine, given: bool = True) -> list[RenderableType]:
-    """Mapped signals, missing ones with their cost, and doubts, for the terminal; `given`: whether there is a machine file."""
+def signals_parts(
+    signals: Signals, machine: Machine, given: bool = True, doubted: bool = False
+) -> list[RenderableType]:
+    """Mapped signals, missing ones with their cost, and doubts, for the terminal.
+
+    `given`: whether there is a machine file; `doubted`: whether the unit of the openings is in doubt.
+    """
     words = machine_words(machine, signals.items)
     parts: list[RenderableType] = [
         text("No signal of the machine was found.", "bold"),
@@ -173,7 +178,7 @@ def signals_parts(signals: Signals, machine: Machine, given: bool = True) -> lis
     if signals.missing:
         lines = [(name, _cost(cost, reason)) for name, cost, reason in _missing_groups(signals, machine, words)]
         parts += [section("Missing signals and their effect"), table(("signal", "effect"), lines)]
-    told = forecast(signals.items, machine, words)
+    told = forecast(signals.items, machine, words, doubted=doubted)
     if signals.items and told:
         by_part = [(_part(f, words), f.words, "\n".join(f.log)) for f in told]
         parts += [

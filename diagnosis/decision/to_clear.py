@@ -67,8 +67,8 @@ def to_clear(
     out += short_parts(against.short, assessments, decided_s, driven, limits, words, open_state=against.open_state)
     if against.unexplained:
         for kind, second in (
-            (Kind.WHEEL, "wheel.<part>.v_true (a second speed)"),
-            (Kind.STEER, "steer.<part>.phi_true (a second angle)"),
+            (Kind.WHEEL, "wheel.*.v_true (a second speed)"),
+            (Kind.STEER, "steer.*.phi_true (a second angle)"),
         ):
             parts = {c for c, _ in against.unexplained if (c in axles) is (kind is Kind.STEER)}
             if not parts:
@@ -78,7 +78,7 @@ def to_clear(
                 p in assessments and assessments[p].tier is Tier.DIRECT for p in ((c, "actuator") for c in parts)
             )
             asked = words.drive == "valve" and kind is Kind.WHEEL and not logged
-            other = " or wheel.<part>.u_applied (the valve position)" if asked else ""
+            other = " or wheel.*.u_applied (the valve position)" if asked else ""
             out.append(
                 ToClear(
                     f"{who}: no single fault explains the residual.",
@@ -289,7 +289,7 @@ def _act(check: Checked, twice: Collection[str]) -> str:
         return _STEER
     if check.check is Check.CARRIED:
         return (
-            f"log wheel.<part>.u_applied (the {words.drive}'s own measurement), or lift the machine, give every {words.part} the same "
+            f"log wheel.*.u_applied (the {words.drive}'s own measurement), or lift the machine, give every {words.part} the same "
             "command for 10 s, and diagnose that log"
         )
     if check.check is Check.BEHIND:
@@ -302,13 +302,11 @@ def _act(check: Checked, twice: Collection[str]) -> str:
     if check.check is Check.ROUGHNESS and check.worst is not None:
         return words.fill(
             "check the connector, the cable and the target of the {wheel.sensor}, and drive the same again"
-        ) + ("" if check.component in twice else "; a log with wheel.<part>.v_true (a second speed) settles it")
+        ) + ("" if check.component in twice else "; a log with wheel.*.v_true (a second speed) settles it")
     if check.worst is None:
         return f"move all {words.parts} together at one steady speed for at least 10 s, and diagnose that log"
     lifted = f"lift the machine, give every {words.part} the same command for 10 s, and compare their speeds with a hand tachometer"
-    return (
-        lifted if check.component in twice else f"{lifted}; a log with wheel.<part>.v_true (a second speed) settles it"
-    )
+    return lifted if check.component in twice else f"{lifted}; a log with wheel.*.v_true (a second speed) settles it"
 
 
 def _sentence(text: str) -> str:

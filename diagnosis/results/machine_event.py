@@ -93,5 +93,5 @@ def speeds_doubted(text: str, act: str) -> MachineEvent:
 def foreign(text: str) -> MachineEvent:
     """Most wheels deviate now and then from a wheel model that does not fit the machine."""
     doubt = "most {wheels} deviate now and then from what the {wheel} model expects"
-    act = "record {valve} positions (wheel.<W>.u_applied), or give the machine's [plant], and diagnose again"
+    act = "record {valve} positions (wheel.*.u_applied), or give the machine's [plant], and diagnose again"
     return MachineEvent("The {wheel} model does not fit this machine", text, doubt, act, model=True)

@@ -365,3 +365,14 @@ def test_a_second_file_without_any_signal_is_a_note(tmp_path: Path, capsys: pyte
     report = json.loads((out / "report.json").read_text(encoding="utf-8"))
     assert "none of its channels is a signal" in capsys.readouterr().out
     assert any("weather.csv: none of its channels is a signal" in q["result"] + q["effect"] for q in report["quality"])
+
+
+@pytest.mark.parametrize("name", ["report.html", "report.json", "report.parquet"])
+def test_a_file_of_somebody_else_is_not_replaced(
+    name: str, tmp_path: Path, calls: dict[str, Any], capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / name).write_text("<html>my own page</html>")
+    assert run(["diagnose", "drive.mcap", "-o", str(tmp_path)]) == 2
+    said = " ".join(capsys.readouterr().err.split())
+    assert "was not written by mfhca and was not replaced; move it away, or give another folder with -o" in said
+    assert (tmp_path / name).read_text() == "<html>my own page</html>"
