@@ -150,7 +150,9 @@ def _chosen(wheels: Sequence[str] | None, machine: Machine) -> tuple[str, ...]:
     chosen = tuple(machine.wheels if wheels is None else wheels)
     for wheel in chosen:
         if wheel not in machine.wheels:
-            raise ConfigError(f"--wheel {wheel}: no such wheel; the machine has {', '.join(machine.wheels)}")
+            raise ConfigError(
+                f"--wheel {wheel or repr(wheel)}: no such wheel; the machine has {', '.join(machine.wheels)}"
+            )
     return chosen
 
 

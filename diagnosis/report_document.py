@@ -226,16 +226,10 @@ def _scope(judged: Judged) -> tuple[Cut, ...]:
     if unjudged:
         names = join_words([axle.removesuffix("_steer") for axle in unjudged])
         out.append(Cut(CutKind.STEERING, tuple(unjudged), f"the {names} steering was not judged"))
-    out += [
-        Cut(
-            CutKind.DATA,
-            (axle,),
-            f"for {missing * line.dt:.1f} s of {line.size * line.dt:.1f} s, without data, the {axle.removesuffix('_steer')} "
-            "steering was not judged",
-        )
-        for axle in machine.axles
-        if not _unjudged(judged.found, axle) and (missing := _without_data(judged.found, axle)) > _MISSING * line.size
-    ]
+    for missing, axles in _axles_without_data(judged).items():
+        names = join_words([axle.removesuffix("_steer") for axle in axles])
+        text = f"for {missing} s of {line.size * line.dt:.1f} s, without data, the {names} steering was not judged"
+        out.append(Cut(CutKind.DATA, axles, text))
     empty, whole_s = without_speed(line, machine), line.size * line.dt
     if empty > min(_MISSING * whole_s, _EMPTY_S):
         out.append(
@@ -247,6 +241,17 @@ def _scope(judged: Judged) -> tuple[Cut, ...]:
         whole = (judged.recorded.last_ns - judged.recorded.first_ns) * 1e-9
         out.append(Cut(CutKind.LOG, (), f"only {line.size * line.dt:.1f} s of {whole:.1f} s of the log were judged"))
     return tuple(out)
+
+
+def _axles_without_data(judged: Judged) -> dict[str, tuple[str, ...]]:
+    """Axles whose steering has no data for much of the mission, by how long that is [s] as it is written."""
+    line, out = judged.mission.timeline, dict[str, tuple[str, ...]]()
+    for axle in judged.machine.axles:
+        missing = 0 if _unjudged(judged.found, axle) else _without_data(judged.found, axle)
+        if missing > _MISSING * line.size:
+            said = f"{missing * line.dt:.1f}"
+            out[said] = (*out.get(said, ()), axle)
+    return out
 
 
 def _unjudged(found: ComponentResult, component: str) -> bool:

@@ -62,6 +62,14 @@ def to_clear(
                 "in the machine file if they were recorded under another name",
             )
         )
+    cut = [cut.text for cut in against.scope if cut.kind in (CutKind.LOG, CutKind.WHEELS)]
+    if cut:
+        out.append(
+            ToClear(
+                f"{_sentence(join_words(cut))}.",
+                "diagnose the whole log, with every part (no --start, --end, --wheel)",
+            )
+        )
     out += [ToClear(event.text, event.act) for event in against.events]
     out += [ToClear(text, "correct [signals] in a machine file, and diagnose again") for text in against.hints]
     out += short_parts(against.short, assessments, decided_s, driven, limits, words, open_state=against.open_state)
@@ -104,14 +112,6 @@ def to_clear(
                 else "diagnose the files of one mission together, and others apart"
                 if left_out
                 else "copy the log from the machine once more, or record another mission",
-            )
-        )
-    cut = [cut.text for cut in against.scope if cut.kind in (CutKind.LOG, CutKind.WHEELS)]
-    if cut:
-        out.append(
-            ToClear(
-                f"{_sentence(join_words(cut))}.",
-                "diagnose the whole log, with every part (no --start, --end, --wheel)",
             )
         )
     others = [cut.text for cut in against.scope if cut.kind is CutKind.OTHERS]

@@ -49,6 +49,17 @@ def not_following(text: str) -> MachineEvent:
     return MachineEvent(title, text, doubt, "enable the drives, release the emergency stop, and record a mission again")
 
 
+def not_related(text: str) -> MachineEvent:
+    """Speeds and commands are of sizes that nothing relates, from start to end."""
+    title = "The machine did not follow its commands"
+    doubt = "the machine did not follow its commands"
+    act = (
+        "give wheel diameter, gear ratio and units in a machine file (`mfhca config init --log LOG`), check which topic or symbol commands the "
+        "machine, and diagnose again; if it was held or its drives were off, record a mission in which they are on"
+    )
+    return MachineEvent(title, text, doubt, act)
+
+
 def not_shown(text: str) -> MachineEvent:
     """The machine went as it was told, by a receiver, and its speeds do not show it."""
     title = "The speeds do not show how the machine went"

@@ -30,7 +30,7 @@ def like_wheels(channels: Mapping[str, Channel], taken: Mapping[str, SignalSourc
         What each signal is taken from, by canonical name.
     """
     speeds = [origin.label for name, origin in taken.items() if _SPEED.fullmatch(name)]
-    kinds = {kind for label in speeds if (kind := _kind(label))}
+    kinds = {kind for label in speeds if (kind := kind_of(label))}
     used = {origin.label for origin in taken.values()}
     places = {place for label in used if None not in (place := position(label))}
     unnumbered = {_unnumbered(label) for label in used}
@@ -40,7 +40,7 @@ def like_wheels(channels: Mapping[str, Channel], taken: Mapping[str, SignalSourc
         if channel.name not in used
         and name not in used
         and not speaks_of_no_wheel(name)
-        and _kind(channel.name) in kinds
+        and kind_of(channel.name) in kinds
         and position(channel.name) not in places
         and not (
             _unnumbered(channel.name) in used or (channel.name in unnumbered and position(channel.name) != (None, None))
@@ -48,7 +48,7 @@ def like_wheels(channels: Mapping[str, Channel], taken: Mapping[str, SignalSourc
     )
 
 
-def _kind(label: str) -> tuple[str, ...]:
+def kind_of(label: str) -> tuple[str, ...]:
     """Words of a name but for those of a place, and numbers."""
     return tuple(w for w in tokens(label) if not (is_place(w) or w.isdigit() or w in _LOOSE))
 
