@@ -14,6 +14,7 @@ import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from diagnosis.comparison.previous import with_previous
+from diagnosis.own_files import check_replaced
 from diagnosis.report.page import build_page
 from diagnosis.report.plot_data import axis_of
 from diagnosis.results.document import ReportDocument
@@ -53,7 +54,10 @@ def write_result(result: MissionResult, folder: Path, *, max_size_mb: float = 8.
     ------
     OutputError
         Where the folder cannot be written.
+    ConfigError
+        Where a file of the result's name is there that this tool did not write.
     """
+    check_replaced(folder)
     lsb = {s["name"]: s["lsb"] for s in result.report["signals"] if s["lsb"]}
     before = result.layout
     steps = {**grids_of(result.columns, lsb), **(before.steps if before else {})}

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from diagnosis.assess import ComponentResult, assess_components
 from diagnosis.channels.copied_rows import without_copied_rows
 from diagnosis.channels.doubted_openings import without_openings, without_valves
+from diagnosis.channels.doubted_speeds import rescaled
 from diagnosis.channels.recording_gaps import recording_gaps, without_gaps
 from diagnosis.channels.resting_position import with_zeroed_positions
 from diagnosis.channels.shared_gain import without_shared_gain
@@ -36,7 +37,7 @@ from diagnosis.report_document import Judged, report_of_mission
 from diagnosis.results.assessment import Assessment
 from diagnosis.results.closeups import closeups_of
 from diagnosis.results.document import MachineRow, ReportDocument
-from diagnosis.results.machine_event import openings_doubted
+from diagnosis.results.machine_event import openings_doubted, speeds_doubted
 from diagnosis.results.machine_words import machine_words
 from diagnosis.results.result import MissionResult
 from diagnosis.results.stated_sizes import known_probability, mode_columns, size_columns
@@ -52,6 +53,7 @@ from replay.mission import Mission, load_mission
 from replay.progress import Progress, Stage, Subscriber, silent
 from replay.signals.opening_doubts import OpeningDoubt, opening_doubt
 from replay.signals.signal import Signals
+from replay.signals.speed_doubts import SpeedDoubt, speed_doubt
 from replay.signals.timeline import Timeline, align
 
 Array = NDArray[np.float64] | NDArray[np.float32]
@@ -150,7 +152,9 @@ def _chosen(wheels: Sequence[str] | None, machine: Machine) -> tuple[str, ...]:
     chosen = tuple(machine.wheels if wheels is None else wheels)
     for wheel in chosen:
         if wheel not in machine.wheels:
-            raise ConfigError(f"--wheel {wheel}: no such wheel; the machine has {', '.join(machine.wheels)}")
+            raise ConfigError(
+                f"--wheel {wheel or repr(wheel)}: no such wheel; the machine has {', '.join(machine.wheels)}"
+            )
     return chosen
 
 
@@ -166,7 +170,8 @@ def _walk(
     shown = without_copied_rows(mission.timeline)
     doubt = opening_doubt(shown, mission.signals.items, machine)
     used = shown if doubt is None else without_openings(shown, machine)
-    timeline = without_shared_gain(with_zeroed_positions(used, machine), machine)
+    scale = speed_doubt(used, mission.signals.items, machine)
+    timeline = without_shared_gain(with_zeroed_positions(rescaled(used, scale), machine), machine)
     mission = replace(mission, timeline=timeline)
 
     def publish(stage: Progress) -> None:
@@ -179,9 +184,14 @@ def _walk(
         assess_components(timeline, replay, machine, chosen, publish, mission.signals.items), timeline
     )
     found = found if doubt is None else _without_valves(found, doubt)
+    found = found if scale is None else _with_scale(found, scale)
     _require_something(found.assessments, mission, machine)
     publish(Progress(Stage.DECIDING))
-    judged = _without_contradicted(_without_backwards(Judged(mission, recorded, machine, replay, found)))
+    judged = _without_contradicted(
+        _without_backwards(
+            Judged(mission, recorded, machine, replay, found, factor=1.0 if scale is None else scale.first_factor)
+        )
+    )
     judged = _with_stalls(_with_what_stands_out(judged))
     found = judged.found
     report = report_of_mission(judged, identity)
@@ -197,6 +207,11 @@ def _without_valves(found: ComponentResult, doubt: OpeningDoubt) -> ComponentRes
     """The same with no drive judged, and with the reason as what is wrong with the whole machine."""
     event = openings_doubted(doubt.text, doubt.act).worded(found.words)
     return replace(found, assessments=without_valves(found.assessments, found.words), events=(*found.events, event))
+
+
+def _with_scale(found: ComponentResult, doubt: SpeedDoubt) -> ComponentResult:
+    """The same with the scale that all wheels' speeds share as what is wrong with the whole machine."""
+    return replace(found, events=(*found.events, speeds_doubted(doubt.text, doubt.act).worded(found.words)))
 
 
 def _outside_gaps(found: ComponentResult, timeline: Timeline) -> ComponentResult:
@@ -218,7 +233,14 @@ def _without_backwards(judged: Judged) -> Judged:
     if not wrong | exchanged:
         return judged
     told = without_claims(found.assessments, wrong, exchanged, judged.mission.timeline.dt)
-    return Judged(judged.mission, judged.recorded, judged.machine, judged.replay, replace(found, assessments=told))
+    return Judged(
+        judged.mission,
+        judged.recorded,
+        judged.machine,
+        judged.replay,
+        replace(found, assessments=told),
+        factor=judged.factor,
+    )
 
 
 def _without_contradicted(judged: Judged) -> Judged:

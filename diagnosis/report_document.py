@@ -34,6 +34,7 @@ from replay.faults import State
 from replay.machine.config import Machine
 from replay.mission import Mission
 from replay.setup.places import place_doubts
+from replay.signals.like_wheels import WHICH
 from replay.version import __version__
 
 _CUT_S = 0.5  # of a log, not judged
@@ -59,6 +60,8 @@ class Judged:
         Assessments of all parts.
     named_by : tuple[Checked, ...]
         Checks that alone name a fault of `found`: which part of it fails is not known, so that they stay open.
+    factor : float
+        By what the speeds of all wheels were multiplied before they were judged [1].
     kept : dict[str, Any]
         What the checks computed of the mission, whatever is found in it.
     """
@@ -69,6 +72,7 @@ class Judged:
     replay: Replay
     found: ComponentResult
     named_by: tuple[Checked, ...] = ()
+    factor: float = 1.0
     kept: dict[str, Any] = field(default_factory=dict, repr=False, compare=False)
 
     @cached_property
@@ -103,7 +107,8 @@ class Judged:
     def scale(self) -> Scale | None:
         """What is known of the scale of the wheels' speeds."""
         names = {f"wheel.{w}.v" for w in self.machine.wheels}
-        return scale_of(self.cells, {row["recorded_unit"] for row in self.recorded.rows if row["name"] in names})
+        units = {row["recorded_unit"] for row in self.recorded.rows if row["name"] in names}
+        return scale_of(self.cells, units, factor=self.factor)
 
     @cached_property
     def detectable(self) -> Detectability:
@@ -214,20 +219,17 @@ def _scope(judged: Judged) -> tuple[Cut, ...]:
     if more := judged.mission.signals.other_wheels:
         text = f"the log names {len(more)} more {machine.part}s than this machine has ({', '.join(more)}), which were not judged"
         out.append(Cut(CutKind.OTHERS, (), text))
+    if asked := next((q for q in machine.questions if q.startswith(WHICH)), ""):
+        text = f"the machine file still asks {asked.rstrip('?')}: not judged"
+        out.append(Cut(CutKind.OTHERS, (), text))
     unjudged = [axle for axle in machine.axles if _unjudged(judged.found, axle)]
     if unjudged:
         names = join_words([axle.removesuffix("_steer") for axle in unjudged])
         out.append(Cut(CutKind.STEERING, tuple(unjudged), f"the {names} steering was not judged"))
-    out += [
-        Cut(
-            CutKind.DATA,
-            (axle,),
-            f"for {missing * line.dt:.1f} s of {line.size * line.dt:.1f} s, without data, the {axle.removesuffix('_steer')} "
-            "steering was not judged",
-        )
-        for axle in machine.axles
-        if not _unjudged(judged.found, axle) and (missing := _without_data(judged.found, axle)) > _MISSING * line.size
-    ]
+    for missing, axles in _axles_without_data(judged).items():
+        names = join_words([axle.removesuffix("_steer") for axle in axles])
+        text = f"for {missing} s of {line.size * line.dt:.1f} s, without data, the {names} steering was not judged"
+        out.append(Cut(CutKind.DATA, axles, text))
     empty, whole_s = without_speed(line, machine), line.size * line.dt
     if empty > min(_MISSING * whole_s, _EMPTY_S):
         out.append(
@@ -239,6 +241,17 @@ def _scope(judged: Judged) -> tuple[Cut, ...]:
         whole = (judged.recorded.last_ns - judged.recorded.first_ns) * 1e-9
         out.append(Cut(CutKind.LOG, (), f"only {line.size * line.dt:.1f} s of {whole:.1f} s of the log were judged"))
     return tuple(out)
+
+
+def _axles_without_data(judged: Judged) -> dict[str, tuple[str, ...]]:
+    """Axles whose steering has no data for much of the mission, by how long that is [s] as it is written."""
+    line, out = judged.mission.timeline, dict[str, tuple[str, ...]]()
+    for axle in judged.machine.axles:
+        missing = 0 if _unjudged(judged.found, axle) else _without_data(judged.found, axle)
+        if missing > _MISSING * line.size:
+            said = f"{missing * line.dt:.1f}"
+            out[said] = (*out.get(said, ()), axle)
+    return out
 
 
 def _unjudged(found: ComponentResult, component: str) -> bool:

@@ -150,7 +150,7 @@ def read_signals(
     )
     missing = near_misses(signals.missing, [file.summary for file in files], NO_CHANNEL)
     every = {name: channel for channels in named_channels(logs) for name, channel in channels.items()}
-    more = other_wheels(every, machine)
+    more = other_wheels(every, machine, {n: s.origin for n, s in signals.items.items()})
     return dated, replace(signals, missing=missing, notes=notes, open_loop=bool(marked), other_wheels=more)
 
 

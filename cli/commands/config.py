@@ -80,7 +80,7 @@ def check(
     terminal = terminal_of(context, json=json)
     machine, source = machine_of(file)
     lost: list[str] = []
-    asked, against, doubts = "", tuple[str, ...](), tuple[str, ...]()
+    asked, against, doubts, doubted = "", tuple[str, ...](), tuple[str, ...](), False
     document: dict[str, object] = {"file": str(file), "ok": True, "given_signals": sorted(machine.signals)}
     if log:
         with terminal.progress(Stage.STARTING) as progress:
@@ -91,7 +91,7 @@ def check(
         lost = [f"{name}: {signals.missing[name]}" for name in machine.signals if name in signals.missing]
         asked = first_question(signals) if signals.questions else ""
         if not asked:
-            against, doubts = _contradictions(signals, machine)
+            against, doubts, doubted = _contradictions(signals, machine)
         document |= {
             "ok": not (lost or asked or against),
             "signals": signals_document(files, signals, machine, source),
@@ -99,7 +99,7 @@ def check(
             "doubts": list(doubts),
         }
         if not json:
-            terminal.show(*signals_parts(signals, machine))
+            terminal.show(*signals_parts(signals, machine, doubted=doubted))
     if json:
         terminal.show_json(document)
     if lost:
@@ -125,22 +125,26 @@ def _still_asked(questions: int) -> str:
     return f" {questions} of its comments are questions; remove each when it is answered."
 
 
-def _contradictions(signals: Signals, machine: Machine) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """What turns of the machine contradict of the places of its wheels and axles, and doubts about sizes and units."""
+def _contradictions(signals: Signals, machine: Machine) -> tuple[tuple[str, ...], tuple[str, ...], bool]:
+    """What turns contradict of the places of wheels and axles, doubts about sizes and units, and whether the openings' unit is one."""
     from diagnosis.results.machine_words import machine_words
     from replay.setup.body_scale import scale_doubts
     from replay.setup.places import place_doubts
     from replay.signals.opening_doubts import opening_doubt
+    from replay.signals.speed_doubts import speed_doubt
     from replay.signals.timeline import align
 
     wheels = {n: s for w in machine.wheels if (s := signals.items.get(n := f"wheel.{w}.v")) is not None}
     if not any(len(s.stamps) > 1 for s in wheels.values()):
-        return (), ()
+        return (), (), False
     line = align(signals)
     openings = opening_doubt(line, signals.items, machine)
     words = machine_words(machine, signals.items)
     of_openings = () if openings is None else (words.fill(f"{openings.text}; {openings.act}"),)
-    return place_doubts(line, machine), (*of_openings, *scale_doubts(line, machine, wheels))
+    speeds = speed_doubt(line, signals.items, machine)
+    of_speeds = () if speeds is None else (f"{speeds.text.partition(':')[0]}; {speeds.act}",)
+    doubts = (*of_openings, *of_speeds, *scale_doubts(line, machine, wheels))
+    return place_doubts(line, machine), doubts, openings is not None
 
 
 def show(context: typer.Context, machine: MachineFile = None, quiet: Quiet = False, verbose: Verbose = False) -> None:

@@ -13,6 +13,7 @@ from cli.terminal.console import Terminal
 from cli.terminal.options import FailOn
 from diagnosis.api.inputs import check_output, check_times, check_wheels, machine_of, mission_paths
 from diagnosis.api.saved_results import previous_result
+from diagnosis.own_files import check_replaced
 from replay.arrays.freed_memory import keep_freed_memory
 from replay.arrays.linear_algebra import load_addresses
 from replay.progress import Progress, Stage, Subscriber
@@ -114,6 +115,7 @@ def _checked(request: DiagnoseRequest) -> _Checked:
     folder = request.output if request.output is not None else _default_folder(paths[0])
     outputs = [folder / name for name in (*_OUTPUTS, *((FOLDER,) if request.clips else ()))]
     check_output(outputs, paths)
+    check_replaced(folder)
     previous = previous_result(request.previous)
     if previous is not None:
         from diagnosis.comparison.previous import require_same_machine

@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     from replay.inspection.report import InspectReport, OddValues, TopicTiming
 
 _EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
+_DATED_NS = 365 * 86_400 * 10**9  # as pages have it: stamps before are of a clock without a date
+_ZONE = (" UTC", " of a clock without a date (simulated time, or counted from a start)")
 _WITHOUT_INDEX = ("csv", "twincat")
 _END_NS = (1 << 63) - 10**10  # where 64 bits end, no clock stands
 _LONG_VALUE = 60
@@ -220,11 +222,20 @@ def _stored(report: InspectReport) -> list[str]:
 def _when(report: InspectReport) -> str:
     if report.stop_ns >= _END_NS:
         return "no usable stamps"
-    return f"{_start(report.start_ns, 3)} UTC, {report.duration_s:.3f} s" if report.stop_ns else "no stamps"
+    if not report.stop_ns:
+        return "no stamps"
+    return f"{_start(report.start_ns, 3)}{_ZONE[_undated(report.start_ns)]}, {report.duration_s:.3f} s"
+
+
+def _undated(ns: int) -> bool:
+    """Whether a stamp is of simulated time, or counted from a start, and tells no date."""
+    return 0 <= ns < _DATED_NS
 
 
 def _start(ns: int, digits: int = 0) -> str:
-    """Date and time; a number of seconds where no calendar reaches."""
+    """Date and time; a number of seconds where no calendar reaches, or of a clock without a date."""
+    if _undated(ns):
+        return f"from {ns / 1e9:.{digits}f} s"
     try:
         moment = _EPOCH + timedelta(microseconds=ns // 1000)
     except OverflowError:

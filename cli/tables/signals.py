@@ -149,14 +149,23 @@ _STANDS_IN = (
     "no machine file was given: ranges of rotations are shown with the wheels of {} ({:.3g} m); "
     "`mfhca config init --log LOG` writes one from the log"
 )
+_NO_WHEEL = (
+    "no machine file was given: {} stands in, and no signal of its wheels is in the log; `mfhca config init --log LOG` writes a machine file "
+    "from the log"
+)
 _NAMED = (
     "no machine file was given: the wheels are those that the log names, and ranges of rotations are shown with wheels of {:.3g} m; "
     "`mfhca config init --log LOG` writes a machine file from the log"
 )
 
 
-def signals_parts(signals: Signals, machine: Machine, given: bool = True) -> list[RenderableType]:
-    """Mapped signals, missing ones with their cost, and doubts, for the terminal; `given`: whether there is a machine file."""
+def signals_parts(
+    signals: Signals, machine: Machine, given: bool = True, doubted: bool = False
+) -> list[RenderableType]:
+    """Mapped signals, missing ones with their cost, and doubts, for the terminal.
+
+    `given`: whether there is a machine file; `doubted`: whether the unit of the openings is in doubt.
+    """
     words = machine_words(machine, signals.items)
     parts: list[RenderableType] = [
         text("No signal of the machine was found.", "bold"),
@@ -173,7 +182,7 @@ def signals_parts(signals: Signals, machine: Machine, given: bool = True) -> lis
     if signals.missing:
         lines = [(name, _cost(cost, reason)) for name, cost, reason in _missing_groups(signals, machine, words)]
         parts += [section("Missing signals and their effect"), table(("signal", "effect"), lines)]
-    told = forecast(signals.items, machine, words)
+    told = forecast(signals.items, machine, words, doubted=doubted)
     if signals.items and told:
         by_part = [(_part(f, words), f.words, "\n".join(f.log)) for f in told]
         parts += [
@@ -181,13 +190,20 @@ def signals_parts(signals: Signals, machine: Machine, given: bool = True) -> lis
             table(("part", "what shows", "log to tell more"), by_part),
         ]
     notes = [n for n in signals.notes if _is_doubt(n)]
-    if not given and any(n.startswith("wheel.") for n in signals.items):
+    if not given:
         notes = [n for n in notes if not any(words in n for words in _OF_ANOTHER)]
-        size = 2 * (machine.wheel_radius or 0.0)
-        notes.insert(0, _STANDS_IN.format(machine.name, size) if machine.assumed else _NAMED.format(size))
+        notes.insert(0, _not_given(machine, any(n.startswith("wheel.") for n in signals.items)))
     if notes:
         parts += [section("Notes"), bullets(notes)]
     return parts
+
+
+def _not_given(machine: Machine, wheels: bool) -> str:
+    """That no machine file was given, and what stands in; `wheels`: whether the log has signals of wheels."""
+    if not wheels:
+        return _NO_WHEEL.format(machine.name)
+    size = 2 * (machine.wheel_radius or 0.0)
+    return _STANDS_IN.format(machine.name, size) if machine.assumed else _NAMED.format(size)
 
 
 def _two_lines(rows: Sequence[tuple[str, str, str, str, str]]) -> RenderableType:

@@ -147,6 +147,8 @@ def check_wheels(wheels: Sequence[str] | None, machine: Machine, name: str = "--
     spelling = {w.casefold(): w for w in machine.wheels}
     for wheel in wheels:
         if wheel.casefold() not in spelling:
-            raise ConfigError(f"{name} {wheel}: no such wheel; the machine has {', '.join(machine.wheels)}")
+            raise ConfigError(
+                f"{name} {wheel or repr(wheel)}: no such wheel; the machine has {', '.join(machine.wheels)}"
+            )
     asked = {spelling[w.casefold()] for w in wheels}
     return tuple(w for w in machine.wheels if w in asked)

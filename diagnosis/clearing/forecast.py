@@ -11,7 +11,8 @@ from replay.faults import Side
 from replay.machine.config import Machine
 
 _OTHERS = 2
-_ASKED = "steer.<A>.phi_ref or steer.<A>.u"
+_DOUBTED = "not judged before the unit of the {valve} openings is certain"
+_ASKED = "steer.*.phi_ref or steer.*.u"
 
 
 @dataclass(frozen=True)
@@ -27,11 +28,11 @@ class Forecast:
     side : Side
         Which side.
     told : bool
-        Whether a fault of it is told from one of the other side, at any time of the mission.
+        Whether a fault of it is told from one of the other side.
     words : str
         What shows, and what does not.
     log : tuple[str, ...]
-        Signals that would tell more, ``<W>`` and ``<A>`` for a wheel and an axle.
+        Signals that would tell more, ``*`` for a wheel or an axle.
     """
 
     components: tuple[str, ...]
@@ -42,7 +43,9 @@ class Forecast:
     log: tuple[str, ...]
 
 
-def forecast(logged: Collection[str], machine: Machine, words: MachineWords) -> tuple[Forecast, ...]:
+def forecast(
+    logged: Collection[str], machine: Machine, words: MachineWords, *, doubted: bool = False
+) -> tuple[Forecast, ...]:
     """What the signals `logged` can tell of the machine's parts, parts with the same signals together.
 
     Parameters
@@ -53,7 +56,11 @@ def forecast(logged: Collection[str], machine: Machine, words: MachineWords) -> 
         The machine.
     words : MachineWords
         How to speak of it.
+    doubted : bool
+        Whether the unit of all valves' openings is in doubt, so that none of them is looked at.
     """
+    opened = {n for n in logged if n.rpartition(".")[2] in ("u", "u_applied")} if doubted else set[str]()
+    logged = [n for n in logged if n not in opened]
     speeds = sum(f"wheel.{w}.v" in logged for w in machine.wheels)
     commanded = "cmd.v" in logged or any(f"wheel.{w}.v_ref" in logged for w in machine.wheels)
     groups: dict[tuple[Kind, Side, bool, str, tuple[str, ...]], list[str]] = {}
@@ -68,8 +75,10 @@ def forecast(logged: Collection[str], machine: Machine, words: MachineWords) -> 
                     _angle_sensor(has, "imu.yaw_rate" in logged, words, told_where),
                     _steering_drive(has, words, told_where),
                 )
+            if any(n.startswith(f"{prefix}.{name}.") for n in opened):
+                sides = sides[0], (False, _DOUBTED, ())
             for side, (told, text, more) in zip((Side.SENSOR, Side.ACTUATOR), sides, strict=True):
-                lacking = tuple(signal for signal in more if "<" not in signal or signal.rpartition(".")[2] not in has)
+                lacking = tuple(signal for signal in more if "*" not in signal or signal.rpartition(".")[2] not in has)
                 groups.setdefault((kind, side, told, text, lacking), []).append(name)
     return tuple(
         Forecast(tuple(who), kind, side, told, words.fill(text), more)
@@ -82,16 +91,16 @@ _Told = tuple[bool, str, tuple[str, ...]]
 
 
 def _wheel_sensor(has: set[str], speeds: int, words: MachineWords, commanded: bool) -> _Told:
-    more: tuple[str, ...] = ("wheel.<W>.v_true",)
+    more: tuple[str, ...] = ("wheel.*.v_true",)
     if "v" not in has:
-        return False, "not judged: no speed is logged", ("wheel.<W>.v",)
+        return False, "not judged: no speed is logged", ("wheel.*.v",)
     if "v_true" in has:
-        return True, "told at any time, against its second measurement", ()
+        return True, "told while the machine moves, against its second measurement", ()
     if not has & {"u", "u_applied"}:
         if speeds == 1 and not commanded:
             return False, "only a speed that is frozen, wild or noisy shows: no command is logged", ("cmd.v", *more)
         if words.drive == "valve":
-            more = ("wheel.<W>.u", *more)
+            more = ("wheel.*.u", *more)
         if not commanded:
             return False, "what departs from the other {wheels} shows: no command is logged", ("cmd.v", *more)
         return (
@@ -109,19 +118,19 @@ def _wheel_sensor(has: set[str], speeds: int, words: MachineWords, commanded: bo
 
 
 def _wheel_drive(has: set[str], speeds: int, words: MachineWords, commanded: bool) -> _Told:
-    more = ("wheel.<W>.u_applied",)
+    more = ("wheel.*.u_applied",)
     if "u" not in has and words.drive != "valve":
         if "effort" in has:
             return False, "whether it is weak is not judged: what effort is healthy is not known", ()
         if not commanded:
-            return False, "not judged: no command is logged", ("cmd.v", "wheel.<W>.effort")
-        return False, "only a standstill under command shows; whether it is weak is not judged", ("wheel.<W>.effort",)
+            return False, "not judged: no command is logged", ("cmd.v", "wheel.*.effort")
+        return False, "only a standstill under command shows; whether it is weak is not judged", ("wheel.*.effort",)
     if "u" not in has:
-        return False, "not judged: no {valve} command is logged", ("wheel.<W>.u", *more)
+        return False, "not judged: no {valve} command is logged", ("wheel.*.u", *more)
     if "u_applied" in has:
-        return True, "told at any time, by its opening", ()
+        return True, "told while it is opened, by its measured opening", ()
     if "v" not in has:
-        return False, "not judged: no speed and no opening is logged", ("wheel.<W>.v", *more)
+        return False, "not judged: no speed and no opening is logged", ("wheel.*.v", *more)
     if speeds <= _OTHERS:
         return False, "too few {wheels} to compare with: a loss that lasts the whole mission does not show", more
     return (
@@ -133,27 +142,27 @@ def _wheel_drive(has: set[str], speeds: int, words: MachineWords, commanded: boo
 
 def _angle_sensor(has: set[str], yaw: bool, words: MachineWords, commanded: bool) -> _Told:
     if "phi" not in has:
-        return False, "not judged: no angle is logged", ("steer.<A>.phi",)
+        return False, "not judged: no angle is logged", ("steer.*.phi",)
     if "phi_true" in has:
-        return True, "told at any time, against its second measurement", ()
-    more: tuple[str, ...] = ("steer.<A>.phi_true",) if yaw else ("steer.<A>.phi_true or imu.yaw_rate",)
+        return True, "told while the axle is steered, against its second measurement; an offset at any time", ()
+    more: tuple[str, ...] = ("steer.*.phi_true",) if yaw else ("steer.*.phi_true or imu.yaw_rate",)
     if not has & {"u", "u_applied"}:
         if not commanded:
             return False, "not judged: neither a commanded angle nor a {valve} command is logged", (_ASKED, *more)
-        more = ("steer.<A>.u", *more)
+        more = ("steer.*.u", *more)
     offset = "an offset shows by the yaw rate" if yaw else "an offset does not show"
     return False, f"shows while the axle is steered, mostly as one of sensor or {words.drive}; {offset}", more
 
 
 def _steering_drive(has: set[str], words: MachineWords, commanded: bool) -> _Told:
-    more = ("steer.<A>.u_applied",)
+    more = ("steer.*.u_applied",)
     if "u" not in has and (not commanded or "phi" not in has or "u_applied" in has):
-        asked = _ASKED if "phi" in has and "u_applied" not in has else "steer.<A>.u"
+        asked = _ASKED if "phi" in has and "u_applied" not in has else "steer.*.u"
         return False, "not judged: no {valve} command is logged", (asked, *more)
     if "u" not in has:
-        return False, "shows while the axle is steered, mostly as one of sensor or {valve}", ("steer.<A>.u", *more)
+        return False, "shows while the axle is steered, mostly as one of sensor or {valve}", ("steer.*.u", *more)
     if "u_applied" in has:
-        return True, "told at any time, by its opening", ()
+        return True, "told while the axle is steered, by its measured opening", ()
     if "phi" not in has:
-        return False, "not judged: no angle and no opening is logged", ("steer.<A>.phi", *more)
+        return False, "not judged: no angle and no opening is logged", ("steer.*.phi", *more)
     return False, "shows while the axle is steered, mostly as one of sensor or {valve}", more

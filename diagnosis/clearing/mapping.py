@@ -129,7 +129,7 @@ def _hints(
     follows = np.where(np.isfinite(wanted), lowest_passed(wanted, cells.dt, _LAG_S if sizes else cells.dt), np.nan)
     told: set[int] = set()
     for i, j in combinations(range(len(names)), 2):
-        if _swapped(signals[:, [i, j]], follows[:, [i, j]]):
+        if _swapped(signals[:, [i, j]], follows[:, [i, j]], cells.dt):
             told |= {i, j}
             one, other = _part(names[i]), _part(names[j])
             text = f"{names[i]} follows {what.replace('its', 'the')} of {other}, and {names[j]} that of {one}: {_LOOK}"
@@ -199,11 +199,11 @@ def _factor(ratio: float, gear: float) -> str:
     return words or (f"{np.exp(ratio):.2g} times" if abs(ratio) > _NO_LOOP else "")
 
 
-def _swapped(measured: Array, wanted: Array) -> bool:
-    """Whether two signals, (cells, 2), follow each other's command much better than their own."""
+def _swapped(measured: Array, wanted: Array, dt: float) -> bool:
+    """Whether two signals, (cells, 2), follow each other's command much better than their own; `dt` in s."""
     use = np.isfinite(measured).all(axis=1) & np.isfinite(wanted).all(axis=1)
     y, x = measured[use], wanted[use]
-    if not y.size or np.mean(np.abs(x[:, 0] - x[:, 1])) < _DIFFER * np.max(np.abs(x)):
+    if len(y) * dt < _LEAST_S or np.mean(np.abs(x[:, 0] - x[:, 1])) < _DIFFER * np.max(np.abs(x)):
         return False
     y = y * (np.abs(x).sum() / max(float(np.abs(y).sum()), 1e-9))  # loops stay behind their commands
     own, other = (np.mean(np.abs(y - z)) for z in (x, x[:, ::-1]))

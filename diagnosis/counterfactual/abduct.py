@@ -179,7 +179,7 @@ def _check(timeline: Timeline, replay: Replay, machine: Machine, name: str) -> N
             raise NotJudged(f"{name}: wheel.{wheel}.{leaf} is not in the log; the {words} of every wheel is needed")
     if not any_finite(replay.v_ref).all():
         raise NotJudged(
-            f"{name}: the commanded speeds of the wheels are not known; log cmd.v and cmd.omega, or wheel.<W>.v_ref"
+            f"{name}: the commanded speeds of the wheels are not known; log cmd.v and cmd.omega, or wheel.*.v_ref"
         )
 
 

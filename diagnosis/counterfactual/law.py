@@ -50,7 +50,7 @@ def recorded_law(replay: Replay, machine: Machine, name: str) -> Law:
     if law is None or not replay.fits:
         raise NotJudged(
             f"{name}: no law is known to explain its valve commands, so that nothing can be said of another one; log "
-            "wheel.<W>.u and the commanded speeds, or name the law that ran with --recorded"
+            "wheel.*.u and the commanded speeds, or name the law that ran with --recorded"
         )
     if law.psi not in ("forced", PRINTED):
         raise NotJudged(

@@ -24,6 +24,8 @@ from diagnosis.results.vocabulary import Kind, Severity, Tier
 from replay.faults import Side, State
 from replay.machine.config import Limits, Machine
 from replay.mission import Mission
+from replay.readers.tables.table_log import TEXT_LEFT_OUT
+from replay.signals.like_wheels import kind_of
 from replay.signals.timeline import Timeline
 
 #: A component and its side.
@@ -284,6 +286,10 @@ def more_caveats(mission: Mission, first_ns: int, machine: Machine) -> list[str]
                 else ""
             )
         )
+    if texts := _texts(mission):
+        out.append(
+            f"{TEXT_LEFT_OUT.capitalize()} that are called like signals: {', '.join(texts)}. Export them as numbers."
+        )
     if machine.questions:
         out.append(
             f"The machine file still asks: {' '.join(q[:1].upper() + q[1:] for q in machine.questions)} Answer there, and delete the lines marked QUESTION."
@@ -292,6 +298,13 @@ def more_caveats(mission: Mission, first_ns: int, machine: Machine) -> list[str]
     if cut > mission.timeline.dt:
         out.append(f"Only a part of the mission was judged; times count from its start, {cut:.3f} s into the log.")
     return out
+
+
+def _texts(mission: Mission) -> list[str]:
+    """Columns of text that were left out, and are called like what a signal is taken from."""
+    kinds = {kind for s in mission.signals.items.values() if (kind := kind_of(s.origin.label))}
+    notes = [note for f in mission.files for note in f.summary.notes if f"{TEXT_LEFT_OUT}: " in note]
+    return [n for note in notes for n in note.partition(f"{TEXT_LEFT_OUT}: ")[2].split(", ") if kind_of(n) in kinds]
 
 
 def _alike(names: Sequence[str]) -> list[str]:

@@ -7,9 +7,11 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from diagnosis.results.assessment import STATES, Assessment
-from diagnosis.results.ending import Ending, how_it_ends
+from diagnosis.results.ending import NEVER_JUDGED, Ending, how_it_ends
 from diagnosis.results.result import FaultInterval
 from replay.faults import State
+
+_NEVER = [STATES.index(state) for state in NEVER_JUDGED]
 
 
 def endings_of(
@@ -31,8 +33,9 @@ def endings_of(
     out = {}
     for fault in faults:
         healthy = []
-        for side in fault.side.sides:
-            states = assessments[fault.component, side].states
+        sides = [assessments[fault.component, side].states for side in fault.side.sides]
+        judged = [states for states in sides if not np.isin(states, _NEVER).all()]
+        for states in judged or sides:
             behind = states[int(fault.stop_s / end_s * states.size) :]
             healthy.append(np.count_nonzero(behind == STATES.index(State.HEALTHY)) * end_s / states.size)
         out[fault.id] = how_it_ends(fault.stop_s, end_s, min(healthy))

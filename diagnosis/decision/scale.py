@@ -117,7 +117,7 @@ class Scale(NamedTuple):
         )
 
 
-def scale_of(cells: Cells, units: Collection[str]) -> Scale | None:
+def scale_of(cells: Cells, units: Collection[str], *, factor: float = 1.0) -> Scale | None:
     """What sensors of the body say of the scale of the wheels' speeds; None for a machine whose parts are no wheels.
 
     Parameters
@@ -126,6 +126,8 @@ def scale_of(cells: Cells, units: Collection[str]) -> Scale | None:
         The mission.
     units : Collection[str]
         Units in which the wheels' speeds were recorded.
+    factor : float
+        By what they were multiplied before they were judged [1].
     """
     machine = cells.machine
     if machine.speed_unit != "m/s":
@@ -134,6 +136,7 @@ def scale_of(cells: Cells, units: Collection[str]) -> Scale | None:
     diameter = machine.geometry.wheel_diameter if machine.geometry is not None and turned else None
     speeds = cells.wheels("v")
     found = () if not np.isfinite(speeds).any() else (*_straight(cells, speeds), *_turning(cells, speeds))
+    found = tuple(s._replace(factor=s.factor * factor) for s in found)
     return Scale(diameter, found, assumed="geometry" in machine.assumed)
 
 

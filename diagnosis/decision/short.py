@@ -123,9 +123,9 @@ def short_parts(
 
 
 def _components(parts: Sequence[Part]) -> str:
-    """Components as a name of a signal has them: ``FR``, of several ``<W>``."""
+    """Components as a name of a signal has them: ``FR``, of several ``*``."""
     names = {component for component, _ in parts}
-    return names.pop() if len(names) == 1 else "<part>"
+    return names.pop() if len(names) == 1 else "*"
 
 
 def _span(values: Sequence[float], form: str) -> str:
@@ -144,7 +144,7 @@ def unjudged_axles(axles: Sequence[Part], assessments: Mapping[Part, Assessment]
     act = (
         _act_of_axle(axles[0][1], state, lack).replace("{c}", _components(axles))
         if lack is Lack.OPENING_UNIT
-        else "log steer.<part>.phi and steer.<part>.u, and steer from stop to stop twice while driving"
+        else "log steer.*.phi and steer.*.u, and steer from stop to stop twice while driving"
         if lack in (Lack.SIGNALS, Lack.COMMAND)
         else "steer from stop to stop twice at standstill and several times while driving, with the log running"
     )

@@ -62,13 +62,21 @@ def to_clear(
                 "in the machine file if they were recorded under another name",
             )
         )
+    cut = [cut.text for cut in against.scope if cut.kind in (CutKind.LOG, CutKind.WHEELS)]
+    if cut:
+        out.append(
+            ToClear(
+                f"{_sentence(join_words(cut))}.",
+                "diagnose the whole log, with every part (no --start, --end, --wheel)",
+            )
+        )
     out += [ToClear(event.text, event.act) for event in against.events]
     out += [ToClear(text, "correct [signals] in a machine file, and diagnose again") for text in against.hints]
     out += short_parts(against.short, assessments, decided_s, driven, limits, words, open_state=against.open_state)
     if against.unexplained:
         for kind, second in (
-            (Kind.WHEEL, "wheel.<part>.v_true (a second speed)"),
-            (Kind.STEER, "steer.<part>.phi_true (a second angle)"),
+            (Kind.WHEEL, "wheel.*.v_true (a second speed)"),
+            (Kind.STEER, "steer.*.phi_true (a second angle)"),
         ):
             parts = {c for c, _ in against.unexplained if (c in axles) is (kind is Kind.STEER)}
             if not parts:
@@ -78,7 +86,7 @@ def to_clear(
                 p in assessments and assessments[p].tier is Tier.DIRECT for p in ((c, "actuator") for c in parts)
             )
             asked = words.drive == "valve" and kind is Kind.WHEEL and not logged
-            other = " or wheel.<part>.u_applied (the valve position)" if asked else ""
+            other = " or wheel.*.u_applied (the valve position)" if asked else ""
             out.append(
                 ToClear(
                     f"{who}: no single fault explains the residual.",
@@ -106,20 +114,13 @@ def to_clear(
                 else "copy the log from the machine once more, or record another mission",
             )
         )
-    cut = [cut.text for cut in against.scope if cut.kind in (CutKind.LOG, CutKind.WHEELS)]
-    if cut:
-        out.append(
-            ToClear(
-                f"{_sentence(join_words(cut))}.",
-                "diagnose the whole log, with every part (no --start, --end, --wheel)",
-            )
-        )
     others = [cut.text for cut in against.scope if cut.kind is CutKind.OTHERS]
     if others:
         out.append(
             ToClear(
                 f"{_sentence(join_words(others))}.",
-                "write a machine file from this log (`mfhca config init --log LOG -o machine.toml`), and diagnose with it",
+                "write a machine file from this log (`mfhca config init --log LOG -o machine.toml`) in which every wheel has its lines, and diagnose "
+                "with it",
             )
         )
     empty = [cut.text for cut in against.scope if cut.kind is CutKind.DATA and not cut.components]
@@ -288,7 +289,7 @@ def _act(check: Checked, twice: Collection[str]) -> str:
         return _STEER
     if check.check is Check.CARRIED:
         return (
-            f"log wheel.<part>.u_applied (the {words.drive}'s own measurement), or lift the machine, give every {words.part} the same "
+            f"log wheel.*.u_applied (the {words.drive}'s own measurement), or lift the machine, give every {words.part} the same "
             "command for 10 s, and diagnose that log"
         )
     if check.check is Check.BEHIND:
@@ -301,13 +302,11 @@ def _act(check: Checked, twice: Collection[str]) -> str:
     if check.check is Check.ROUGHNESS and check.worst is not None:
         return words.fill(
             "check the connector, the cable and the target of the {wheel.sensor}, and drive the same again"
-        ) + ("" if check.component in twice else "; a log with wheel.<part>.v_true (a second speed) settles it")
+        ) + ("" if check.component in twice else "; a log with wheel.*.v_true (a second speed) settles it")
     if check.worst is None:
         return f"move all {words.parts} together at one steady speed for at least 10 s, and diagnose that log"
     lifted = f"lift the machine, give every {words.part} the same command for 10 s, and compare their speeds with a hand tachometer"
-    return (
-        lifted if check.component in twice else f"{lifted}; a log with wheel.<part>.v_true (a second speed) settles it"
-    )
+    return lifted if check.component in twice else f"{lifted}; a log with wheel.*.v_true (a second speed) settles it"
 
 
 def _sentence(text: str) -> str:

@@ -99,7 +99,7 @@ def fit_missions(missions: Sequence[Mission], machine: Machine, *, progress: Sub
     bad = {s for e in errors for s in e.signals}
     if not errors and not any(f"wheel.{w}.u" in t.signals for t in timelines for w in machine.wheels):
         raise NotJudged(
-            f"{', '.join(names) or 'no mission'}: no command of a valve or drive (wheel.<W>.u: opening, duty, torque) is logged beside "
+            f"{', '.join(names) or 'no mission'}: no command of a valve or drive (wheel.*.u: opening, duty, torque) is logged beside "
             "the speeds, and what `mfhca fit` finds is how speeds answer it; machines that follow commanded speeds are diagnosed without it"
         )
     if driving < _LEAST_SECONDS and not errors:

@@ -188,7 +188,7 @@ def going_out(report: ReportDocument) -> tuple[str, str]:
         return "No", ", not before repair"
     if not may_go_out(report["verdict"]):
         why = report["verdict"]["not_cleared"]
-        return "No", f", not before it was checked{': ' if why else ''}{why}"
+        return "No", f", it must be checked first{': ' if why else ''}{why}"
     return "Yes", "; the faults to watch are no reason to keep it in" if status is Verdict.WATCH else ""
 
 

@@ -78,12 +78,16 @@ _EXCHANGED = (
 
 @dataclass(frozen=True)
 class Judgement:
-    """Both sides of each wheel that could be judged, and what happened to the machine as a whole, to its gyro and to all speeds, a sentence each."""
+    """Both sides of each wheel that could be judged, and what happened to the machine as a whole, to its gyro and to all speeds, a sentence each.
+
+    `unrelated` says that speeds and commands are of sizes that nothing relates.
+    """
 
     parts: Mapping[str, tuple[Assessment, Assessment]]
     events: tuple[str, ...]
     gyro: tuple[str, ...] = ()
     unshown: tuple[str, ...] = ()
+    unrelated: tuple[str, ...] = ()
 
 
 def assess_response(
@@ -128,7 +132,7 @@ def assess_response(
         stood = standstills(idle, dt)
         ignored = () if stood or seen else unexplained(drives, limits, dt)
         ignored, said = witnessed(ignored, witness, seen, drives, speeds, (width, limits, dt))
-        return Judgement({}, stood or ignored, (), said)
+        return Judgement({}, stood, (), said, () if stood else ignored)
     rest = {w: samples_of(d.y, d.fresh) for w, d in data.items() if w not in found}
     found = by_each_other(found, width * dt, rest)
     holds = {w: holds_of(j.wheel.samples, MOVES * limits.driving_speed, dt) for w, j in found.items()}
@@ -251,7 +255,7 @@ def assess_response(
         paused([f for side in parts.values() for f in side[0].findings], dt) if len(data) == 1 else ()
     )
     ignored, said = witnessed(ignored, witness, seen, drives, speeds, (width, limits, dt))
-    return Judgement(parts, (*stood, *(astray if lasts else ()), *ignored), gyro, said)
+    return Judgement(parts, (*stood, *(astray if lasts else ())), gyro, said, ignored)
 
 
 def _turned_by(wheel: str, found: Mapping[str, Judged]) -> bool:

@@ -17,7 +17,7 @@ from diagnosis.response.models import BLOCK_S
 from diagnosis.response.sides import without_doubles
 from diagnosis.response.tracking import assess_channel, assess_tracking
 from diagnosis.results.assessment import Assessment, Reason
-from diagnosis.results.machine_event import not_following, not_shown, other_yaw_rate, turns_otherwise
+from diagnosis.results.machine_event import not_following, not_related, not_shown, other_yaw_rate, turns_otherwise
 from diagnosis.results.vocabulary import Tier
 from replay.machine.config import Machine
 
@@ -54,6 +54,7 @@ class ResponseEvidence:
                     parts[wheel, side] = doubted(part, spans, _TURNS_OTHERWISE)
         events = (
             *map(not_following, judged.events),
+            *map(not_related, judged.unrelated),
             *map(not_shown, judged.unshown),
             *map(other_yaw_rate, judged.gyro),
             *(turns_otherwise(t.text) for t in turns),

@@ -11,6 +11,8 @@ from replay.faults import Side, State
 _END_S = 1.0  # before the end of the log: a fault that is found until then lasts to it
 #: Healthy time behind a fault that shows that it is gone [s].
 HEALTHY_S = 1.0
+#: States of which a side that was never judged has no other.
+NEVER_JUDGED = (State.NOT_ASSESSED, State.NO_DATA)
 
 
 class Ending(StrEnum):
@@ -34,12 +36,16 @@ def how_it_ends(stop_s: float, duration_s: float, healthy_s: float) -> Ending:
 
 
 def healthy_after(component: str, side: Side, after_s: float, states: Sequence[StateRow]) -> float:
-    """For how long every side of a part was healthy behind a time of the mission [s], the least of them [s]."""
+    """For how long every side of a part that was judged at all was healthy behind a time of the mission [s], the least of them [s]."""
     healthy = dict.fromkeys(((component, s.value) for s in side.sides), 0.0)
+    judged = set()
     for row in states:
-        if (row["component"], row["side"]) in healthy and row["state"] == State.HEALTHY:
-            healthy[row["component"], row["side"]] += max(0.0, row["stop_s"] - max(after_s, row["start_s"]))
-    return min(healthy.values())
+        key = (row["component"], row["side"])
+        if key in healthy and row["state"] not in NEVER_JUDGED:
+            judged.add(key)
+        if key in healthy and row["state"] == State.HEALTHY:
+            healthy[key] += max(0.0, row["stop_s"] - max(after_s, row["start_s"]))
+    return min(seconds for key, seconds in healthy.items() if key in judged or not judged)
 
 
 def ending_of(fault: IntervalRow, report: ReportDocument) -> Ending:

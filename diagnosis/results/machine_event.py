@@ -49,6 +49,17 @@ def not_following(text: str) -> MachineEvent:
     return MachineEvent(title, text, doubt, "enable the drives, release the emergency stop, and record a mission again")
 
 
+def not_related(text: str) -> MachineEvent:
+    """Speeds and commands are of sizes that nothing relates, from start to end."""
+    title = "The machine did not follow its commands"
+    doubt = "the machine did not follow its commands"
+    act = (
+        "give wheel diameter, gear ratio and units in a machine file (`mfhca config init --log LOG`), check which topic or symbol commands the "
+        "machine, and diagnose again; if it was held or its drives were off, record a mission in which they are on"
+    )
+    return MachineEvent(title, text, doubt, act)
+
+
 def not_shown(text: str) -> MachineEvent:
     """The machine went as it was told, by a receiver, and its speeds do not show it."""
     title = "The speeds do not show how the machine went"
@@ -84,8 +95,14 @@ def openings_doubted(text: str, act: str) -> MachineEvent:
     return MachineEvent("The unit of the {valve} openings is in doubt", f"{text}.", doubt, f"{act}, and diagnose again")
 
 
+def speeds_doubted(text: str, act: str) -> MachineEvent:
+    """All wheels share what can only be a wrong size or unit of their speeds; `text` and `act` without their stops."""
+    doubt = "the scale of the {wheel} speeds is in doubt"
+    return MachineEvent("The machine's settings do not fit the log", f"{text}.", doubt, f"{act}, and diagnose again")
+
+
 def foreign(text: str) -> MachineEvent:
     """Most wheels deviate now and then from a wheel model that does not fit the machine."""
     doubt = "most {wheels} deviate now and then from what the {wheel} model expects"
-    act = "record {valve} positions (wheel.<W>.u_applied), or give the machine's [plant], and diagnose again"
+    act = "record {valve} positions (wheel.*.u_applied), or give the machine's [plant], and diagnose again"
     return MachineEvent("The {wheel} model does not fit this machine", text, doubt, act, model=True)

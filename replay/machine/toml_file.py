@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from replay.border import UnforeseenValue, bordered
-from replay.errors import ConfigError
+from replay.errors import ConfigError, check_range
 from replay.faults import FaultMode, Side
 from replay.log.source_options import SignalSource, SourceOptions
 from replay.machine.axle_plant import AxlePlant
@@ -83,6 +83,9 @@ def _machine(data: Mapping[str, Any]) -> Machine:
     top = {key: _number(f"geometry.{key}", geo.pop(key)) for key in MACHINE_LEVEL if key in geo}
     geometry = _geometry(geo, tuple(wheels), base)
     speed = top.get("max_speed", base.max_speed)
+    check_range(
+        "geometry.max_speed", speed, 1e-6, 1e6, str(head.get("speed_unit", base.speed_unit))
+    )  # before limits are made of it
     limits = dict(data.get("limits", {}))
     limits.setdefault("driving_speed", round(base.limits.driving_speed * speed / base.max_speed, 9))
     limits.setdefault("min_sat", round(base.limits.min_sat * speed / base.max_speed, 9))

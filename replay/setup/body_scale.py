@@ -69,16 +69,16 @@ def _scaled(line: Timeline, machine: Machine, mean: NDArray[np.float64], step: i
             if name != "cmd.v":
                 return
             continue
-        fits = "is the unit or gain of wheel.<W>.v right?"
+        fits = "is the unit or gain of wheel.*.v right?"
         if turning and machine.geometry is not None:
             diameter = machine.geometry.wheel_diameter
             radius = " (is it the radius?)" if abs(np.log(factor / 2)) < _TWICE else ""
             fits = (
-                f"is wheel_diameter = {diameter:g}{radius}, gear_ratio = {machine.gear_ratio:g} or the unit of wheel.<W>.v right? "
+                f"is wheel_diameter = {diameter:g}{radius}, gear_ratio = {machine.gear_ratio:g} or the unit of wheel.*.v right? "
                 f"A wheel of {diameter * factor:.3g} m would fit"
             )
         if unit := next((words for k, words in _UNITS if abs(np.log(factor / k)) < _NEAR), ""):
-            fits = f"is the unit of wheel.<W>.v right ({unit}?)"
+            fits = f"is the unit of wheel.*.v right ({unit}?)"
         yield f"by {what} the machine is {factor:.3g} times as fast as by its wheels throughout: {fits}"
         return
 

@@ -96,7 +96,7 @@ def units_by_positions(draft: Draft, structure: Structure, found: Signals) -> di
     fits = f"{unit} is written, with which they agree" if unit else "give the unit or gain of the one that is wrong"
     draft.ask(
         "signals",
-        f"in which units are wheel.<W>.v and wheel.<W>.v_position? As recorded {', '.join(n.split('.')[1] for n in gains)} read {gain:.3g} × "
+        f"in which units are wheel.*.v and wheel.*.v_position? As recorded {', '.join(n.split('.')[1] for n in gains)} read {gain:.3g} × "
         f"the slope of the position of their own joint (median); {fits}.",
     )
     return {n: replace(found.items[n].origin, unit=unit) for n in gains} if unit else {}

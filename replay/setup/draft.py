@@ -21,7 +21,7 @@ from replay.setup.draft_notes import Draft
 from replay.setup.given import ask_about_odometry, given_signals, odometry, table_sources
 from replay.setup.lengths import largest_angle, limits_for, wheel_places, wheel_radius, with_speeds, without_size
 from replay.setup.motion import WheelMotion, backwards, wheel_motion
-from replay.setup.numbered_wheels import ask_for_numbers, ordered_by_turns
+from replay.setup.numbered_wheels import ask_for_more_wheels, ask_for_numbers, ordered_by_turns
 from replay.setup.one_clock import lags
 from replay.setup.preset import Preset
 from replay.setup.read import options_of
@@ -30,6 +30,7 @@ from replay.setup.structure import ONE, Structure, described_structure, named_st
 from replay.setup.unstated_units import usual_units, valve_currents
 from replay.setup.unsure_signals import unsure_signals
 from replay.signals.file_names import named_channels
+from replay.signals.like_wheels import like_wheels
 from replay.signals.mapping import by_number, map_signals
 from replay.signals.possible_commands import possible_commands
 from replay.signals.signal import Signals
@@ -136,6 +137,7 @@ def draft_machine(logs: Sequence[RawLog], preset: Preset | None = None) -> Draft
     origins = _in_one_direction(draft, structure, found, motions)
     origins = {name: signal.origin for name, signal in every.items.items()} | origins
     _ask_for_what_is_missing(draft, every, channels)
+    ask_for_more_wheels(draft, like_wheels({n: c for n, c in channels.items() if n not in empty}, origins))
     motions = in_turn_with_commands(draft, structure, found, motions, origins)
     straight = [w for w, p in (structure.places or {}).items() if p.axle == "fixed"]
     radius = wheel_radius(

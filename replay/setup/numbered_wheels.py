@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from replay.setup.draft_notes import Draft
 from replay.setup.motion import WheelMotion
 from replay.setup.structure import Structure
+from replay.signals.like_wheels import WHICH
 from replay.signals.name_parts import position
 
+_NAMED = 8  # channels in a question
 _LEAST = 0.03  # m from the middle, from which a side is told
 
 
@@ -67,4 +69,27 @@ def ask_for_numbers(draft: Draft, numbered: list[str], by_turns: bool) -> None:
         "machine",
         f"which wheel has which number? {', '.join(numbered)}: {told}; a wrong order blames the wrong wheel. Put the wheels into "
         "their order, or change the lines below.",
+    )
+
+
+def ask_for_more_wheels(draft: Draft, names: Sequence[str]) -> None:
+    """Ask for wheels whose speeds are in the log, and which the draft does not have.
+
+    Parameters
+    ----------
+    draft : Draft
+        Takes the question.
+    names : Sequence[str]
+        Channels that are called like a wheel's speed; empty: nothing is asked.
+    """
+    if not names:
+        return
+    own = draft.machine.wheels
+    many = len(names) > 1
+    draft.ask(
+        "machine",
+        f"{WHICH[many]}{', '.join(names[:_NAMED])}{', …' if len(names) > _NAMED else ''}? {'They are' if many else 'It is'} called like a speed of {', '.join(own)}, and "
+        f"{'are' if many else 'is'} of none of these: {'they were' if many else 'it was'} left out, and nothing clears a machine with wheels "
+        "that nobody judged. Give each a name in wheels, a place in [geometry], and lines in [signals] like those below; "
+        f"delete this question if {'they are' if many else 'it is'} no wheel{'s' if many else ''}.",
     )

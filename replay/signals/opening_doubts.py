@@ -29,6 +29,7 @@ _VALVES = 2
 _KNOWN = (10.0, 100.0, 1000.0)  # factors of units, which one valve alone may show
 _FULL = 1.1  # of full opening
 _VOLTS, _AT_LIMIT, _HELD = 10.0, 0.005, 0.01  # a saturated command in volts [V], how near it is, share of samples there
+_MOST_VOLTS = 10.5  # what an analogue signal of 10 V may reach
 _STILL = 0.01  # of the usual speed
 _REST, _EVEN = 0.25, 0.05  # of the largest command: where valves rest that rest nowhere near 0, and how alike
 _CLOSED = ((5.0, 0.2, -1.0, "0 to 10 V, 5 V closed"), (12.0, 0.125, -1.5, "4 to 20 mA, 12 mA closed"), (4.0, 0.0625, -0.25, "4 to 20 mA, 4 mA closed"))  # fmt: skip
@@ -75,6 +76,7 @@ def opening_doubt(timeline: Timeline, items: Mapping[str, Signal], machine: Mach
     values = {n: np.asarray(timeline.signals[n][::every], dtype=np.float64) for n in origins}
     return (
         _unanswered(origins)
+        or _beyond_full(values, items, machine)
         or _apart(values, origins, machine, timeline.dt * every)
         or _saturated(values, origins)
         or _resting_open(timeline, every, values, origins, machine)
@@ -96,6 +98,27 @@ def _unanswered(origins: Mapping[str, SignalSource]) -> OpeningDoubt | None:
             text = f"The machine file has unit = {unit!r} for {_listed(named)}, and the question was not answered: {_UNJUDGED}"
             return OpeningDoubt(text, f'write unit = "%", or {_SCALES[unit]}, in each of these lines of [signals]')
     return None
+
+
+def _beyond_full(values: Mapping[str, Array], items: Mapping[str, Signal], machine: Machine) -> OpeningDoubt | None:
+    """Openings of which nobody stated a unit, and that are no fractions: several valves go beyond full opening, and stay there."""
+    bare = [n for n in values if items[n].origin.unit is None or (items[n].guessed and items[n].origin.unit == "1")]
+    full = _FULL * max(machine.control.u_max, 1.0)
+    commands = [n for n in bare if n.endswith(".u")]
+    beyond = [n for n in commands or bare if np.count_nonzero(np.abs(values[n]) > full) >= _LEAST]
+    if not beyond or len(beyond) < min(_VALVES, len(commands or bare)):
+        return None
+    reach = max(_peak(values[n]) for n in beyond)
+    text = f"No unit is stated for {_listed(beyond)}, and they reach {reach:.3g}, where 1 is full opening: {_UNJUDGED}"
+    own = items[beyond[0]].origin
+    percent = signal_line(beyond[0], replace(own, unit="%"))
+    volts = (
+        f", or where 10 V open it fully {signal_line(beyond[0], replace(own, unit='1', gain=0.1))}"
+        if reach <= _MOST_VOLTS
+        else ""
+    )
+    line = f"{percent}{volts}{_likewise(bare)}"
+    return OpeningDoubt(text, f"write under [signals] of a machine file (`mfhca config init` drafts one) {line}")
 
 
 def _apart(values: Mapping[str, Array], origins: Mapping[str, SignalSource], machine: Machine, dt: float) -> OpeningDoubt | None:  # fmt: skip

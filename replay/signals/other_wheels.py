@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from replay.log.raw_log import Channel
+from replay.log.source_options import SignalSource
 from replay.machine.config import Machine
 from replay.machine.geometry import Geometry, WheelGeometry
+from replay.signals.like_wheels import like_wheels
 from replay.signals.name_parts import position, wheel_said
 from replay.signals.rules import candidates
 
@@ -20,8 +22,12 @@ _PLACES = {
 }
 
 
-def other_wheels(channels: Mapping[str, Channel], machine: Machine) -> tuple[str, ...]:
-    """Names of the wheels in the middle of a log's machine that has speeds of six; empty where the machine file lists signals.
+def other_wheels(
+    channels: Mapping[str, Channel], machine: Machine, taken: Mapping[str, SignalSource] | None = None
+) -> tuple[str, ...]:
+    """Names of the wheels in the middle of a log's machine that has speeds of six, else of channels that are called like wheels' speeds.
+
+    Empty where the machine file lists signals: `mfhca config init` asks about such channels in the file.
 
     Parameters
     ----------
@@ -29,8 +35,17 @@ def other_wheels(channels: Mapping[str, Channel], machine: Machine) -> tuple[str
         Of all files, by the names that say what they hold.
     machine : Machine
         The machine that the log is judged by.
+    taken : Mapping[str, SignalSource] or None
+        What each signal is taken from, by canonical name.
     """
-    if machine.signals or len(machine.wheels) >= len(_PLACES) or len(machine.wheels) < 2:
+    if machine.signals or len(machine.wheels) < 2:
+        return ()
+    return _in_the_middle(channels, machine) or like_wheels(channels, taken or {})
+
+
+def _in_the_middle(channels: Mapping[str, Channel], machine: Machine) -> tuple[str, ...]:
+    """Wheels in the middle of a log's machine that has speeds of six, beside a machine of fewer."""
+    if len(machine.wheels) >= len(_PLACES):
         return ()
     geometry = Geometry({w: WheelGeometry(x, y, 0.0, "fixed") for w, (x, y) in _PLACES.items()}, 0.2)
     six = Machine("six wheels", "", tuple(_PLACES), geometry, max_speed=1e6)

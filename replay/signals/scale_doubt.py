@@ -50,7 +50,7 @@ def scale_doubt(items: Mapping[str, Signal], machine: Machine) -> str:
     how = f"{times:.3g} times as fast as" if times > 1 else f"{1 / times:.3g} times slower than"
     return (
         f"all wheels move in step with cmd.v, but {how} it commands: is geometry.wheel_diameter, gear_ratio, "
-        "or the unit of wheel.<W>.v or cmd.v right?"
+        "or the unit of wheel.*.v or cmd.v right?"
     )
 
 

@@ -27,6 +27,7 @@ from replay.signals.to_si import factor_of, magnitudes, peak_of
 _TOO_FAST = 3.0
 _WIDE = 1.5
 _MOST_VOLTS = 10.5  # what an analogue signal of 10 V may reach
+_CURRENT = (3.5, 21.0)  # mA; what a signal of 4 to 20 mA keeps between
 _MOST_OF_IT = 0.2  # of the samples other than zero lie beyond the limit: no spikes
 _ANY_MACHINE = 30.0  # m/s; faster than any machine whose top speed was not given
 _SOUND = 2  # other signals of the kind, recorded in the same unit, that are plausible: then it is a fault of this one
@@ -160,6 +161,13 @@ def _fitting_speed(signal: str, peak: float, origin: SignalSource, machine: Mach
 
 def _too_open(signal: str, values: NDArray[np.float64], peak: float, origin: SignalSource, machine: Machine) -> Doubt:
     unit = origin.unit or SI_UNITS["fraction"]
+    if _is_current(values / factor_of(signal, origin, machine)):
+        ways = (("12 mA close it", 0.125, -1.5), ("4 mA close it", 0.0625, -0.25))
+        lines = (
+            f"where {what} {signal_line(signal, replace(origin, unit='1', gain=g, offset=b))}" for what, g, b in ways
+        )
+        said = f"{signal} reaches {peak:.3g} of full opening with unit {unit!r}; it is probably a current of 4 to 20 mA; check its unit"
+        return Doubt(signal, said, ", or ".join(lines), _mostly_beyond(values, machine.control.u_max))
     percent = _WIDE < peak <= 150
     volts = percent and peak <= _MOST_VOLTS  # nothing tells them from %
     probably = "; it is in % or in volts" if volts else "; it is probably %" if percent else ""
@@ -168,6 +176,15 @@ def _too_open(signal: str, values: NDArray[np.float64], peak: float, origin: Sig
     other = f", or where 10 V open it fully {signal_line(signal, replace(origin, unit='1', gain=0.1))}" if volts else ""
     line = f"{signal_line(signal, tried)}{other}"
     return Doubt(signal, f"{text}; check its unit", line, _mostly_beyond(values, machine.control.u_max))
+
+
+def _is_current(recorded: NDArray[np.float64]) -> bool:
+    """Whether values as recorded keep between 4 and 20."""
+    known = recorded[np.isfinite(recorded)]
+    if not known.size:
+        return False
+    low, high = np.quantile(known, [0.01, 0.99])
+    return bool(_CURRENT[0] <= low and high <= _CURRENT[1])
 
 
 def _too_far(signal: str, values: NDArray[np.float64], peak: float, origin: SignalSource, machine: Machine) -> Doubt:

@@ -9,6 +9,7 @@ import pytest
 
 from diagnosis.pipeline import diagnose_signals
 from replay.log.raw_log import Channel
+from replay.log.source_options import SignalSource
 from replay.machine.config import haulotte
 from replay.signals.other_wheels import other_wheels
 from replay.signals.signal import Signals
@@ -50,3 +51,17 @@ def test_a_log_of_more_wheels_clears_no_machine_of_four() -> None:
     verdict = diagnose_signals(signals, haulotte()).report["verdict"]
     assert "the log names 2 more wheels than this machine has (MR, ML), which were not judged" in verdict["scope"]
     assert not verdict["cleared"]
+
+
+@pytest.mark.parametrize("asked", ["which wheels are left_3_speed, right_3_speed?", "which wheel is rear_speed?"])
+def test_a_machine_file_that_still_asks_for_wheels_clears_nothing(asked: str) -> None:
+    machine = replace(haulotte(), questions=("How fast can it go?", asked))
+    verdict = diagnose_signals(signals_of(simulated(), base=False), machine).report["verdict"]
+    assert not verdict["cleared"]
+    assert f"the machine file still asks {asked[:-1]}: not judged" in verdict["scope"]
+
+
+def test_numbered_wheels_beyond_the_machine_s_are_named_without_a_machine_file() -> None:
+    six = channels("w1", "w2", "w3", "w4", "w5", "w6")
+    taken = {f"wheel.{w}.v": SignalSource(column=f"w{i + 1}_speed") for i, w in enumerate(haulotte().wheels)}
+    assert other_wheels(six, haulotte(), taken) == ("w5_speed", "w6_speed")

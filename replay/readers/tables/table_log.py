@@ -100,6 +100,10 @@ class RowTimes:
         return compressed(stamps, remain, self.report.store), remain
 
 
+#: What a note on columns of text says.
+TEXT_LEFT_OUT = "columns of text were left out"
+
+
 def table_log(
     path: Path, form: str, clock: Clock, times: RowTimes, columns: Mapping[str, Finished], texts: Collection[str],
     metadata: Mapping[str, str],
@@ -137,7 +141,7 @@ def table_log(
             label, "", label, at, values, unit_of(label), "text" if values.dtype == object else str(values.dtype)
         )
     if texts:
-        report.note(f"{path.name}: columns of text were left out: {', '.join([*texts][:6])}")
+        report.note(f"{path.name}: {TEXT_LEFT_OUT}: {', '.join([*texts][:6])}")
     back = int(sum(np.count_nonzero(np.diff(at[i : i + 1_048_577]) < 0) for i in range(0, len(at), 1_048_576)))
     if back > 0.01 * len(at):
         report.note(f"{path.name}: {back} of {len(at)} stamps are earlier than the one before")

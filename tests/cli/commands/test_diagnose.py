@@ -284,7 +284,9 @@ def test_steering_that_ends_early_gives_no_all_clear(tmp_path: Path) -> None:
     assert run(["diagnose", str(tmp_path / "half.csv"), "-o", str(tmp_path / "out")]) == 3
     report = json.loads((tmp_path / "out" / "report.json").read_text(encoding="utf-8"))
     assert not report["verdict"]["cleared"]
-    assert any("without data, the front steering was not judged" in text for text in report["verdict"]["scope"])
+    assert any(
+        "without data, the front and rear steering was not judged" in text for text in report["verdict"]["scope"]
+    )
 
 
 def test_a_second_file_that_gives_nothing_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -365,3 +367,37 @@ def test_a_second_file_without_any_signal_is_a_note(tmp_path: Path, capsys: pyte
     report = json.loads((out / "report.json").read_text(encoding="utf-8"))
     assert "none of its channels is a signal" in capsys.readouterr().out
     assert any("weather.csv: none of its channels is a signal" in q["result"] + q["effect"] for q in report["quality"])
+
+
+@pytest.mark.parametrize("name", ["report.html", "report.json", "report.parquet"])
+def test_a_file_of_somebody_else_is_not_replaced(
+    name: str, tmp_path: Path, calls: dict[str, Any], capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / name).write_text("<html>my own page</html>")
+    assert run(["diagnose", "drive.mcap", "-o", str(tmp_path)]) == 2
+    said = " ".join(capsys.readouterr().err.split())
+    assert "was not written by mfhca and was not replaced; move it away, or give another folder with -o" in said
+    assert (tmp_path / name).read_text() == "<html>my own page</html>"
+
+
+def test_a_column_of_text_that_is_called_like_a_signal_is_said(tmp_path: Path) -> None:
+    table = small_table(tmp_path)
+    table["wheel.FR.v"] = [f"{x:.3f} m/s" for x in table["wheel.FR.v"]]
+    table["driver"] = "somebody"
+    table.to_csv(tmp_path / "text.csv", index=False)
+    assert run(["diagnose", str(tmp_path / "text.csv"), "-o", str(tmp_path / "out")]) == 3
+    caveats = json.loads((tmp_path / "out" / "report.json").read_text(encoding="utf-8"))["verdict"]["caveats"]
+    said = "Columns of text were left out that are called like signals: wheel.FR.v. Export them as numbers."
+    assert said in caveats
+
+
+def test_of_a_part_of_a_log_the_whole_is_what_clears_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    small_table(tmp_path)
+    assert run(["diagnose", str(tmp_path / "ok.csv"), "--start", "5", "--end", "8", "-o", str(tmp_path / "out")]) == 3
+    assert "To clear it: diagnose the whole log" in " ".join(capsys.readouterr().out.split())
+
+
+def test_no_name_of_a_wheel_is_shown_as_such(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    small_table(tmp_path)
+    assert run(["diagnose", str(tmp_path / "ok.csv"), "--wheel", "", "-o", str(tmp_path / "out")]) == 2
+    assert "--wheel '': no such wheel" in capsys.readouterr().err

@@ -253,3 +253,27 @@ def test_the_summary_that_a_recorder_leaves_is_not_printed_raw(capsys: pytest.Ca
     out = capsys.readouterr().out
     assert "ros_distro: jazzy" in out
     assert "serialized_metadata" not in out
+
+
+@pytest.mark.parametrize(
+    ("first", "said"),
+    [("0.0", "from 0.000 s of a clock without a date"), ("1760000000.0", "2025-10-09 08:53:20.000 UTC")],
+)
+def test_time_that_counts_from_a_start_is_no_date(
+    first: str, said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rows = "".join(f"{float(first) + k / 10:.1f},{k}\n" for k in range(50))
+    (tmp_path / "a.csv").write_text(f"t [s],speed\n{rows}", encoding="utf-8")
+    assert run(["inspect", str(tmp_path / "a.csv")]) == 0
+    assert said in " ".join(capsys.readouterr().out.split())
+
+
+def test_without_a_wheel_in_the_log_the_missing_machine_file_is_said(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rows = "".join(f"{k / 10:.1f},{k % 7},0.1\n" for k in range(50))
+    (tmp_path / "a.csv").write_text(f"t [s],cmd.v,steer.front.phi_ref\n{rows}", encoding="utf-8")
+    assert run(["channels", str(tmp_path / "a.csv")]) == 0
+    said = " ".join(capsys.readouterr().out.split())
+    assert "no machine file was given" in said
+    assert "times max_speed" not in said

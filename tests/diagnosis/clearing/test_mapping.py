@@ -124,3 +124,12 @@ def test_one_factor_of_all_wheels_is_no_fault_of_any() -> None:
     one = {"wheel.FR.v": wrong["wheel.FR.v"]}
     alone = mapping_hints(in_cells(replace(mission, columns={**mission.columns, **one}), base=True))
     assert [h.exchanged for h in alone if h.component == "FR"] == [()]
+
+
+def test_two_rows_tell_no_place() -> None:
+    """A log of 20 ms was told to have its valves exchanged."""
+    mission = _swapped("wheel.FR.v", "wheel.RL.v")(simulated())
+    short = replace(
+        mission, stamps=mission.stamps[2000:2300], columns={n: x[2000:2300] for n, x in mission.columns.items()}
+    )
+    assert mapping_hints(in_cells(short, base=True)) == ()

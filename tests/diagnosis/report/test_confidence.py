@@ -127,8 +127,8 @@ def test_leave_to_go_out_is_given_only_where_nothing_stands_against_it() -> None
     ("status", "more", "answer"),
     [
         ("stop", {}, ("No", ", not before repair")),
-        ("watch", {"cleared": False, "not_cleared": "the log is damaged"}, ("No", ", not before it was checked: the log is damaged")),
-        ("not_assessed", {}, ("No", ", not before it was checked")),
+        ("watch", {"cleared": False, "not_cleared": "the log is damaged"}, ("No", ", it must be checked first: the log is damaged")),
+        ("not_assessed", {}, ("No", ", it must be checked first")),
         ("watch", {"cleared": True, "not_cleared": ""}, ("Yes", "; the faults to watch are no reason to keep it in")),
         ("ready", {"cleared": True}, ("Yes", "")),
     ],

@@ -323,7 +323,7 @@ def test_caveats_that_say_the_same_are_one_line() -> None:
 
 def test_whether_the_machine_may_go_out_again_is_said_plainly() -> None:
     report, columns = samples.not_assessed()
-    assert "May it go out again? <b>No</b>, not before it was checked." in build_page(report, columns)
+    assert "May it go out again? <b>No</b>, it must be checked first." in build_page(report, columns)
     report, columns = samples.five_faults()
     assert "May it go out again? <b>No</b>, not before repair." in build_page(report, columns)
 

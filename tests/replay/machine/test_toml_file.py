@@ -224,6 +224,8 @@ PLACES = "[geometry]\nwheel_diameter = 0.5\nA = { x = 1.0, y = 0 }\n"
         ("[geometry]\ngear_ratio = -1\n", ["geometry.gear_ratio = -1", "0.001"]),
         ("[geometry]\nmax_steer = 45\n", ["geometry.max_steer = 45 rad", "0 to 3.2 rad"]),
         ("[geometry]\nmax_speed = []\n", ["geometry.max_speed", "[]", "number"]),
+        ("[geometry]\nmax_speed = -1\n", ["geometry.max_speed = -1"]),
+        ("[geometry]\nmax_speed = 0\n", ["geometry.max_speed = 0"]),
         ("[geometry]\nwheel_base = 2\n", ["geometry.wheel_base", "wheelbase"]),
         (TWO + "[geometry]\nwheelbase = 2.0\n", ["wheelbase", "['A', 'B']", "[geometry.A]"]),
         (TWO + "[geometry]\nwheel_diameter = 0.5\n", ["wheel_diameter", "[geometry.A]"]),

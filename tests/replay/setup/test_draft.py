@@ -481,3 +481,19 @@ def test_openings_that_may_be_volts_or_a_current_are_asked_for_as_such(
     draft = read_back(draft_machine(read_everything([tmp_path / "run.csv"])), tmp_path)
     assert {draft.machine.signals[f"wheel.{w}.u"].unit for w in draft.machine.wheels} == {unit}
     assert any(asked in q for q in draft.questions)
+
+
+def test_wheels_that_the_draft_does_not_have_are_asked_for(tmp_path: Path) -> None:
+    """Four of six wheels were left out without a word."""
+    t = np.arange(0.0, 20.0, 0.05)
+    speed = 0.5 * np.sin(t)
+    names = [f"{side}_{i}_speed [m/s]" for i in (1, 2, 3) for side in ("left", "right")]
+    table = pd.DataFrame(
+        {"t [s]": t, "v_soll [m/s]": speed, **{n: speed * (1 + 0.01 * k) for k, n in enumerate(names)}}
+    )
+    table.to_csv(tmp_path / "six.csv", index=False)
+    draft = draft_machine(read_everything([tmp_path / "six.csv"], every=False))
+    (asked,) = [q for q in draft.questions if q.startswith("which wheels are")]
+    assert ", ".join(names[2:]) in asked
+    (tmp_path / "m.toml").write_text(machine_text(draft, "six.csv"))
+    assert any(q.startswith("which wheels are left_2_speed") for q in load_machine(tmp_path / "m.toml").questions)

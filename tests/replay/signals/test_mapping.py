@@ -281,6 +281,12 @@ def test_the_recorded_unit_is_used_where_none_is_given() -> None:
         ("wheel.FR.v", SignalSource(column="x", unit="rad/s"), [14.92], 'measured at the motor (gear ratio 17.7): set at = "motor"'),
         ("cmd.v", SignalSource(column="x", unit="m/s"), [300.0], "833.3 times max_speed 0.36 m/s; check its unit"),
         ("wheel.FR.u", SignalSource(column="x", unit="1"), [85.0], "reaches 85 of full opening with unit '1'; it is probably %"),
+        (
+            "wheel.FR.u",
+            SignalSource(column="x", unit="1"),
+            [12.0, 4.0, 20.0, 18.0],
+            "with unit '1'; it is probably a current of 4 to 20 mA",
+        ),
         ("steer.front.phi", SignalSource(column="x", unit="rad"), [35.0], "reaches 35 rad with unit 'rad', max_steer is 0.785 rad; it is probably deg"),
     ],
 )  # fmt: skip

@@ -21,7 +21,7 @@ STAMPS = np.arange(3000, dtype=np.int64) * 20_000_000
 RNG = np.random.default_rng(3)
 OPENING = np.repeat(RNG.uniform(-1.0, 1.0, 60), 50)
 OPENING[::7] = 0.0
-WORTH = {"1": 1.0, "%": 0.01, "% or V": 0.01, "% or mA": 0.01}
+WORTH = {"": 1.0, "1": 1.0, "%": 0.01, "% or V": 0.01, "% or mA": 0.01}
 
 
 def doubt(
@@ -40,7 +40,7 @@ def doubt(
             items[f"wheel.{w}.u_applied"] = WORTH[unit] * position(
                 share * OPENING + RNG.normal(0.0, 2e-3, OPENING.size)
             )
-    source = SignalSource(column="c", unit=unit)
+    source = SignalSource(column="c", unit=unit or None)
     signals = {n: Signal(n, STAMPS, x, source, "run.csv", False, "") for n, x in items.items()}
     return opening_doubt(align(Signals(signals, {})), signals, MACHINE)
 
@@ -122,3 +122,18 @@ def test_a_unit_that_the_machine_file_leaves_open_is_asked(unit: str) -> None:
     assert found is not None
     assert unit in found.text
     assert 'unit = "1", gain = 0.' in found.act
+
+
+@pytest.mark.parametrize(("scale", "volts"), [(1.5, True), (10.0, True), (15.0, False), (100.0, False)])
+def test_openings_without_a_unit_that_go_beyond_full_opening_are_no_fractions(scale: float, volts: bool) -> None:
+    found = doubt(lambda x: scale * x, unit="")
+    assert found is not None
+    assert "No unit is stated for wheel.FR.u, wheel.FL.u and 2 more" in found.text
+    assert '"wheel.FR.u" = { column = "c", unit = "%" }' in found.act
+    assert ("gain = 0.1 }" in found.act) == volts
+
+
+def test_fractions_and_one_valve_beyond_them_are_no_question() -> None:
+    assert doubt(lambda x: 1.05 * x, unit="") is None
+    assert doubt(lambda x: x, lambda x: 1.05 * x, unit="") is None
+    assert doubt(lambda x: 1.5 * x, unit="1") is None  # as the machine file says
