@@ -11,7 +11,9 @@ from diagnosis.pages.labels import UNDATED_NS, clock, mode_legend, number, sat_t
 from diagnosis.report.confidence import (
     going_out,
     headline,
+    held_by_fleet,
     holds_open,
+    is_repaired,
     judged,
     judged_means,
     may_go_out,
@@ -115,7 +117,7 @@ def context(report: ReportDocument, duration: float) -> Context:
 def _verdict(report: ReportDocument) -> Context:
     verdict = report["verdict"]
     words, _ = headline(report)
-    blocked = holds_open(report) and may_go_out(verdict)
+    blocked = (holds_open(report) and may_go_out(verdict)) or is_repaired(report) or held_by_fleet(report) is not None
     faults = {f["id"]: f for f in report["intervals"]}
     return {
         "state": (Verdict.NOT_ASSESSED if blocked else Verdict(verdict["status"])).symbol,
