@@ -161,7 +161,9 @@ def _with_growth(
         part = words.part_words(t["kind"], t["component"], t["side"])
         soon = "grows so fast that half may be lost before two more are over"
         if any(t is x for x in told) and otherwise is not Leave.MAY:
-            said.append(f"the loss of the {part} was {100 * before:.0f} % over the mission before, and {soon}".replace("-", "−"))
+            said.append(
+                f"the loss of the {part} was {100 * before:.0f} % over the mission before, and {soon}".replace("-", "−")
+            )
             continue
         said.append(
             f"{part} lost {100 * now:.0f} % over its last mission ({100 * before:.0f} % over the one before), and {soon}".replace(
