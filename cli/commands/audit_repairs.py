@@ -101,7 +101,7 @@ def run_repairs(terminal: Terminal, request: RepairRequest) -> None:
                 terminal.show(text(f"  stays open: {left}", "dim"))
     pages = [text(f"fleet page  {request.output / 'fleet.html'}")]
     pages += [
-        text(f"report      {request.output / report / 'report.html'}, which says so too") for report in recorded.reports
+        text(f"report      {request.output / report / 'report.html'}, written anew") for report in recorded.reports
     ]
     terminal.show(*machine_parts(recorded.machines), "", *pages)
 

@@ -52,7 +52,7 @@ def compare_newest(store: Store, names: Sequence[str], max_size_mb: float, emit:
 
 
 def renew_newest(store: Store, machines: Collection[str], max_size_mb: float, emit: Emit) -> list[str]:
-    """The same for machines by their identity; gives the folders of the reports that say it now.
+    """The same for machines by their identity; gives the folders of the reports that were written anew.
 
     Raises
     ------
@@ -64,8 +64,7 @@ def renew_newest(store: Store, machines: Collection[str], max_size_mb: float, em
         for result, report, *key in store.database.rows(_NEWEST, (machine, CALENDAR_NS)):
             with own_report(store.folder, report, Key(*key)) as folder:
                 try:
-                    if folder is not None:
-                        _renew(store, int(result), folder, max_size_mb, known().get(machine))
+                    if folder is not None and _renew(store, int(result), folder, max_size_mb, known().get(machine)):
                         told.append(report)
                 except OutputError:
                     raise
@@ -74,8 +73,8 @@ def renew_newest(store: Store, machines: Collection[str], max_size_mb: float, em
     return told
 
 
-def _renew(store: Store, result: int, folder: Path, max_size_mb: float, known: Known | None) -> None:
-    """Write comparison and note into one report, unless it has them."""
+def _renew(store: Store, result: int, folder: Path, max_size_mb: float, known: Known | None) -> bool:
+    """Write comparison and note into one report, and say so, unless it has them."""
     from diagnosis.output import load_report, rebuild
 
     now, found = time.time_ns(), previous_report(store, result)
@@ -89,8 +88,10 @@ def _renew(store: Store, result: int, folder: Path, max_size_mb: float, known: K
         return own if found is None else with_previous(own, found[1], found[0].report, open_faults, now)
 
     compared = _compared(kept) if found is None else (found[0].start_ns, list(open_faults))
-    if (_compared(kept), _undated(kept.get("fleet"))) != (compared, _undated(note)):
-        rebuild(folder, max_size_mb=max_size_mb, change=told)
+    if (_compared(kept), _undated(kept.get("fleet"))) == (compared, _undated(note)):
+        return False
+    rebuild(folder, max_size_mb=max_size_mb, change=told)
+    return True
 
 
 def _compared(report: ReportDocument) -> tuple[int | None, list[str]]:

@@ -48,7 +48,7 @@ class Told:
 
 @dataclass(frozen=True)
 class Recorded:
-    """What was recorded, the machines of the fleet page afterwards, and the folders of their newest reports, which say it too."""
+    """What was recorded, the machines of the fleet page afterwards, and the folders of their newest reports that were written anew."""
 
     told: tuple[Told, ...]
     machines: tuple[ListedMachine, ...]
