@@ -125,7 +125,7 @@ def _verdict(report: ReportDocument) -> Context:
         "steered": bool(report["machine"]["axles"]),
         "going_out": going_out(report),
         "sure": "" if verdict["actions"] else sure_of_verdict(report),
-        "title": verdict["title"] or words,
+        "title": (verdict["title"] or words) + (", repaired since" if is_repaired(report) else ""),
         "text": verdict["text"],
         "caveats": merged_caveats(other_caveats(verdict)),
         "to_clear": clearing_sentences(verdict),

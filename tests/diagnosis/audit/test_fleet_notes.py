@@ -88,7 +88,8 @@ def test_a_repair_is_written_into_the_report_of_the_mission_before_it(stopped: P
     said = page(stopped)
     when = utc_moment(at(2.0))
     assert f"Repaired since this mission: FR speed sensor ({note['repairs'][0]['faults'][0]}), {when}" in said
-    assert f"Repaired since: {when}." in said
+    assert f"Repaired since, {when}." in said
+    assert ", repaired since</h1>" in said
     assert '<a href="../../fleet.html">the fleet page</a>' in said
     assert "not before repair" not in said
     words = Verdict.of(report(stopped))
