@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
@@ -171,8 +171,7 @@ def rebuild(
     *,
     max_size_mb: float = 8.0,
     previous: tuple[Path, ReportDocument] | None = None,
-    open_faults: Sequence[str] = (),
-    asof_ns: int | None = None,
+    change: Callable[[ReportDocument], ReportDocument] | None = None,
 ) -> Path:
     """Make ``report.html`` again from a saved result, without the log.
 
@@ -184,10 +183,8 @@ def rebuild(
         Size the page should keep to [MB].
     previous : tuple[Path, ReportDocument] or None
         Name and document of an earlier result of the machine to compare with; kept in ``report.json``.
-    open_faults : Sequence[str]
-        Sentences on faults of earlier missions that are open, to stand with `previous`.
-    asof_ns : int or None
-        When that was known [ns since 1970].
+    change : Callable or None
+        Gives the document as it is to be kept in ``report.json`` and shown.
 
     Raises
     ------
@@ -201,16 +198,19 @@ def rebuild(
     saved = load_result(source)
     report, columns, windows = saved.report, saved.columns, saved.windows
     if previous is not None:
-        compared: ReportDocument = writable(with_previous(report, previous[1], str(previous[0]), open_faults, asof_ns))
-        report = compared
+        report = with_previous(report, previous[1], str(previous[0]))
+    if change is not None:
+        report = change(report)
+    changed = report is not saved.report
+    kept: ReportDocument = writable(report) if changed else report
     with bordered(folder, "a saved result", remedy=_AGAIN):
-        page = build_page(report, columns, closeups=windows, max_size_mb=max_size_mb)
-    if previous is None:
+        page = build_page(kept, columns, closeups=windows, max_size_mb=max_size_mb)
+    if not changed:
         with atomic_path(folder / HTML) as html:
             _write_text(page, html)
     else:
         with atomic_paths(folder / HTML, source) as (html, document):
-            document.write_bytes(_json(report))
+            document.write_bytes(_json(kept))
             _write_text(page, html)
     return folder / HTML
 

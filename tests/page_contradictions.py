@@ -10,6 +10,7 @@ from diagnosis.comparison.words import coverage_head
 from diagnosis.report.confidence import going_out, judged
 from diagnosis.report.fault_times import times_words, when_words
 from diagnosis.report.machine_picture import machine_picture
+from diagnosis.report.standing import Standing, standings_of
 from diagnosis.report.tables import clearing_sentences
 from diagnosis.report.timeline import timeline
 
@@ -99,6 +100,21 @@ def of_standings(report: Mapping[str, Any]) -> Iterator[str]:
         yield f"{found.group(0)!r}, and the picture calls {healthy} wheels healthy"
 
 
+def of_reasons(report: Mapping[str, Any]) -> Iterator[str]:
+    """Parts that are not cleared while the machine is ready, or of whose component nothing says what is open."""
+    standings = standings_of(report)  # type: ignore[arg-type]
+    left = [f"{c} {side}" for (c, side), s in standings.items() if s is Standing.NOT_CLEARED]
+    rows = report["verdict"]["to_clear"]
+    if report["verdict"]["status"] == "ready" and left:
+        yield f"ready, and not cleared: {', '.join(left)}"
+    if not all(row.get("parts") for row in rows):
+        return
+    told = {p["component"] for row in rows for p in row["parts"]}
+    told |= {f["component"] for f in report["intervals"] if f["severity"] != "info"}
+    if untold := [name for name in left if name.partition(" ")[0] not in told]:
+        yield f"not cleared, and nothing says why: {', '.join(untold)}"
+
+
 def _sides(fault: Mapping[str, Any]) -> tuple[str, ...]:
     return ("sensor", "actuator") if fault["side"] == "sensor_or_actuator" else (fault["side"],)
 
@@ -136,5 +152,15 @@ def of_sizes(report: Mapping[str, Any]) -> Iterator[str]:
 
 def of_page(report: Mapping[str, Any]) -> Iterator[str]:
     """All of them."""
-    for rule in (of_judged, of_going_out, of_endings, of_previous, of_standings, of_acts, of_times, of_sizes):
+    for rule in (
+        of_judged,
+        of_going_out,
+        of_endings,
+        of_previous,
+        of_standings,
+        of_reasons,
+        of_acts,
+        of_times,
+        of_sizes,
+    ):
         yield from rule(report)

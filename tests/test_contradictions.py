@@ -25,10 +25,13 @@ from replay.signals.timeline import align
 from replay.simulation.options import EvidenceLevel, SimulationOptions
 from replay.simulation.run import simulate_mission
 from tests import fleet_samples as samples
+from tests import report_samples
 from tests.campaigns import campaign_of_rows
 from tests.contradictions import contradictions
 from tests.coverage_changes import changed_coverage, judged_side
 from tests.fleet_contradictions import fleet_contradictions
+from tests.page_contradictions import of_reasons
+from tests.whole_documents import whole_report
 
 Document = dict[str, Any]
 Columns = dict[str, NDArray[Any]]
@@ -175,6 +178,18 @@ def test_a_spoilt_result_is_seen(result: tuple[Document, Columns], spoil: Callab
     changed = copy.deepcopy(document)
     spoil(changed)
     assert contradictions(changed) != []
+
+
+def test_a_part_that_is_not_cleared_without_a_reason_is_seen() -> None:
+    made, _ = report_samples.no_faults()
+    document: Document = whole_report(made)  # type: ignore[assignment]
+    document["verdict"] |= {"status": "ready", "cleared": True, "to_clear": []}
+    assert list(of_reasons(document)) == []
+    row = {"component": "FR", "side": "actuator", "deviation": "excess", "for_s": None, "size": 0.0}
+    document["detectability"]["rows"].append(row)
+    ready, untold = of_reasons(document)
+    assert ready == "ready, and not cleared: FR actuator"
+    assert untold == "not cleared, and nothing says why: FR actuator"
 
 
 def _another_loss(d: Document, columns: Columns) -> None:

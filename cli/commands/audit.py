@@ -186,7 +186,7 @@ def audit(
     verbose: Verbose = False,
 ) -> None:
     """Diagnose a tree of logs: a report per mission and a page about the fleet; or record a repair."""
-    repairs = RepairRequest(output, repaired or [], not_repaired or [], one_date(on), json)
+    repairs = RepairRequest(output, repaired or [], not_repaired or [], one_date(on), json, max_size)
     if forget and not (repaired or not_repaired):
         run_forget(terminal_of(context, json=json), output, forget, paths or [], json=json)
         return

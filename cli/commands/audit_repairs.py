@@ -28,6 +28,7 @@ class RepairRequest:
     not_repaired: list[str]
     on: str | None
     json: bool
+    max_size_mb: float = 8.0
 
     def is_asked(self, paths: Sequence[str]) -> bool:
         """Whether repairs are to be recorded, and not logs to be audited.
@@ -76,7 +77,9 @@ def run_repairs(terminal: Terminal, request: RepairRequest) -> None:
 
         withdrawn = bool(request.not_repaired)
         words = request.not_repaired or request.repaired
-        recorded = record_repairs(request.output, words, _date(request.on), _unheard, withdrawn=withdrawn)
+        recorded = record_repairs(
+            request.output, words, _date(request.on), _unheard, withdrawn=withdrawn, max_size_mb=request.max_size_mb
+        )
     if request.json:
         told = [{**asdict(t), "withdrawn": withdrawn} for t in recorded.told]
         terminal.show_json({"repairs": told, "machines": [asdict(m) for m in recorded.machines]})
@@ -96,7 +99,11 @@ def run_repairs(terminal: Terminal, request: RepairRequest) -> None:
             terminal.show(text(f"  closes: {closes}", "dim"))
             for left in t.stays:
                 terminal.show(text(f"  stays open: {left}", "dim"))
-    terminal.show(*machine_parts(recorded.machines), "", text(f"fleet page  {request.output / 'fleet.html'}"))
+    pages = [text(f"fleet page  {request.output / 'fleet.html'}")]
+    pages += [
+        text(f"report      {request.output / report / 'report.html'}, written anew") for report in recorded.reports
+    ]
+    terminal.show(*machine_parts(recorded.machines), "", *pages)
 
 
 def _date(text: str, now: datetime | None = None) -> int:

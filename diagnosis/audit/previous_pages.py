@@ -1,33 +1,34 @@
-"""The newest report of each machine says what changed since the machine's mission before it, and which earlier faults are open."""
+"""The newest report of each machine says what changed since the machine's mission before it, and what the fleet knows beyond it."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from functools import cache
 from pathlib import Path
+from typing import Any, cast
 
 from diagnosis.audit.events import Emit
 from diagnosis.audit.fleet.read import CALENDAR_NS
+from diagnosis.audit.fleet_notes import Known, fleet_note, known_machines
 from diagnosis.audit.previous_mission import previous_report
 from diagnosis.audit.store.folders import own_report
 from diagnosis.audit.store.keys import Key
-from diagnosis.audit.store.store import FILE_NAME, Store
-from diagnosis.pages.labels import utc
+from diagnosis.audit.store.store import Store
+from diagnosis.comparison.previous import with_previous
+from diagnosis.results.document import ReportDocument
+from diagnosis.results.fleet_note_row import FleetNoteRow
 from replay.errors import MfhcaError, OutputError
 
 _NEWEST = (
     "SELECT id, report, log_hash, config_hash, version FROM result WHERE machine_id = ? AND verdict IS NOT NULL "
     "AND report IS NOT NULL AND start_ns >= ? AND id IN (SELECT result FROM mission) ORDER BY start_ns DESC, id DESC LIMIT 1"
 )
-_SEVERE = (
-    "SELECT 1 FROM fault f JOIN result r ON r.id = f.result WHERE r.machine_id = ? AND f.severity = 'high' LIMIT 1"
-)
 _MACHINES = "SELECT DISTINCT r.machine_id FROM mission m JOIN result r ON r.id = m.result WHERE m.name = ? AND r.machine_id <> ''"
 
 
 def compare_newest(store: Store, names: Sequence[str], max_size_mb: float, emit: Emit) -> None:
-    """Write the comparison into the newest report of every machine that has one of the named missions.
+    """Write comparison and note into the newest report of every machine that has one of the named missions.
 
     Parameters
     ----------
@@ -45,54 +46,60 @@ def compare_newest(store: Store, names: Sequence[str], max_size_mb: float, emit:
     OutputError
         Where the output cannot be written.
     """
-    open_faults = cache(lambda: _open_faults(store))
-    for machine in sorted({row[0] for name in names for row in store.database.rows(_MACHINES, (name,))}):
+    renew_newest(
+        store, {row[0] for name in names for row in store.database.rows(_MACHINES, (name,))}, max_size_mb, emit
+    )
+
+
+def renew_newest(store: Store, machines: Collection[str], max_size_mb: float, emit: Emit) -> list[str]:
+    """The same for machines by their identity; gives the folders of the reports that were written anew.
+
+    Raises
+    ------
+    OutputError
+        As above.
+    """
+    known, told = cache(lambda: known_machines(store)), list[str]()
+    for machine in sorted(machines):
         for result, report, *key in store.database.rows(_NEWEST, (machine, CALENDAR_NS)):
             with own_report(store.folder, report, Key(*key)) as folder:
                 try:
-                    if folder is not None:
-                        severe = bool(store.database.rows(_SEVERE, (machine,)))
-                        _compare(
-                            store, int(result), folder, max_size_mb, open_faults().get(machine, []) if severe else []
-                        )
+                    if folder is not None and _renew(store, int(result), folder, max_size_mb, known().get(machine)):
+                        told.append(report)
                 except OutputError:
                     raise
                 except (MfhcaError, KeyError, TypeError, ValueError) as error:
                     emit("not_compared", {"report": report, "reason": str(error)})
+    return told
 
 
-def _open_faults(store: Store) -> dict[str, list[str]]:
-    """Sentences on the faults of each machine that the fleet page holds open and that its last mission did not show."""
-    from diagnosis.audit.fleet.words import fault_words, open_words
-    from diagnosis.audit.fleet_files import load_fleet
-
-    return {
-        m.id: [
-            f"{fault_words(f, m.limits.words)}, last found in {f.last.name} ({utc(f.last.result.start_ns)[:10]}), no repair recorded"
-            + open_words(f.open, f.clean, f.needed)
-            for f in m.faults
-            if f.open and f.since
-        ]
-        for m in load_fleet(Path(store.folder) / FILE_NAME).machines
-        if m.id
-    }
-
-
-def _compare(store: Store, result: int, folder: Path, max_size_mb: float, open_faults: Sequence[str]) -> None:
+def _renew(store: Store, result: int, folder: Path, max_size_mb: float, known: Known | None) -> bool:
+    """Write comparison and note into one report, and say so, unless it has them."""
     from diagnosis.output import load_report, rebuild
 
-    found = previous_report(store, result)
-    if found is None:
-        return
-    previous, document = found
-    kept = load_report(folder / "report.json").get("previous")
-    same = kept is not None and kept["mission"]["start_ns"] == previous.start_ns
-    told = [] if kept is None else kept.get("open_faults", [])
-    if not same or told != list(open_faults):
-        rebuild(
-            folder,
-            max_size_mb=max_size_mb,
-            previous=(Path(previous.report), document),
-            open_faults=open_faults,
-            asof_ns=time.time_ns(),
-        )
+    now, found = time.time_ns(), previous_report(store, result)
+    kept = load_report(folder / "report.json")
+    open_faults = () if known is None or found is None else known.open_faults  # they stand with the comparison
+    note = None if known is None else fleet_note(known, kept, folder, Path(store.folder), now, beside=open_faults)
+
+    def told(report: ReportDocument) -> ReportDocument:
+        alone: dict[str, Any] = {k: v for k, v in report.items() if k != "fleet"}
+        own = cast(ReportDocument, alone if note is None else {**alone, "fleet": note})
+        return own if found is None else with_previous(own, found[1], found[0].report, open_faults, now)
+
+    compared = _compared(kept) if found is None else (found[0].start_ns, list(open_faults))
+    if (_compared(kept), _undated(kept.get("fleet"))) == (compared, _undated(note)):
+        return False
+    rebuild(folder, max_size_mb=max_size_mb, change=told)
+    return True
+
+
+def _compared(report: ReportDocument) -> tuple[int | None, list[str]]:
+    """Start of the mission that a report was compared with [ns since 1970], and the open faults that it tells."""
+    previous = report.get("previous")
+    return (None, []) if previous is None else (previous["mission"]["start_ns"], list(previous.get("open_faults", [])))
+
+
+def _undated(note: FleetNoteRow | None) -> dict[str, Any] | None:
+    """A note without when it was written."""
+    return None if note is None else {k: v for k, v in note.items() if k != "asof_ns"}

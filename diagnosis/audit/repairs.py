@@ -15,6 +15,7 @@ from diagnosis.audit.fleet.runs import Run
 from diagnosis.audit.fleet.words import fault_words
 from diagnosis.audit.fleet_files import load_fleet
 from diagnosis.audit.fleet_page import FleetPage
+from diagnosis.audit.previous_pages import renew_newest
 from diagnosis.audit.store.repairs import Repair, read_repairs, record_repair, repaired_at
 from diagnosis.audit.store.store import FILE_NAME, Store
 from diagnosis.pages.labels import utc
@@ -47,16 +48,23 @@ class Told:
 
 @dataclass(frozen=True)
 class Recorded:
-    """What was recorded, and the machines of the fleet page afterwards."""
+    """What was recorded, the machines of the fleet page afterwards, and the folders of their newest reports that were written anew."""
 
     told: tuple[Told, ...]
     machines: tuple[ListedMachine, ...]
+    reports: tuple[str, ...] = ()
 
 
 def record_repairs(
-    output: Path, repairs: Sequence[str], repaired_ns: int, emit: Emit, *, withdrawn: bool = False
+    output: Path,
+    repairs: Sequence[str],
+    repaired_ns: int,
+    emit: Emit,
+    *,
+    withdrawn: bool = False,
+    max_size_mb: float = 8.0,
 ) -> Recorded:
-    """Record repairs, or that they were recorded by mistake, and write the fleet page anew.
+    """Record repairs, or that they were recorded by mistake, and write the newest report of each machine and the fleet page anew.
 
     Parameters
     ----------
@@ -70,6 +78,8 @@ def record_repairs(
         Takes the events.
     withdrawn : bool
         Whether they are taken back.
+    max_size_mb : float
+        Size that a page should keep to [MB].
 
     Raises
     ------
@@ -94,6 +104,7 @@ def record_repairs(
                 )
         for _, repair in found:
             record_repair(store, repair, withdrawn=withdrawn)
+        rewritten = renew_newest(store, {machine.id for machine, _ in found if machine.id}, max_size_mb, emit)
     page = FleetPage(output, None, "hours", emit)
     page.renew()
     told = [
@@ -105,7 +116,7 @@ def record_repairs(
         )
         for m, r in found
     ]
-    return Recorded(tuple(told), page.machines())
+    return Recorded(tuple(told), page.machines(), tuple(rewritten))
 
 
 def _dates(repairs: Iterable[Repair]) -> list[str]:

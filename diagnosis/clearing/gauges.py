@@ -230,9 +230,15 @@ def _lasting(below: float, above: float) -> dict[Deviation, float]:
 
 
 def _reference(cells: Cells, component: str, pair: tuple[Array, Array, float], limit: float) -> Reference:
-    """A channel, its reference and its floor; nothing where a fault is stated."""
+    """A channel, its reference and its floor; nothing where a fault is stated.
+
+    Nor does a window show anything that is beyond the limit as it is, by a lag of its own or a moment that the check does not count:
+    it would show a fault of no size.
+    """
     found = compared(cells, *pair)
-    return Reference(found._replace(moves=found.moves & ~cells.explained(component)), limit)
+    with np.errstate(invalid="ignore"):
+        as_it_is = found.off >= limit
+    return Reference(found._replace(moves=found.moves & ~cells.explained(component) & ~as_it_is), limit)
 
 
 def _known(x: Array) -> bool:

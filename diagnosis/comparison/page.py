@@ -23,7 +23,7 @@ from diagnosis.results.comparison_document import (
 )
 from diagnosis.results.fault_rows import state_label
 from diagnosis.results.machine_words import MachineWords, words_of
-from diagnosis.results.vocabulary import Tier
+from diagnosis.results.vocabulary import Kind, Tier
 
 #: What a template is filled with.
 Context = dict[str, object]
@@ -102,14 +102,14 @@ def _row(c: FaultChangeRow, words: MachineWords) -> Context:
     return {
         "part": words.part_words(c["kind"], c["component"], c["side"]),
         "rows": list(rows.values()),
-        "older": _found(c["older"]),
-        "newer": _found(c["newer"]),
+        "older": _found(c["older"], c["kind"], words),
+        "newer": _found(c["newer"], c["kind"], words),
         "changed": ", ".join(CHANGES[name] for name in c["changes"]),
         "note": c["note"],
     }
 
 
-def _found(f: FoundFaultRow | None) -> dict[str, str] | None:
+def _found(f: FoundFaultRow | None, kind: Kind, words: MachineWords) -> dict[str, str] | None:
     if f is None:
         return None
     e = f["epsilon"]
@@ -118,7 +118,7 @@ def _found(f: FoundFaultRow | None) -> dict[str, str] | None:
         "severity": f["severity"],
         "times": times(len(f["ids"]), f["seconds"]),
         "epsilon": epsilon,
-        "more": f"{', '.join(_few(f['ids']))}; p {f['probability']:.3f}; {f['tier']}",
+        "more": f"{', '.join(_few(f['ids']))}; {min(100 * f['probability'], 99.9):.1f} % sure; {words.evidence(Tier(f['tier']), Kind(kind))}",
     }
 
 
@@ -131,17 +131,17 @@ def _coverage(c: CoverageChangeRow, words: MachineWords) -> Context:
         "part": words.part_words(c["kind"], c["component"], c["side"]),
         "change": c["change"],
         "words": coverage_words(c),
-        "older": _judged(c["older"]),
-        "newer": _judged(c["newer"]),
+        "older": _judged(c["older"], c["kind"], words),
+        "newer": _judged(c["newer"], c["kind"], words),
     }
 
 
-def _judged(side: SideCoverageRow | None) -> str:
+def _judged(side: SideCoverageRow | None, kind: Kind, words: MachineWords) -> str:
     if side is None:
         return "not in the result"
     if side["tier"] is Tier.NONE:
         return "no evidence"
-    return f"{side['decided_s']:.1f} of {side['driving_s']:.1f} s ({side['tier']})"
+    return f"{side['decided_s']:.1f} of {side['driving_s']:.1f} s, {words.evidence(Tier(side['tier']), Kind(kind))}"
 
 
 def _metric(m: MetricChangeRow) -> Context:

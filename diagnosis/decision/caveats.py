@@ -121,7 +121,7 @@ def by_model(assessments: Mapping[Part, Assessment], shown: Sequence[Detectable]
         said += [_from_size(name, [r.size for r in rows])] if rows else []
         sizes_known |= any(r.size for r in rows)
     sizes = (
-        f"Of losses that last ten seconds these show, in 95 of 100 places where they may begin: {'; '.join(said)}. "
+        f"A loss of ten seconds would have shown, at 95 of 100 places where it may begin: {'; '.join(said)}. "
         if said
         else ""
     )
@@ -131,8 +131,8 @@ def by_model(assessments: Mapping[Part, Assessment], shown: Sequence[Detectable]
         words.fill(
             "Sensors and {valve}s without a second measurement were judged by a {wheel} model identified from this mission. "
         )
-        + f"{sizes}A loss that lasts the whole mission on every {words.part} does not show. A second measurement would show more; "
-        "a machine file with [plant], as `mfhca fit` writes it, shows a loss on all of them, too."
+        + f"{sizes}A loss of every {words.part} that lasts the whole mission does not show. A second measurement would show more, and "
+        f"a machine file with [plant], which `mfhca fit` writes from healthy missions, also a loss of every {words.part}."
     )
 
 
@@ -140,13 +140,13 @@ def _from_size(name: str, sizes: Sequence[float | None]) -> str:
     """From which size on a loss shows of parts of one kind."""
     known = sorted(x for x in sizes if x)
     if not known:
-        return f"on no {name} any"
+        return f"on no {name}"
     span = dict.fromkeys(f"{100 * x:.0f}" for x in (known[0], known[-1]))
-    size = f"those of {' to '.join(span)} % or more{' (by part)' if len(span) > 1 else ''}"
+    size = f"from {' to '.join(span)} % on{' (by part)' if len(span) > 1 else ''}"
     if len(known) == len(sizes):
         return f"on every {name} {size}"
     return (
-        f"on {len(known)} of {len(sizes)} {name}s {size}, on the other{'s' if len(sizes) - len(known) > 1 else ''} none"
+        f"on {len(known)} of {len(sizes)} {name}s {size}, on the other{'s' if len(sizes) - len(known) > 1 else ''} not"
     )
 
 

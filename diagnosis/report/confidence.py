@@ -11,7 +11,7 @@ from diagnosis.results.document import IntervalRow, ReportDocument, VerdictRow
 from diagnosis.results.fault_rows import state_label
 from diagnosis.results.limited import MOST_CLAIMED
 from diagnosis.results.machine_words import words_of
-from diagnosis.results.vocabulary import Kind, Leave, Tier, Verdict
+from diagnosis.results.vocabulary import Kind, Leave, Severity, Tier, Verdict
 from replay.faults import Side, State
 
 _WORDS = ((0.99, "Practically certain"), (0.9, "Very likely"), (0.7, "Likely"))
@@ -162,13 +162,18 @@ def headline(report: ReportDocument) -> tuple[str, str]:
     """Verdict in a word or two, and whether the machine may go out; the latter empty where the former says it.
 
     Faults to watch give leave only where every wheel part was judged long enough and nothing of the log is lost; see
-    `diagnosis.decision.decide`. No leave is given while an audit holds a fault of an earlier mission open.
+    `diagnosis.decision.decide`. No leave is given while an audit holds a fault of an earlier mission open, or the machine in for what it knows
+    of other missions; and where what stopped it was repaired since, that is said instead.
     """
     verdict = report["verdict"]
     status = Verdict(verdict["status"])
+    if is_repaired(report):
+        return "Repaired since this mission", f"{Leave.CHECK}: the fleet page says what is known since"
+    alone = "Faults to watch" if status is Verdict.WATCH else "No fault in this mission"
     if holds_open(report) and may_go_out(verdict):
-        label = "Faults to watch" if status is Verdict.WATCH else "No fault in this mission"
-        return label, "but one of an earlier mission is open: the fleet page says whether it may go out"
+        return alone, "but one of an earlier mission is open: the fleet page says whether it may go out"
+    if (held := held_by_fleet(report)) is not None:
+        return alone if may_go_out(verdict) else status.label, f"{held}: the fleet page says why"
     if status is not Verdict.WATCH:
         return status.label, _ANSWERS[status]
     if not verdict["cleared"]:
@@ -184,8 +189,17 @@ def going_out(report: ReportDocument) -> tuple[str, str]:
         when = f"was open on {utc(asof)[:10]}, when this was written" if asof is not None else "is open"
         why = f"a fault of an earlier mission {when}"
         return "No", f", not before the fleet page says so, which holds the newest state: {why}"
+    if is_repaired(report):
+        return (
+            "No",
+            ", not before it was checked: what stopped it was repaired since, and the fleet page says what is known since then",
+        )
     if status is Verdict.STOP:
         return "No", ", not before repair"
+    if (held := held_by_fleet(report)) is not None:
+        note = report["fleet"]
+        reason = note["reason"].rstrip(".")
+        return "No", f": the fleet page said “{held}” on {utc(note['asof_ns'])[:10]}, when this was written: {reason}"
     if not may_go_out(report["verdict"]):
         why = report["verdict"]["not_cleared"]
         return "No", f", it must be checked first{': ' if why else ''}{why}"
@@ -198,9 +212,35 @@ def may_go_out(verdict: VerdictRow) -> bool:
     return status is Verdict.READY or (status is Verdict.WATCH and verdict["cleared"])
 
 
+def own_leave(report: ReportDocument) -> Leave:
+    """Whether the machine may go out by its mission alone."""
+    if may_go_out(report["verdict"]):
+        return Leave.MAY
+    return Leave.MUST_NOT if report["verdict"]["status"] == Verdict.STOP else Leave.CHECK
+
+
 def holds_open(report: ReportDocument) -> bool:
     """Whether an audit has written into a report that a severe fault of an earlier mission is open."""
     return "previous" in report and bool(report["previous"].get("open_faults"))
+
+
+def is_repaired(report: ReportDocument) -> bool:
+    """Whether all that stopped a machine in a mission was repaired since, as an audit has written into its report."""
+    note = report.get("fleet")
+    stopped = report["verdict"]["status"] == Verdict.STOP
+    if note is None or not stopped or not note["repairs"] or note["leave"] == Leave.MUST_NOT:
+        return False
+    mended = {f for r in note["repairs"] for f in r["faults"]}
+    return all(f["id"] in mended for f in report["intervals"] if f["severity"] == Severity.HIGH)
+
+
+def held_by_fleet(report: ReportDocument) -> Leave | None:
+    """The list in which an audit's fleet has a machine, where that lets it go out less than the mission alone does; else None."""
+    note = report.get("fleet")
+    if note is None or report["verdict"]["status"] == Verdict.STOP:
+        return None
+    leave, order = Leave(note["leave"]), (Leave.MAY, Leave.CHECK, Leave.MUST_NOT)
+    return leave if order.index(leave) > order.index(own_leave(report)) else None
 
 
 def _share(x: float) -> str:

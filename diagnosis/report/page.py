@@ -29,6 +29,7 @@ from diagnosis.report import tables
 from diagnosis.report.compared_channels import pair_of
 from diagnosis.report.driven_path import driven_path
 from diagnosis.report.evidence import evidence_of
+from diagnosis.report.fleet_note import fleet_section, repaired_faults
 from diagnosis.report.healthy_lanes import healthy_lanes
 from diagnosis.report.machine_picture import axles_in_words, machine_picture, places_in_words
 from diagnosis.report.path_picture import path_picture
@@ -137,6 +138,8 @@ def build_page(
         "main": Markup(packed(main.encode())),
         "later": Markup(packed(later.encode()) if plots else ""),
         "previous": previous_section(report),
+        "fleet": fleet_section(report),
+        "repaired": repaired_faults(report),
         "evidence": evidence,
         "unlisted": len(whole["intervals"]) - len(report["intervals"]),
         "has_plots": plots,

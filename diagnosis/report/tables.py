@@ -11,7 +11,9 @@ from diagnosis.pages.labels import UNDATED_NS, clock, mode_legend, number, sat_t
 from diagnosis.report.confidence import (
     going_out,
     headline,
+    held_by_fleet,
     holds_open,
+    is_repaired,
     judged,
     judged_means,
     may_go_out,
@@ -115,7 +117,7 @@ def context(report: ReportDocument, duration: float) -> Context:
 def _verdict(report: ReportDocument) -> Context:
     verdict = report["verdict"]
     words, _ = headline(report)
-    blocked = holds_open(report) and may_go_out(verdict)
+    blocked = (holds_open(report) and may_go_out(verdict)) or is_repaired(report) or held_by_fleet(report) is not None
     faults = {f["id"]: f for f in report["intervals"]}
     return {
         "state": (Verdict.NOT_ASSESSED if blocked else Verdict(verdict["status"])).symbol,
@@ -123,7 +125,7 @@ def _verdict(report: ReportDocument) -> Context:
         "steered": bool(report["machine"]["axles"]),
         "going_out": going_out(report),
         "sure": "" if verdict["actions"] else sure_of_verdict(report),
-        "title": verdict["title"] or words,
+        "title": (verdict["title"] or words) + (", repaired since" if is_repaired(report) else ""),
         "text": verdict["text"],
         "caveats": merged_caveats(other_caveats(verdict)),
         "to_clear": clearing_sentences(verdict),

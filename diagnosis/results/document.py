@@ -11,6 +11,7 @@ from typing import Final, Literal, NotRequired, TypedDict
 from diagnosis.results.clearing_rows import ClearingRow, DetectabilityTable
 from diagnosis.results.comparison_document import PreviousRow
 from diagnosis.results.document_numbers import Probability, Seconds
+from diagnosis.results.fleet_note_row import FleetNoteRow
 from diagnosis.results.loop_rows import MetricsRow
 from diagnosis.results.size_rows import EpsilonRow, SatRow
 from diagnosis.results.vocabulary import Kind, Severity, Tier, Verdict
@@ -307,7 +308,8 @@ class LimitsRow(TypedDict):
 class ReportDocument(TypedDict):
     """`report.json`: one mission, its verdict, faults, states, coverage and data.
 
-    `previous` is there where the mission was compared with another one of the machine.
+    `previous` is there where the mission was compared with another one of the machine; `fleet` in the newest report of an audited machine
+    where the fleet knows more than the mission.
     """
 
     schema: Literal["mfhca-report/1"]
@@ -329,3 +331,4 @@ class ReportDocument(TypedDict):
     quality: list[QualityRow]
     limits: LimitsRow
     previous: NotRequired[PreviousRow]
+    fleet: NotRequired[FleetNoteRow]

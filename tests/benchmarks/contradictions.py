@@ -1,8 +1,8 @@
 """Results that contradict themselves, over hundreds of missions: `python tests/benchmarks/contradictions.py --count 6`.
 
 Six kinds of data: the simulator's scenarios and machines of other structures, in every tier; the machines of other physics beside
-this file, with every sort of trouble; ordinary robots set up as `config init` does; the reference data's foreign plant; real robots
-and arms as they are, and with faults written into them; made-up fleets. Each result is read by `tests.contradictions`:
+this file, with every sort of trouble; ordinary robots set up as `config init` does; the reference data's foreign plant; its real robots,
+arms, rigs, car and public logs as they are, and robots with faults written into them; made-up fleets. Each result is read by `tests.contradictions`:
 verdict, title, hypotheses, severity, advice, sizes, times, states, the page's and the terminal's words must agree; each fleet by
 `tests.fleet_contradictions`: lists, states, headline, table and page. Ends with 1 where one
 does not. Seeds from 2000 on. The real logs and the plant lie where ``MFHCA_REFERENCE_DATA`` says; without them they are left out.
@@ -21,26 +21,24 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
-import electrohydraulic
 import foreign_machine
-import hydrostatic
 import numpy as np
 import ordinary
 import orjson
-import robots
+from all_clear import OTHERS
 from ordinary_robots.faults import FAULTS
 from ordinary_robots.machines import KINDS
+from real_results import real
 from troubles import troubles
 from variation import recorded_signals
 
 from diagnosis.audit.fleet.fleet_types import FleetDocument
 from diagnosis.audit.fleet_files import fleet_json, load_fleet
-from diagnosis.pipeline import diagnose, diagnose_mission, diagnose_signals
+from diagnosis.pipeline import diagnose_mission, diagnose_signals
 from diagnosis.results.result import MissionResult
 from replay.errors import MfhcaError
 from replay.machine.config import haulotte
-from replay.machine.toml_file import load_machine
-from replay.mission import Mission, load_mission
+from replay.mission import Mission
 from replay.signals.timeline import align
 from replay.simulation.options import SimulationOptions
 from replay.simulation.run import simulate_mission
@@ -78,11 +76,11 @@ def simulated(count: int, first: int) -> Iterator[Named]:
 
 
 def other_physics(count: int, first: int) -> Iterator[Named]:
-    """Machines of other physics with every so many-th sort of trouble, and sound."""
+    """Machines of other physics beside this file, all that `all_clear.py` knows, with every so many-th sort of trouble, and sound."""
     kinds = troubles(75.0)
-    for place, physics in enumerate((hydrostatic, electrohydraulic)):
-        for k in range(2 * count):
-            trouble = None if k % 6 == 5 else kinds[(17 * k + 7 * place) % len(kinds)]
+    for place, physics in enumerate(OTHERS.values()):
+        for k in range(count):
+            trouble = None if (k + place) % 6 == 5 else kinds[(17 * k + 7 * place) % len(kinds)]
             seed = first + 300 + k
             for tier in TIERS:
                 signals = physics.signals(seed, trouble.faults if trouble else (), 75.0, tier)
@@ -155,28 +153,6 @@ def fleets(count: int, first: int) -> Iterator[tuple[str, FleetDocument]]:
         with tempfile.TemporaryDirectory() as folder:
             store = fleet_samples.write_store(Path(folder) / "fleet.sqlite", missions)
             yield f"fleet {first + k}", fleet_json(load_fleet(store))
-
-
-def real(count: int, first: int) -> Iterator[Named]:
-    """Robots as they are and with faults, the disabled one, and arms."""
-    folder = robots.data_folder()
-    for name in ("husky_bag", "warthog_bag"):
-        machine = load_machine(folder / f"robots/{name}.toml")
-        mission = load_mission([folder / "robots" / name], machine)
-        yield name, diagnose_mission(mission, machine)
-        rng, t = np.random.default_rng(first), mission.timeline
-        for k in range(2 * count):
-            wheel, kind = machine.wheels[rng.integers(len(machine.wheels))], robots.KINDS[k % len(robots.KINDS)]
-            start = rng.uniform(15.0, t.size * t.dt - 20.0)
-            part = slice(int(start / t.dt), int((start + robots.SPELL_S) / t.dt))
-            speed = robots.injected(t.signals[f"wheel.{wheel}.v"], kind, part, robots.RADIUS[name], rng)
-            changed = replace(mission, timeline=replace(t, signals={**t.signals, f"wheel.{wheel}.v": speed}))
-            yield f"{name} {wheel} {kind} {start:.0f} s", diagnose_mission(changed, machine)
-    disabled = load_machine(folder / "robots/warthog_disabled.toml")
-    yield "disabled warthog", diagnose([folder / "robots/warthog_disabled.csv"], disabled)
-    arm = load_machine(folder / "robot_arm_raw/machine.toml")
-    for path in sorted((folder / "robot_arm_raw").glob("*.csv"))[: 10 * count]:
-        yield f"arm {path.stem}", diagnose([path], arm)
 
 
 def main() -> None:

@@ -91,7 +91,7 @@ def lists_of(document: FleetDocument) -> tuple[Left, ...]:
         otherwise = leave_of(m["verdict"], m["cleared"], m["unjudged"], lost=lost)  # but for what grows
         place, reason = _why(otherwise, m, standing[k], document["missions"], rising[k])
         reason += _repaired(every[k], m) if leave is Leave.MAY else ""
-        reason = _with_growth(otherwise, m, _with_losses(leave, m, reason, untold), fast[k])
+        reason = _with_growth(otherwise, m, _with_losses(leave, m, reason, untold), fast[k], untold)
         reason = _with_blind(reason, m)
         if leave is not Leave.MAY and any(f["open"] and f["since"] for f in standing[k]) and _ready(m, document):
             newest = document["missions"][m["missions"][-1]]["name"]
@@ -106,7 +106,7 @@ def lists_of(document: FleetDocument) -> tuple[Left, ...]:
 
 
 def _predates(mission: MissionRow, faults: Sequence[FleetFaultRow]) -> bool:
-    """Whether a mission found a fault whose part was repaired after it: its report stays as it was written."""
+    """Whether a mission found a fault whose part was repaired after it: its report tells the machine as it was then."""
     at = mission.get("start_ns")
     mended = {
         (f["component"], f["side"], f["mode"])
@@ -145,8 +145,13 @@ def _with_losses(leave: Leave, m: MachineRow, reason: str, untold: Sequence[Tren
     return f"{reason}; {losses}"
 
 
-def _with_growth(otherwise: Leave, m: MachineRow, reason: str, fast: Sequence[TrendRow]) -> str:
-    """A reason with the losses that grow towards a half: where it might go out but for them (`otherwise`), they are the reason."""
+def _with_growth(
+    otherwise: Leave, m: MachineRow, reason: str, fast: Sequence[TrendRow], told: Sequence[TrendRow]
+) -> str:
+    """A reason with the losses that grow towards a half: where it might go out but for them (`otherwise`), they are the reason.
+
+    Of the losses in `told` the reason says already how large they are.
+    """
     if not fast:
         return reason
     words = words_of(m)
@@ -154,9 +159,16 @@ def _with_growth(otherwise: Leave, m: MachineRow, reason: str, fast: Sequence[Tr
     for t in sorted(fast, key=lambda t: -t["points"][-1][2])[:_FAULTS]:
         before, now = t["points"][-2][2], t["points"][-1][2]
         part = words.part_words(t["kind"], t["component"], t["side"])
+        soon = "grows so fast that half may be lost before two more are over"
+        if any(t is x for x in told) and otherwise is not Leave.MAY:
+            said.append(
+                f"the loss of the {part} was {100 * before:.0f} % over the mission before, and {soon}".replace("-", "−")
+            )
+            continue
         said.append(
-            f"{part} lost {100 * now:.0f} % over its last mission ({100 * before:.0f} % over the one before), and grows so fast that half "
-            "may be lost before two more are over".replace("-", "−")
+            f"{part} lost {100 * now:.0f} % over its last mission ({100 * before:.0f} % over the one before), and {soon}".replace(
+                "-", "−"
+            )
         )
     losses = "; ".join(said)
     return f"{losses}: check the part; {reason}" if otherwise is Leave.MAY else f"{reason}; {losses}"

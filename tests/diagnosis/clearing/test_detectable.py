@@ -125,3 +125,16 @@ def test_an_angle_that_is_off_shows_where_the_machine_goes_straight() -> None:
     sizes = check.offset(places.overlap(check.frame))
     assert sizes[0] == pytest.approx(0.07)
     assert np.isinf(sizes[1])
+
+
+def test_a_window_that_is_beyond_the_limit_as_it_is_shows_no_fault_of_no_size() -> None:
+    """A valve whose check passes all the same is not *found with an excess of 0 %*, which would leave it not cleared."""
+    mission = _with(simulated(), "wheel.FR.u_applied", 20.0, 20.8, 4.0)
+    reference = _gauges(mission, "FR", Side.ACTUATOR, base=False).reference
+    assert reference is not None
+    all_windows = reference.compared._replace(moves=np.ones_like(reference.compared.moves))
+    assert (all_windows.off >= reference.limit).any()
+    assert not (reference.compared.moves & (all_windows.off >= reference.limit)).any()
+    rows = detectable(in_cells(mission, base=False)).rows
+    sizes = [r.size for r in rows if (r.component, r.side) == ("FR", Side.ACTUATOR) and r.size is not None]
+    assert min(sizes) > 0.0

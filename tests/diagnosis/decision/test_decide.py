@@ -264,13 +264,13 @@ def test_a_model_of_this_mission_says_what_it_does_not_show() -> None:
 
     none = (None,) * 4
     (some,) = verdict(parts, model=model, shown=shown((0.37, None, None, None), none)).caveats
-    assert "may begin: on 1 of 2 speed sensors those of 37 % or more, on the other none; on no drive valve any." in some
+    assert "may begin: on 1 of 2 speed sensors from 37 % on, on the other not; on no drive valve." in some
     (nothing,) = verdict(parts, model=model, shown=shown(none, none)).caveats
     assert "need not show, however large" in nothing
     rows = shown((0.12, 0.31, 0.2, 0.2), (0.4, None, None, 0.4))
     (told,) = verdict(parts, model=model, shown=rows).caveats
     assert (
-        "on every speed sensor those of 12 to 31 % or more (by part); on 1 of 2 drive valves those of 40 % or more, on the other none."
+        "on every speed sensor from 12 to 31 % on (by part); on 1 of 2 drive valves from 40 % on, on the other not."
         in told
     )
     assert verdict(parts, model=replace(model, identified=False)).caveats == ()

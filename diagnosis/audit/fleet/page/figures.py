@@ -84,7 +84,7 @@ def _coverage(machines: Sequence[MachineRow]) -> str:
         if blind
         else []
     )
-    words += [f"uncertain for {count(dark, 'machine')}"] if dark else []
+    words += [f"not known of {count(dark, 'machine')}"] if dark else []
     return "; ".join(words) or "every part judged long enough in the last mission"
 
 

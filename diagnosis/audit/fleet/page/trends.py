@@ -68,7 +68,7 @@ def dead_words(t: TrendRow, standing: Sequence[FleetFaultRow]) -> str:
     if not mine:
         return ""
     rows = join_words(list(dict.fromkeys(state_label(f["mode"], f["side"]).lower() for f in mine)))
-    return f"without the time that is told as {rows}"
+    return f"not counting the time found as {rows}"
 
 
 def course(t: TrendRow, machines: Sequence[MachineRow], unit: str, standing: Sequence[FleetFaultRow] = ()) -> Context:
@@ -101,7 +101,7 @@ def course(t: TrendRow, machines: Sequence[MachineRow], unit: str, standing: Seq
             f"above the limit of {round_to(t['limit'])}: ε̂ {t['points'][-1][2]:.2f} over the whole of its last mission"
         )
     if dead := dead_words(t, standing):
-        words = f"{words}, {dead}: not as good as it looks"
+        words = f"{words}; {dead}, so the part is worse than this"
     state = "above" if beyond or dead or t["forecast"]["state"] == "above" else "near" if t["approaching"] else "calm"
     return {
         "title": title,

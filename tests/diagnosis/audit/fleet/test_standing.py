@@ -187,9 +187,9 @@ def test_a_fault_that_comes_back_is_as_severe_as_it_is_now(
         ([Sample("a"), Sample("b", day=None)], "every part judged long enough in the last mission"),
         ([Sample("a", blind=[("FR", "sensor")])], "1 part not judged long enough in the last mission"),
         ([NO_SIGNAL], "nothing judged"),
-        ([Sample("a", day=None, verdict="not_assessed", blind=samples.PARTS)], "uncertain for 1 machine"),
-        ([Sample("a"), Sample("b", "HX-2", state="crashed")], "uncertain for 1 machine"),
-        ([Sample("a"), Sample("b", state="crashed")], "uncertain for 1 machine"),
+        ([Sample("a", day=None, verdict="not_assessed", blind=samples.PARTS)], "not known of 1 machine"),
+        ([Sample("a"), Sample("b", "HX-2", state="crashed")], "not known of 1 machine"),
+        ([Sample("a"), Sample("b", state="crashed")], "not known of 1 machine"),
     ],
 )
 def test_every_part_is_assessed_only_where_that_is_known(tmp_path: Path, missions: list[Sample], told: str) -> None:
