@@ -13,6 +13,7 @@ from replay.clocks.align import align_clocks
 from replay.clocks.source_clock import SourceClock
 from replay.errors import ConfigError, LogError
 from replay.log.content_hash import content_hash
+from replay.log.empty_log import require_messages, silent_topics
 from replay.log.joined_tables import joined_tables
 from replay.log.left_out import FileLeftOut
 from replay.log.open_loop import is_open_loop, is_open_loop_table
@@ -189,6 +190,7 @@ def _read(
         sha256, size = content_hash(path)
         logs.append(log)
         files.append(MissionFile(path, sha256, size, log.format, _complete(summary, log.summary)))
+    require_messages(summaries, logs)
     return files, logs
 
 
@@ -285,7 +287,8 @@ def first_question(signals: Signals) -> str:
 
 
 def _cause(files: Sequence[MissionFile]) -> str:
-    """Why files may not make a mission: damage, else clocks that could not be compared."""
+    """Why files may not make a mission: damage, else clocks that could not be compared, else topics without messages."""
     damage = [text for file in files for text in file.summary.damage]
     clocks = [f.clock.sentence for f in files if f.clock is not None and f.clock.reason]
-    return f"; the log is damaged: {damage[0]}" if damage else f"; {clocks[0]}" if clocks else ""
+    silent_there = silent_topics(file.summary for file in files)
+    return f"; the log is damaged: {damage[0]}" if damage else f"; {clocks[0]}" if clocks else silent_there

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Protocol
 
 from replay.errors import LogError, NoLog
+from replay.log.empty_log import without_numbers
 from replay.log.raw_log import LogSummary
 from replay.signals.signal import Signals
 
@@ -56,8 +57,10 @@ def require_use(files: Sequence[ReadFile], signals: Signals) -> None:
     NoLog
         Where tables that hold no signal are no machine's log.
     LogError
-        With the columns of tables that hold no signal, or the file that adds none.
+        With the channels that hold no number, the columns of tables that hold no signal, or the file that adds none.
     """
+    if not signals.items and (empty := without_numbers(signals.missing)):
+        raise LogError(f"{', '.join(str(f.path) for f in files)}: {empty}")
     if not signals.items and all(t.encoding == "table" for f in files for t in f.summary.topics):
         columns = [c for f in files for t in f.summary.topics for c in t.fields if c.strip()]
         shown = f" ({', '.join(columns[:_SHOWN])}{' …' if len(columns) > _SHOWN else ''})" if columns else ""

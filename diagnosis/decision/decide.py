@@ -186,15 +186,20 @@ def decide(
     found = _with_faults(intervals, against, endings_of(intervals, assessments, end_s)) or _without_faults(
         assessments, decided_s, axles, against
     )
+    said = found.title == _SENSORS_ALONE  # which parts are not judged, and why
+    unseen = tuple(dict.fromkeys(a.hidden for a in assessments.values() if a.hidden))
+    told = said or found.status is Verdict.READY  # which call sensors healthy
+    found = replace(found, text=" ".join((found.text, *unseen))) if told else found
     if found.status is Verdict.NOT_ASSESSED and open_points and not against.misplaced:  # which says it itself
         found = replace(found, text=f"{found.text} To clear it: {open_points[0].act}.")
-    said = found.title == _SENSORS_ALONE  # which parts are not judged, and why
     caveats = caveats_of(against, assessments, decided_s, driven, axles, limits, short_named=said)
     if _modelled(assessments) and model is not None and model.identified:
         caveats += (by_model(assessments, shown, words),)
     caveats += smallest_loads(assessments, words)
     caveats += limits_of(limits)
     hidden = (_NO_YAW,) if any(_offset_hidden(checks, axle) for axle in axles) else ()
+    if not told:
+        caveats += unseen
     if found.status is Verdict.READY:
         exempt = exempt_axles(assessments, decided_s, driven, axles, limits, words, open_state=against.open_state)
         behind = behind_drives(assessments, axles, checks, model, words)

@@ -25,6 +25,8 @@ from diagnosis.response.common_cause import (
 from diagnosis.response.disputed import DISPUTED, HIDES, disputed_steps, doubted, unproved
 from diagnosis.response.drive import by_peers, unanswered
 from diagnosis.response.effort import idle_drives, idle_spans, own_pull, powered, shares_of
+from diagnosis.response.encoder_scale import scaled_sides
+from diagnosis.response.encoder_scale_words import by_the_gyro, told
 from diagnosis.response.ground import by_drag, by_slip
 from diagnosis.response.gyro import wrong_gyro
 from diagnosis.response.inputs import FollowerData, cell_of, cells
@@ -78,7 +80,7 @@ _EXCHANGED = (
 
 @dataclass(frozen=True)
 class Judgement:
-    """Both sides of each wheel that could be judged, and what happened to the machine as a whole, to its gyro and to all speeds, a sentence each.
+    """Both sides of each wheel that could be judged, and what happened to the machine as a whole, to its gyro, to all speeds and to those of one side, a sentence each.
 
     `unrelated` says that speeds and commands are of sizes that nothing relates.
     """
@@ -88,6 +90,7 @@ class Judgement:
     gyro: tuple[str, ...] = ()
     unshown: tuple[str, ...] = ()
     unrelated: tuple[str, ...] = ()
+    scaled: tuple[str, ...] = ()
 
 
 def assess_response(
@@ -244,18 +247,21 @@ def assess_response(
         powers = powers_of(j.wheel.blocks, j.driving, about, width * dt, beside.get(w), limits.clear_at, lasting[w])
         hides = np.repeat(unshown(powers, j.driving.size, width * dt), width)[: j.data.y.size]
         sensor = unproved(sensor, hides, HIDES)
-        delay, told = smallest_delay(j, width * dt)
+        delay, lateness = smallest_delay(j, width * dt)
         powers = powers._replace(rows=(*powers.rows, delay))
         signless = (_UNDIRECTED.format(name=names[w]),) if j.data.undirected else ()
-        parts[w] = replace(sensor, powers=powers, notes=(*sensor.notes, told, *signless, *remarks)), drive
+        parts[w] = replace(sensor, powers=powers, notes=(*sensor.notes, lateness, *signless, *remarks)), drive
     unsettled = {w: [*kept[w], *(s for s in slips[w] if not wrong_yaw_rate(s, j))] for w, j in judged.items()}
-    gyro = wrong_gyro(judged, unsettled, turning, width * dt, heading)
+    sought = scaled_sides(judged, unsettled, turning, width * dt)
+    gyro = wrong_gyro(judged, unsettled, turning, width * dt, heading, [(x.start, x.stop) for x in sought.found])
+    parts = {w: (by_the_gyro(w, sensor, judged, sought, turning), drive) for w, (sensor, drive) in parts.items()}
     ignored = () if any(j.response.answered for j in judged.values()) else unexplained(drives, limits, dt)
     stood = standstills(idle, dt) or (
         paused([f for side in parts.values() for f in side[0].findings], dt) if len(data) == 1 else ()
     )
     ignored, said = witnessed(ignored, witness, seen, drives, speeds, (width, limits, dt))
-    return Judgement(parts, (*stood, *(astray if lasts else ())), gyro, said, ignored)
+    scaled = told(sought, turning, width * dt)
+    return Judgement(parts, (*stood, *(astray if lasts else ())), gyro, said, ignored, scaled)
 
 
 def _turned_by(wheel: str, found: Mapping[str, Judged]) -> bool:

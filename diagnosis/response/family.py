@@ -17,7 +17,14 @@ from diagnosis.response.models import BLOCK_S
 from diagnosis.response.sides import without_doubles
 from diagnosis.response.tracking import assess_channel, assess_tracking
 from diagnosis.results.assessment import Assessment, Reason
-from diagnosis.results.machine_event import not_following, not_related, not_shown, other_yaw_rate, turns_otherwise
+from diagnosis.results.machine_event import (
+    not_following,
+    not_related,
+    not_shown,
+    one_side_otherwise,
+    other_yaw_rate,
+    turns_otherwise,
+)
 from diagnosis.results.vocabulary import Tier
 from replay.machine.config import Machine
 
@@ -56,6 +63,7 @@ class ResponseEvidence:
             *map(not_following, judged.events),
             *map(not_related, judged.unrelated),
             *map(not_shown, judged.unshown),
+            *map(one_side_otherwise, judged.scaled),
             *map(other_yaw_rate, judged.gyro),
             *(turns_otherwise(t.text) for t in turns),
         )

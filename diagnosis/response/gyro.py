@@ -48,6 +48,7 @@ def wrong_gyro(
     turning: Turning | None,
     block_s: float,
     heading: Array | None = None,
+    aside: Sequence[tuple[int, int]] = (),
 ) -> tuple[str, ...]:
     """A sentence for each time in which the gyro alone contradicts the wheels, and nothing else turns as it says.
 
@@ -63,6 +64,8 @@ def wrong_gyro(
         Length of a block [s].
     heading : Array or None, shape (b,)
         Yaw rate by the heading of odometry [rad/s]: where that has what the gyro shows, and the wheels have not, these slip.
+    aside : Sequence[tuple[int, int]]
+        Blocks [start, stop) that something else explains.
     """
     if turning is None or not all(j.response.answered for j in judged.values()):
         return ()
@@ -74,6 +77,8 @@ def wrong_gyro(
         sound &= ~far
         for s in faults[w]:
             sound[max(0, s.start - _AROUND) : s.stop + _AROUND] = False
+    for start, stop in aside:
+        sound[start:stop] = False
     found = fitted(apart, turning.yaw, sound, _SOUND)
     if found is None:
         return _never(apart, turning.yaw, sound, block_s)

@@ -123,6 +123,8 @@ class Assessment:
         What the mission would have shown to this evidence; None: as to the checks of the all-clear.
     lacks : Mapping[State, Lack]
         What is missing where a reason is that something is.
+    hidden : str
+        What does not show although the part was judged, a sentence; empty where nothing is known to hide.
     """
 
     states: NDArray[np.int8]
@@ -136,6 +138,7 @@ class Assessment:
     loss: Loss | None = None
     powers: Powers | None = None
     lacks: Mapping[State, Lack] = field(default_factory=dict)
+    hidden: str = ""
 
     def reasoned(self, state: State, reason: Reason) -> Assessment:
         """The same with another reason of a state."""

@@ -82,6 +82,17 @@ def other_yaw_rate(text: str) -> MachineEvent:
     return MachineEvent("The gyro contradicts the {wheels}", text, doubt, act)
 
 
+def one_side_otherwise(text: str) -> MachineEvent:
+    """The measured yaw rate shows one side going otherwise than it reads, while all keep to their commands."""
+    act = (
+        "mark the {wheels}, let each make ten turns by its encoder and count them, and measure the tyres; a speed over ground (gnss.speed) in the "
+        "log would tell slip apart"
+    )
+    return MachineEvent(
+        "The gyro contradicts one side's speed", text, "the gyro contradicts the speed of one side", act
+    )
+
+
 def turns_otherwise(text: str) -> MachineEvent:
     """Gyro and odometry turn otherwise, and nothing else measures how the machine turns."""
     doubt = "gyro and odometry contradict each other"

@@ -19,6 +19,7 @@ def worded(found: Assessment, words: MachineWords) -> Assessment:
         found,
         reasons={state: words.fill(why) for state, why in found.reasons.items()},
         notes=tuple(words.fill(note) for note in found.notes),
+        hidden=words.fill(found.hidden),
         findings=tuple(_finding(f, words) for f in found.findings),
     )
 

@@ -10,6 +10,7 @@ from pathlib import Path, PurePath
 from replay.clocks.align import align_clocks
 from replay.clocks.source_clock import SourceClock
 from replay.errors import LogError
+from replay.log.empty_log import silent_topics
 from replay.log.raw_log import Channel, RawLog
 from replay.log.source_options import SignalSource
 from replay.machine.config import Control, Machine, haulotte
@@ -44,7 +45,7 @@ _SHOWN = 6  # names in a message
 def structure_of(logs: Sequence[RawLog]) -> Structure:
     """Wheels of the machine that recorded some logs; raises `LogError` where none can be found."""
     channels = _all_channels(logs)
-    return _structure(channels, _description(logs, []), None)
+    return _structure(channels, _description(logs, []), None, silent_topics(log.summary for log in logs))
 
 
 def preset_draft(preset: Preset) -> Draft:
@@ -90,7 +91,7 @@ def draft_machine(logs: Sequence[RawLog], preset: Preset | None = None) -> Draft
     channels = _all_channels(logs)
     doubts: list[str] = []
     description = _description(logs, doubts)
-    structure = _structure(channels, description, preset)
+    structure = _structure(channels, description, preset, silent_topics(log.summary for log in logs))
     draft = Draft(Machine(_name(description, logs), "", structure.wheels, None))
     many = f"Wheels {', '.join(structure.wheels)}" if len(structure.wheels) > 1 else f"One drive, {structure.wheels[0]}"
     draft.say("machine", f"{many}, from {structure.how}.")
@@ -191,7 +192,7 @@ def _description(logs: Sequence[RawLog], doubts: list[str]) -> RobotDescription 
 
 
 def _structure(
-    channels: Mapping[str, Channel], description: RobotDescription | None, preset: Preset | None
+    channels: Mapping[str, Channel], description: RobotDescription | None, preset: Preset | None, silent: str
 ) -> Structure:
     joints = [m[1] for c in channels.values() if (m := re.search(r"\[([^\[\]]+)\]$", c.field)) and c.topic]
     described = None if description is None else described_structure(description, joints)
@@ -208,7 +209,7 @@ def _structure(
     raise LogError(
         f"no wheel speed is in the log: {_nameless(joints, channels)}, and there is no odometry; `mfhca channels LOG --all` lists "
         "what it holds; record /joint_states, or give the structure with --preset and name the signals in [signals]; an arm "
-        'needs a machine file with its joints as wheels and part = "joint"'
+        f'needs a machine file with its joints as wheels and part = "joint"{silent}'
     )
 
 

@@ -7,6 +7,7 @@ from fnmatch import fnmatch
 from pathlib import Path
 
 from replay.arrays.column_store import ColumnStore
+from replay.log.empty_log import require_messages
 from replay.log.joined_tables import joined_tables
 from replay.log.raw_log import RawLog
 from replay.log.source_options import SourceOptions
@@ -37,19 +38,21 @@ def read_everything(
     Raises
     ------
     LogError
-        Where a file cannot be read.
+        Where a file cannot be read, or none holds a message.
     """
     store = ColumnStore()
-    logs = []
+    logs, summaries = [], []
     for path in paths:
         options = options_of(path, machine)
         topics = None
+        summary = summarise_log(path, options)
+        summaries.append(summary)
         if not every:
-            summary = summarise_log(path, options)
             plan = plan_topics([summary], machine or haulotte(), lambda t: is_description(t.name, t.type_name))
             topics = plan[summary.source]
         progress(Progress(Stage.READING, path.name))
         logs.append(in_order(read_log(path, options, topics, store=store)))
+    require_messages(summaries, logs)
     return joined_tables(logs)
 
 

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from replay.arrays.column_store import ColumnStore
 from replay.errors import ConfigError
+from replay.log.empty_log import NO_NUMBER
 from replay.log.raw_log import Channel, LogSummary, RawLog, TopicInfo
 from replay.log.source_options import SignalSource
 from replay.machine.config import Machine
@@ -215,7 +216,7 @@ def _take_guess(draft: _Draft, name: str, found: list[tuple[Candidate, RawLog]])
             continue
         data = _data(log, channel, candidate.origin)
         if not np.isfinite(data[1]).any():
-            reason = f"{candidate.origin.label} holds no number"
+            reason = f"{candidate.origin.label} {NO_NUMBER}"
             continue
         unit = candidate.origin.unit or usable_unit(name, channel.unit) or ""
         origin = choose_motor_or_wheel(name, replace(candidate.origin, unit=unit), data[1], draft.machine)

@@ -18,6 +18,7 @@ from replay.arrays.blocks import blocks, release
 from replay.arrays.column_store import ColumnStore
 from replay.arrays.compiling import njit
 from replay.errors import LogError
+from replay.log.empty_log import without_numbers
 from replay.signals.signal import Signal, Signals
 
 State = TypeVar("State")
@@ -164,6 +165,8 @@ def align(signals: Signals, start_s: float | None = None, stop_s: float | None =
     wheel = {k: s for k, s in signals.items.items() if k.startswith("wheel.") and s.stamps.size > 1}
     if not wheel and signals.named_elsewhere:
         raise LogError(f"no wheel signal with at least two samples was found; {signals.named_elsewhere}")
+    if not wheel and (empty := without_numbers(signals.missing, ["wheel."])):
+        raise LogError(f"no speed of a wheel has two samples: {empty}")
     if not wheel:
         raise LogError(
             "no wheel signal with at least two samples was found; `mfhca config init --log LOG -o machine.toml` writes a machine "

@@ -1,0 +1,107 @@
+"""What is said of one side that goes otherwise than it reads, and of the factor on an encoder that a log does not show."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from diagnosis.response.disputed import unproved
+from diagnosis.response.encoder_scale import LENGTH_S, Scaled, Sought
+from diagnosis.response.machine import Judged
+from diagnosis.response.turning import Turning
+from diagnosis.results.assessment import Assessment
+
+_END_S = 1.0
+OTHERWISE = "it keeps to its command, but the gyro shows that one side of the machine goes otherwise than it reads"
+
+
+def told(sought: Sought, turning: Turning | None, block_s: float) -> tuple[str, ...]:
+    """A sentence for each time in which one side goes otherwise than it reads; `block_s` is the length of a block [s]."""
+    if turning is None:
+        return ()
+    return tuple(sentence_of(x, turning.sides, turning.yaw.size, block_s) for x in sought.found)
+
+
+def by_the_gyro(
+    wheel: str, sensor: Assessment, judged: Mapping[str, Judged], sought: Sought, turning: Turning | None
+) -> Assessment:
+    """A wheel's sensor with nothing healthy said of it while the gyro contradicts its side, and with what does not show.
+
+    Parameters
+    ----------
+    wheel : str
+        The wheel.
+    sensor : Assessment
+        Of it.
+    judged : Mapping[str, Judged]
+        All wheels.
+    sought : Sought
+        What was looked for.
+    turning : Turning or None
+        How the body is turned.
+    """
+    one = judged[wheel]
+    if not one.response.answered:
+        return sensor
+    several = len(judged) > 1
+    if several or one.view is None:
+        sensor = replace(sensor, hidden=unseen(sought, several=several))
+    blocks = one.wheel.blocks.start
+    width, where = int(blocks[1]) if blocks.size > 1 else 1, np.zeros(one.data.y.size, np.bool_)
+    for x in sought.found:
+        if turning is not None and (not x.told or turning.sides[wheel] == x.side):
+            where[x.start * width : x.stop * width] = True
+    return unproved(sensor, where, OTHERWISE)
+
+
+def sentence_of(one: Scaled, sides: Mapping[str, float], size: int, block_s: float) -> str:
+    """What is said of a time in which one side goes otherwise than it reads.
+
+    Parameters
+    ----------
+    one : Scaled
+        The time.
+    sides : Mapping[str, float]
+        Of each wheel, as in `Turning`.
+    size : int
+        Blocks of the mission.
+    block_s : float
+        Length of a block [s].
+    """
+    this, other = (_named([w for w, side in sides.items() if side == s]) for s in (one.side, -one.side))
+    start = "From the start" if one.start * block_s < _END_S else f"From {one.start * block_s:.1f} s"
+    stop = "the end of the log" if (size - one.stop) * block_s < _END_S else f"{one.stop * block_s:.1f} s"
+    likely = f"{this} went {one.factor:.2f} × as fast as read"
+    which = f"{likely} ({other} is less likely)" if one.told else f"{likely}, or {other} {one.rival:.2f} ×"
+    return (
+        f"{start} to {stop} the gyro shows that the machine turned as if {which}, while the {{wheels}} kept to their commands: an encoder that is "
+        "scaled inside the speed loop that it closes, another tyre, or one that slips; no factor or constant of the gyro itself does that."
+    )
+
+
+def _named(wheels: Sequence[str]) -> str:
+    """The wheels of a side: with several of them the share is that of their mean."""
+    return wheels[0] if len(wheels) == 1 else f"the mean of {', '.join(wheels[:-1])} and {wheels[-1]}"
+
+
+def unseen(sought: Sought, *, several: bool) -> str:
+    """What does not show of an encoder that closes its drive's loop, a sentence.
+
+    Parameters
+    ----------
+    sought : Sought
+        What was looked for.
+    several : bool
+        Whether there are several drives, whose difference turns the machine.
+    """
+    of = "A factor on an encoder that closes its own drive's speed loop"
+    if np.isfinite(sought.smallest):
+        x = sought.smallest
+        return (
+            f"{of} shows by the gyro alone, on one {{wheel}} from {x:.2f} × (or {1.0 / x:.2f} ×) on where it lasts {LENGTH_S:.0f} s of driving; a smaller "
+            "one is not assessed."
+        )
+    log = "a yaw rate (imu.yaw_rate) with turns both ways" if several else "a speed over ground (gnss.speed)"
+    return f"{of} would not show in this log, and is not assessed: log {log}."
