@@ -230,7 +230,7 @@ def _hysteresis(isolated: Isolated, found: IdentifiedPair) -> bool:
     pair, seen = found.pair, isolated.seen
     if pair.side is not Side.ACTUATOR or not seen.use.any():
         return False
-    brief = int(np.count_nonzero(seen.use)) * pair.dt < _RESTS_S
+    brief = int(np.count_nonzero(seen.use)) * found.model.dt < _RESTS_S  # a channel may be slower than the timeline
     both = np.maximum(np.abs(seen.y[seen.use]), np.abs(seen.x[seen.use]))
     rests = float(np.nanquantile(both, _MOSTLY)) < _MIDDLE * pair.span
     return rests or (brief and seen.deviation < min(_HYSTERESIS * pair.span, _usually_off(found)))

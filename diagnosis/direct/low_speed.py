@@ -1,7 +1,8 @@
 """What the speed sensors of a machine do whenever it starts, stops or turns round is their habit, and no fault of one of them.
 
 Sensors that count edges see few at low speed: they read 0 before the first one, hold the last, and come late. How far they are
-off then is taken from all passages of all wheels through low speed; a finding there that is no further off is left open.
+off then is taken from all passages of all wheels through low speed; a finding there that is no further off is left open. One that
+lasts longer than any passage is held to what they are off by in the middle of their time, and not to their worst moment.
 """
 
 from __future__ import annotations
@@ -47,14 +48,15 @@ def without_low_speed_habit(
     low = _LOW * max(float(np.quantile(x, _TOP)) for x in speeds.values())
     off = {w: evened_off(one) for w, one in found.items()}
     sound = {w: ~in_lasting(assessments[w].findings, off[w].size, found[w].pair.dt) for w in found}
-    peaks = np.concatenate([_peaks(off[w], speeds[w], sound[w], low) for w in found])
-    if peaks.size < _PASSAGES:
+    passages = np.concatenate([_passages(off[w], speeds[w], sound[w], low) for w in found])
+    if len(passages) < _PASSAGES:
         return dict(assessments)
-    limit = _BEYOND * float(np.quantile(peaks, _USUAL))
-    return {
-        w: left_open(a, [f for f in a.findings if _is_habit(f, off[w], speeds[w] < low, limit)])
-        for w, a in assessments.items()
-    }
+    most, middle = _BEYOND * np.quantile(passages, _USUAL, axis=0)
+    out = {}
+    for w, a in assessments.items():
+        slow, brief = speeds[w] < low, round(_LASTS_S / found[w].pair.dt)
+        out[w] = left_open(a, [f for f in a.findings if _is_habit(f, off[w], slow, (most, middle), brief)])
+    return out
 
 
 def evened_off(one: IdentifiedPair) -> Array:
@@ -75,16 +77,27 @@ def in_lasting(findings: Sequence[Finding], size: int, dt: float) -> NDArray[np.
     return out
 
 
-def _peaks(off: Array, speed: Array, sound: NDArray[np.bool_], low: float) -> Array:
-    """Largest deviation of each passage that comes near standstill, and begins or ends with motion; of sound ones alone."""
+def _passages(off: Array, speed: Array, sound: NDArray[np.bool_], low: float) -> Array:
+    """Largest deviation of each passage that comes near standstill and begins or ends with motion, and the median while it moves, (passages, 2).
+
+    Of sound ones alone.
+    """
     edge = np.flatnonzero(np.diff(np.r_[False, speed < low, False].astype(np.int8)))
     spans = [(a, b) for a, b in zip(edge[::2], edge[1::2], strict=True) if a > 0 or b < speed.size]
-    return np.array([off[a:b].max() for a, b in spans if speed[a:b].min() < _SLOWEST * low and sound[a:b].all()])
+    near = [(a, b) for a, b in spans if speed[a:b].min() < _SLOWEST * low and sound[a:b].all()]
+    moves = speed > _SLOWEST * low
+    return np.array(
+        [(off[a:b].max(), np.median(off[a:b][moves[a:b]]) if moves[a:b].any() else 0.0) for a, b in near]
+    ).reshape(-1, 2)
 
 
-def _is_habit(finding: Finding, off: Array, low: NDArray[np.bool_], limit: float) -> bool:
+def _is_habit(finding: Finding, off: Array, low: NDArray[np.bool_], limits: tuple[float, float], brief: int) -> bool:
+    """Whether a finding at low speed is off by no more than passages; `limits` of its largest deviation and, beyond `brief` steps, its median."""
     part = slice(finding.start, finding.stop)
-    return bool(low[part].mean() >= _MOSTLY and off[part].max(initial=0.0) <= limit)
+    most, middle = limits
+    if low[part].mean() < _MOSTLY or off[part].max(initial=0.0) > most:
+        return False
+    return finding.stop - finding.start <= brief or bool(np.median(off[part]) <= middle)
 
 
 def left_open(a: Assessment, findings: Sequence[Finding]) -> Assessment:

@@ -19,7 +19,7 @@ from replay.faults import FaultMode
 
 _SMALL = 0.1  # of the span, root mean square: a larger deviation is none of a healthy valve, whatever the others do
 _SHARE, _SHARE_OTHERS = 0.2, 0.3  # of its command, likewise: by habit, and while others are off as well
-_WINDOW_S, _WINDOWS = 2.0, 4  # s; fewer show nothing
+_WINDOW_S, _KNOWN, _WINDOWS = 2.0, 0.25, 4  # s; of it, in which readings come; fewer windows show nothing
 _USUAL, _BEYOND = 0.9, 1.8  # quantile of the windows, and times it
 _BEYOND_OTHERS = 1.6  # times what the others are off meanwhile
 _EITHER = 0.3  # probability of a share beside a constant
@@ -69,7 +69,8 @@ def _usual(one: IdentifiedPair) -> float:
     use = (one.samples.status[:size] == PAIR) & ~one.samples.quiet[:size]
     off = np.where(use, np.nan_to_num(one.samples.y[:size] - one.samples.x[:size]), 0.0).reshape(-1, width)
     count = np.count_nonzero(use.reshape(-1, width), axis=1)
-    size_of = np.sqrt((off**2).sum(axis=1) / np.maximum(count, 1))[count > 0.25 * width]
+    known_s = count * one.model.dt  # a position may be slower than the timeline
+    size_of = np.sqrt((off**2).sum(axis=1) / np.maximum(count, 1))[known_s > _KNOWN * _WINDOW_S]
     small = size_of[size_of < _SMALL * one.pair.span]
     return float(np.quantile(small, _USUAL)) if small.size >= _WINDOWS else 0.0
 

@@ -51,7 +51,7 @@ def mode_of(isolated: Isolated, found: IdentifiedPair, limits: Limits) -> FaultM
         outside = epsilon is not None and epsilon.exceeds_table(limits.min_epsilon) > _MOST_PROBABLY
         return None if seen.deviation < least else FaultMode.OUTSIDE_TABLE if outside else mode
     # a reference that hardly moves is as constant
-    away = np.count_nonzero(np.abs(seen.y - seen.x)[seen.use] > _CLEAR * noise) * found.pair.dt
+    away = np.count_nonzero(np.abs(seen.y - seen.x)[seen.use] > _CLEAR * noise) * found.model.dt
     if found.pair.side is Side.ACTUATOR:
         relation = found.relation
         returns = _LEFT_S + 2.0 * (relation.lag + max(0.0, relation.delay * found.pair.dt))
@@ -65,7 +65,7 @@ def mode_of(isolated: Isolated, found: IdentifiedPair, limits: Limits) -> FaultM
     size = float(np.sqrt(np.mean(known**2))) if known.size else 0.0
     if seen.deviation < _AS_TRUE * size:
         return None
-    if isolated.restless and slowly_off(seen.y[seen.use], known, found.pair.dt) < _ALIVE * size:
+    if isolated.restless and slowly_off(seen.y[seen.use], known, found.model.dt) < _ALIVE * size:
         return None  # it lives, at a speed that stays: the noise is its reference's
     at_rest = known.size and max(seen.deviation, float(np.max(np.abs(known)))) < limits.min_sat / 2
     return None if at_rest else mode  # it repeats what it had, which is true

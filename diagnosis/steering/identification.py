@@ -135,11 +135,23 @@ def own_spread(cov: Array) -> Array:
 
 
 def usual_rate(parts: Sequence[Windows]) -> float | None:
-    """Rate at which the axles usually turn [rad/s]; None where they turn too little."""
-    rates = np.concatenate([np.abs(w.rate[w.good]) for w in parts]) if parts else np.zeros(0)
-    noise = max((w.noise for w in parts), default=0.0)
-    turning = rates[rates > max(5 * noise, 1e-4)]
-    return float(np.quantile(turning, 0.8)) if turning.size >= LEAST_WINDOWS else None
+    """Rate at which the axles usually turn [rad/s]; None where they turn too little.
+
+    Where the noise of one sensor would hide the motion of all axles, each is held to its own.
+    """
+    most = max((w.noise for w in parts), default=0.0)
+    for noises in ([most] * len(parts), [w.noise for w in parts]):
+        rates = [_turning(w, noise) for w, noise in zip(parts, noises, strict=True)]
+        turning = np.concatenate(rates) if rates else np.zeros(0)
+        if turning.size >= LEAST_WINDOWS:
+            return float(np.quantile(turning, 0.8))
+    return None
+
+
+def _turning(w: Windows, noise: float) -> Array:
+    """Rates of windows that noise does not explain [rad/s], shape (k,)."""
+    rates = np.abs(w.rate[w.good])
+    return np.asarray(rates[rates > max(5 * noise, 1e-4)])
 
 
 def _fit_alone(long: Sequence[Windows], short: Sequence[Windows], scale: float) -> FittedPlant:

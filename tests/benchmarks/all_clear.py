@@ -42,6 +42,7 @@ import numpy as np
 import paver
 import sprayer
 import telehandler
+import transporter
 import tug
 from accuracy import EVIDENCE
 from campaign import Outcome, Task, judged
@@ -78,6 +79,7 @@ OTHERS = {
         paver,
         tug,
         loader,
+        transporter,
     )
 }
 _DRIVEN, _STEERED = 0.06, 0.02  # m/s, rad/s
@@ -265,7 +267,7 @@ def main() -> None:
         "--machine",
         nargs="+",
         default=None,
-        help="default, structures, foreign, hydrostatic, electrohydraulic, electric, flow_sharing, closed_circuit, geared_circuit, forwarder, dumper, sprayer, telehandler, paver, tug, loader",
+        help=", ".join(("default, structures, foreign", *OTHERS)),
     )
     parser.add_argument("--duration", type=float, default=75.0, help="length of a mission [s]")
     parser.add_argument("--every", type=int, default=1, help="one of so many kinds of trouble")

@@ -62,3 +62,28 @@ def test_two_sensors_show_no_habit() -> None:
     pairs = {w: sensor() for w in WHEELS[:2]}
     told = without_low_speed_habit(pairs, {w: assessment(*NEAR_REST) for w in WHEELS[:2]})
     assert all(a.findings for a in told.values())
+
+
+def slow_sensor(*, loses: float = 0.0, wanders: float = 0.0) -> IdentifiedPair:
+    """A sensor of a machine that starts and stops, and creeps at a steady 0.06 m/s for 10 s, where it loses a share; slow, it is off by `wanders`."""
+    t = np.arange(SIZE) * DT
+    creeps = (t >= 24.5) & (t < 35.5)
+    x = np.where(creeps, 0.06, SPEED)
+    y = np.where(np.abs(x) < 0.03, 0.0, x)
+    y = np.where(creeps, y * (1.0 - loses), y) - np.where(np.abs(x) < 0.1, wanders, 0.0)
+    samples = SimpleNamespace(x=x, y=y, status=np.full(SIZE, PAIR, dtype=np.int8))
+    return cast(IdentifiedPair, SimpleNamespace(samples=samples, pair=SimpleNamespace(dt=DT)))
+
+
+def test_what_lasts_longer_than_a_passage_is_held_to_the_middle_of_passages() -> None:
+    pairs = {w: slow_sensor(loses=0.45 if w == "RR" else 0.0) for w in WHEELS}
+    told = without_low_speed_habit(pairs, {w: assessment(2500, 3500) for w in WHEELS if w == "RR"} | {
+        w: Assessment(np.full(SIZE, CODE[State.HEALTHY]), tier=Tier.DIRECT) for w in WHEELS if w != "RR"
+    })  # fmt: skip
+    assert [w for w, a in told.items() if a.findings] == ["RR"]
+
+
+def test_what_lasts_is_left_open_where_passages_are_off_by_as_much_all_along() -> None:
+    pairs = {w: slow_sensor(wanders=0.012) for w in WHEELS}
+    told = without_low_speed_habit(pairs, {w: assessment(2500, 3500) for w in WHEELS})
+    assert not any(a.findings for a in told.values())

@@ -82,3 +82,20 @@ def test_a_small_loss_of_a_valve_without_hysteresis_is_found() -> None:
     spool[BEGIN:END] -= 0.25 * u[BEGIN:END]
     (found,) = assess_pair(pair(Side.ACTUATOR, spool, u), LIMITS).findings
     assert (found.mode, found.start) == (FaultMode.INEFFICIENT, pytest.approx(BEGIN, abs=300))
+
+
+@pytest.mark.parametrize("every", [1, 5])
+def test_a_small_loss_of_a_reading_that_is_slower_than_the_timeline_is_no_hysteresis(every: int) -> None:
+    """What lasts for twenty seconds is no brief rest off its command, however few readings there are in it."""
+    dt = 0.01
+    t, rng = np.arange(0.0, 75.0, dt), np.random.default_rng(9)
+    u = 0.07 + 0.02 * np.sin(2 * np.pi * t / 7.0) + 0.01 * np.sin(2 * np.pi * t / 2.3)
+    spool = np.round((u + 0.002 * rng.normal(size=t.size)) * 500) / 500
+    lost = (t >= 40.0) & (t < 60.0)
+    spool[lost] -= 0.3 * u[lost]
+    new = np.arange(t.size) % every == 0
+    spool = spool[np.arange(t.size) // every * every]
+    every_one = np.ones(t.size, dtype=np.bool_)
+    one = Pair(Side.ACTUATOR, spool, u, new, every_one, ~every_one, dt, "", 1.0, "y", "x", Noise())
+    (found,) = assess_pair(one, LIMITS).findings
+    assert (found.mode, found.start * dt) == (FaultMode.INEFFICIENT, pytest.approx(40.0, abs=0.5))

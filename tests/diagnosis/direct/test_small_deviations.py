@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from diagnosis.channels.sample_status import PAIR
+from diagnosis.channels.sample_status import PAIR, SKIP
 from diagnosis.direct.identification import IdentifiedPair
 from diagnosis.direct.small_deviations import without_small_deviations
 from diagnosis.results.assessment import CODE, Assessment, Finding
@@ -24,14 +24,16 @@ COMMAND = 0.6 * np.sin(np.arange(SIZE) * DT * 0.7)
 SPAN = (1000, 4000)
 
 
-def valve(gain: float, opens: slice = slice(None)) -> IdentifiedPair:
-    """A valve that opens by a share of what it is told, for a while."""
+def valve(gain: float, opens: slice = slice(None), every: int = 1) -> IdentifiedPair:
+    """A valve that opens by a share of what it is told, for a while; its position comes at `every` step."""
     gains = np.ones(SIZE)
     gains[opens] = gain
-    y, status, quiet = gains * COMMAND, np.full(SIZE, PAIR, np.int8), np.zeros(SIZE, np.bool_)
+    y, status, quiet = gains * COMMAND, np.full(SIZE, SKIP, np.int8), np.zeros(SIZE, np.bool_)
+    status[::every] = PAIR
     part = lambda a, b: (y[a:b], COMMAND[a:b], status[a:b])  # noqa: E731
     samples = SimpleNamespace(x=COMMAND, y=y, status=status, quiet=quiet, part=part)
-    return cast(IdentifiedPair, SimpleNamespace(samples=samples, pair=SimpleNamespace(dt=DT, span=1.0)))
+    pair, model = SimpleNamespace(dt=DT, span=1.0), SimpleNamespace(dt=every * DT)
+    return cast(IdentifiedPair, SimpleNamespace(samples=samples, pair=pair, model=model))
 
 
 def told(
@@ -39,16 +41,18 @@ def told(
     mode: FaultMode = FaultMode.INEFFICIENT,
     opens: slice = slice(None),
     hypotheses: tuple[Hypothesis, ...] = (),
+    every: int = 1,
 ) -> Assessment:
     states = np.full(SIZE, CODE[State.HEALTHY])
     states[slice(*SPAN)] = CODE[State(mode.value)]
     finding = Finding(*SPAN, Side.ACTUATOR, mode, 0.97, hypotheses, None, None, (), Tier.DIRECT)
-    pairs = dict(zip(WHEELS, (valve(x, opens) for x in gains), strict=False))
+    pairs = dict(zip(WHEELS, (valve(x, opens, every) for x in gains), strict=False))
     return without_small_deviations(pairs, {"FR": Assessment(states, findings=(finding,), tier=Tier.DIRECT)})["FR"]
 
 
-def test_what_another_valve_is_off_by_as_well_is_left_open() -> None:
-    after = told((0.9, 1.0, 0.93, 0.96))
+@pytest.mark.parametrize("every", [1, 5])
+def test_what_another_valve_is_off_by_as_well_is_left_open(every: int) -> None:
+    after = told((0.9, 1.0, 0.93, 0.96), every=every)
     assert after.findings == ()
     assert (after.states[slice(*SPAN)] == CODE[State.NOT_ASSESSED]).all()
 

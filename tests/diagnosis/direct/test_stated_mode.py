@@ -27,9 +27,9 @@ def stated(y: Array, x: Array, *, restless: bool) -> FaultMode | None:
     use = np.ones(SIZE, np.bool_)
     seen = SimpleNamespace(y=y, x=x, use=use, noise=0.004, deviation=float(np.sqrt(np.mean((y - x) ** 2))))
     run = SimpleNamespace(row=STUCK, size=SIZE)
-    pair = SimpleNamespace(side=Side.SENSOR, dt=DT)
+    found = SimpleNamespace(pair=SimpleNamespace(side=Side.SENSOR, dt=DT), model=SimpleNamespace(dt=DT))
     isolated = cast(Isolated, SimpleNamespace(run=run, seen=seen, restless=restless))
-    return mode_of(isolated, cast(IdentifiedPair, SimpleNamespace(pair=pair)), Limits())
+    return mode_of(isolated, cast(IdentifiedPair, found), Limits())
 
 
 @pytest.mark.parametrize(

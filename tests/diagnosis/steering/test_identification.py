@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -23,20 +25,21 @@ def axle(
     reach: float = 0.5,
     lost: tuple[float, float, float] = (0, 0, 0),
     every: int = 1,
+    noise: float = 5e-4,
 ) -> SteeringBlocks:
     """A minute and a half of an axle that follows a wandering angle; `lost` is a loss of the valve from … to … [s].
 
-    The angle has a new sample at `every` step.
+    The angle has a new sample at `every` step, with `noise` [rad].
     """
     rng = np.random.default_rng(seed)
     t = np.arange(0.0, 90.0, DT)
     corners = rng.uniform(-reach, reach, 24)
     ref = np.interp(t, np.linspace(0, 90, 72), np.repeat(corners, 3))
     y, u, phi, rate, held = np.zeros(t.size), np.zeros(t.size), 0.0, 0.0, 0.0
-    noise = rng.normal(0.0, 5e-4, t.size)
+    shaken = rng.normal(0.0, noise, t.size)
     for k in range(t.size):
         held = min(max(held, phi - play), phi + play)
-        y[k] = held + noise[k]
+        y[k] = held + shaken[k]
         u[k] = ref[k] - y[k]
         opening = u[k] * (1 - lost[0]) if lost[1] <= t[k] < lost[2] else u[k]
         rate += DT / 0.05 * (rate_at(opening, valve) - rate)
@@ -96,3 +99,11 @@ def test_an_axle_that_rests_has_no_plant() -> None:
     still = np.random.default_rng(2).normal(0.0, 5e-4, 20_000)
     always = np.ones(still.size, np.bool_)
     assert identify_plants([blocks_of(still, -still, always, always, DT)], [NOISE], STOP, [None]) == [None]
+
+
+def test_a_noisy_angle_of_one_axle_does_not_hide_how_the_other_turns() -> None:
+    loud = 0.2
+    noises = [NOISE, replace(NOISE, white=loud**2)]
+    plants = identify_plants([axle(VALVES[0]), axle(VALVES[1], noise=loud, every=25)], noises, STOP, [None, None])
+    assert plants[0] is not None
+    same(plants[0], VALVES[0])
