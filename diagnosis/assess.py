@@ -2,22 +2,24 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Collection
 from dataclasses import dataclass, replace
 
 from diagnosis.channels.liveness import alive_sources
 from diagnosis.evidence import ACTUATOR, SENSOR, MissionView, Part
-from diagnosis.families import FAMILIES
+from diagnosis.families import AXLES, SINGLE, WHOLE
 from diagnosis.results.assessment import Assessment, unassessed
 from diagnosis.results.limited import believed
 from diagnosis.results.machine_event import MachineEvent
 from diagnosis.results.machine_words import HYDRAULIC, MachineWords, machine_words
 from diagnosis.results.wheel_model import WheelModelFit
 from diagnosis.results.worded import worded
+from replay.arrays.processors import beside
 from replay.control.loop import Replay
 from replay.faults import State
 from replay.machine.config import Machine
-from replay.progress import Subscriber
+from replay.progress import Progress, Subscriber
 from replay.signals.timeline import Timeline
 
 
@@ -54,7 +56,8 @@ def assess_components(
     """
     chosen = tuple(w for w in machine.wheels if w in wheels)
     mission = MissionView(timeline, replay, machine, chosen, alive_sources(timeline), progress)
-    for family in FAMILIES:
+    mission = _measured(mission)
+    for family in WHOLE:
         mission = mission.after(family.assess(mission))
     parts = [(component, side) for component in (*chosen, *machine.axles) for side in (SENSOR, ACTUATOR)]
     found = {part: mission.known.get(part) or _without_evidence(mission, *part) for part in parts}
@@ -65,6 +68,30 @@ def assess_components(
         tuple(event.worded(words) for event in mission.events),
         words,
     )
+
+
+def _measured(mission: MissionView) -> MissionView:
+    """The view after the axles, and after what single wheels show, which is found meanwhile on another processor."""
+    told: list[Progress] = []
+    here = threading.get_ident()
+
+    def say(stage: Progress) -> None:
+        mission.progress(stage) if threading.get_ident() == here else told.append(stage)
+
+    def single() -> MissionView:
+        view = replace(mission, progress=say)
+        for family in SINGLE:
+            view = view.after(family.assess(view))
+        return view
+
+    with beside(single, mission.timeline.size) as found:
+        axles = mission
+        for family in AXLES:
+            axles = axles.after(family.assess(axles))
+        wheels = found()
+    for stage in told:
+        mission.progress(stage)
+    return replace(axles, known={**axles.known, **wheels.known})
 
 
 def _without_evidence(mission: MissionView, wheel: str, side: str) -> Assessment:

@@ -11,7 +11,7 @@ does without a part lacks it, as `channels`, which judges by single channels and
     assess          the walk through these parts, for one component or all of them together
     family          the family itself: an object that is an `EvidenceFamily`
 
-`diagnosis.families` has the table of them, in the order in which they are asked.
+`diagnosis.families` has the tables of them, in the order in which they are asked.
 """
 
 from __future__ import annotations

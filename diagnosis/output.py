@@ -102,7 +102,10 @@ def _kept(
     exact: Mapping[str, NDArray[Any]], grids: Mapping[str, float], among: Collection[str] | None = None
 ) -> tuple[dict[str, NDArray[Any]], Layout]:
     """Columns as a reader of the file gets them, and which of them the file makes of others."""
-    kept = {k: v if k == "t" else stored(k, v, grids[k]) for k, v in exact.items()}
+    near = each(
+        lambda k: exact[k] if k == "t" else stored(k, exact[k], grids[k]), exact, len(next(iter(exact.values()), ()))
+    )
+    kept = dict(zip(exact, near, strict=True))
     made_of = sources_of(exact, kept, grids, among)
     layout = Layout(list(kept), made_of, {k: grids[k] for k in kept})
     return restored({k: v for k, v in kept.items() if k not in made_of}, layout), layout

@@ -57,7 +57,7 @@ def held_reference(x: Array, habit: Habit, dt: float) -> Held:
     return out
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _scan(x, total, travel, distance, window, timeout, out):  # type: ignore[no-untyped-def]
     """Two windows that end at every sample: by travel where there is a distance, no longer than the timeout allows."""
     mean, spread = out
@@ -118,7 +118,7 @@ def news_alone(status: NDArray[np.int8], y: Array, hold: Array, dt: float) -> ND
     return out
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _thin(status, y, hold):  # type: ignore[no-untyped-def]
     last, value = -1, np.nan
     for k in range(status.size):

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import NDArray
 
 from diagnosis.decision.explained import explaining
 from diagnosis.decision.open_checks import open_words
@@ -324,7 +325,16 @@ def without_speed(timeline: Timeline, machine: Machine) -> float:
     """Time in which no wheel speed is valid [s]; `timeline` and `machine` as of the mission."""
     names = [f"wheel.{w}.{x}" for w in machine.wheels for x in ("v", "v_true")]
     speeds = [timeline.signals[n] for n in names if n in timeline.signals]
-    steps = sum(
-        int(np.count_nonzero(~np.isfinite([v[part] for v in speeds]).any(axis=0))) for part in timeline.blocks()
-    )
-    return steps * timeline.dt if speeds else 0.0
+    if not speeds:
+        return 0.0
+    return sum(_without_any([v[part] for v in speeds]) for part in timeline.blocks()) * timeline.dt
+
+
+def _without_any(values: Sequence[NDArray[np.float64]]) -> int:
+    """How many samples none of several columns has."""
+    missing = ~np.isfinite(values[0])
+    for more in values[1:]:
+        if not missing.any():
+            return 0
+        missing &= ~np.isfinite(more)
+    return int(np.count_nonzero(missing))

@@ -17,6 +17,7 @@ from diagnosis.results.left_out import is_left_out
 from diagnosis.results.machine_words import MachineWords
 from diagnosis.results.wheel_model import WheelModelFit
 from replay.arrays.blocks import blocks, release
+from replay.arrays.processors import each
 from replay.clocks.source_clock import SourceClock
 from replay.machine.config import Machine
 from replay.signals.signal import Signal, Signals
@@ -56,30 +57,29 @@ def recorded(signals: Signals, timeline: Timeline, words: MachineWords) -> Recor
 
 def signal_rows(signals: Signals, timeline: Timeline, words: MachineWords) -> list[SignalRow]:
     """One row per mapped signal: origin, rate, gaps, missing share, rounding step."""
-    rows: list[SignalRow] = []
-    for name, signal in signals.items.items():
-        period = timeline.periods_ns[name]
+
+    def row(name: str) -> SignalRow:
+        signal, period = signals.items[name], timeline.periods_ns[name]
         gaps, longest = _gaps(signal, period)
         values = timeline.signals.get(name)
         missing = 1.0 if values is None else float(np.mean(~np.isfinite(values)))
         release(values, signal.stamps)
-        rows.append(
-            {
-                "name": name,
-                "channel": signal.origin.label,
-                "unit": words.unit_of(name),
-                "recorded_unit": signal.origin.unit,
-                "rate_hz": 1e9 / period if period else None,
-                "samples": int(signal.stamps.size),
-                "gaps": gaps,
-                "longest_gap_s": longest,
-                "missing_share": missing,
-                "lsb": rounding_step(signal.values),
-                "guessed": signal.guessed,
-                "source": PurePath(signal.source).name,
-            }
-        )
-    return rows
+        return {
+            "name": name,
+            "channel": signal.origin.label,
+            "unit": words.unit_of(name),
+            "recorded_unit": signal.origin.unit,
+            "rate_hz": 1e9 / period if period else None,
+            "samples": int(signal.stamps.size),
+            "gaps": gaps,
+            "longest_gap_s": longest,
+            "missing_share": missing,
+            "lsb": rounding_step(signal.values),
+            "guessed": signal.guessed,
+            "source": PurePath(signal.source).name,
+        }
+
+    return each(row, signals.items, timeline.size)
 
 
 def _gaps(signal: Signal, period: int) -> tuple[int, float]:

@@ -57,7 +57,7 @@ def low_passed_on(u: Array, tau: float, dt: float, state: float | None) -> tuple
     return out, float(last)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _scan_lag(u, a, x, out):  # type: ignore[no-untyped-def]
     """Write x and carry on with x ← a·x + (1 − a)·u; x stays where u is not known. NaN starts from the first finite u, else 0."""
     if x != x:
@@ -73,7 +73,7 @@ def _scan_lag(u, a, x, out):  # type: ignore[no-untyped-def]
     return x
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _scan_lags(u, keep, at, out):  # type: ignore[no-untyped-def]
     """The same from the first finite u for several shares that are kept; the lags wait for nothing but their own last value."""
     x = np.zeros(keep.size)

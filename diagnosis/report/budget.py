@@ -8,7 +8,6 @@ for: what a browser can hold ends before what a page can.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,6 +15,7 @@ from numpy.typing import NDArray
 
 from diagnosis.report.encode import Channel, Plan, plan_of, reduced, resolution_of, whole, with_pieces
 from diagnosis.results.result import Closeups
+from replay.arrays.processors import each
 
 Values = NDArray[np.floating]
 Spans = list[tuple[int, int]]
@@ -25,8 +25,8 @@ _MARGIN_S = 0.1
 _STRIDE, _BLOCKS, _FEWEST = 64, 32_768, 1024
 _AROUND, _MOST = 0.85, 0.9
 _RANK = {"replay": 1, "evidence": 2}
-_WORKERS = 4
 _MOST_WHOLE = 720_000
+_ROWS = 0  # whatever their length: what is made of them is packed at once
 
 
 @dataclass(frozen=True)
@@ -124,6 +124,7 @@ def spans_of(faults: Iterable[tuple[float, float]], pad_s: float, whole_s: float
     return spans
 
 
+@np.errstate(over="ignore", invalid="ignore")  # of infinite or absurd values
 def encode(given: Encodable, budget: int) -> list[Channel]:
     """Encode columns within a budget [bytes]: every sample where that fits, else extremes with samples around faults.
 
@@ -164,48 +165,37 @@ def _equal(a: Values | None, b: Values | None) -> bool:
     return a.dtype == b.dtype and bool(np.array_equal(a.view(bits), b.view(bits)))
 
 
-def _quiet() -> None:
-    """Let no infinite or absurd value of a column warn: what NumPy tells of them stands for each thread alone."""
-    np.seterr(over="ignore", invalid="ignore")
-
-
 def _encoded(given: Encodable, budget: int) -> list[Channel]:
     columns, samples, per = given.columns, given.samples, given.per
-    with ThreadPoolExecutor(_WORKERS, initializer=_quiet) as pool:
-        plans = dict(
-            zip(
-                columns,
-                pool.map(lambda c: plan_of(columns[c], given.lsb.get(c), resolution_of(c)), columns),
-                strict=True,
-            )
-        )
-        if per == 1 and sum(p.rate for p in plans.values()) * samples <= budget:
-            channels = list(pool.map(lambda c: whole(c, columns[c], plans[c]), columns))
-            if sum(c.size for c in channels) <= budget:
-                return channels
-
-        def run(stride: int) -> list[Channel]:
-            return list(pool.map(lambda c: reduced(c, columns[c], plans[c], per, stride), columns))
-
-        stride = max(_STRIDE, per)
-        while samples // stride > _BLOCKS:
-            stride *= 2
-        while True:
-            channels = run(stride)
-            left = budget - sum(c.size for c in channels)
-            if left >= 0 or samples // stride <= _FEWEST:
-                break
-            stride *= 2
-        spans = _affordable(given, plans, left * (_AROUND if per == 1 and samples <= _MOST_WHOLE else _MOST))
-
-        def near(channel: Channel) -> Channel:
-            return with_pieces(channel, given.pieces(channel.name, spans[channel.name]), plans[channel.name])
-
-        channels = list(pool.map(near, channels))
-        if per > 1 or samples > _MOST_WHOLE:
+    found = each(lambda c: plan_of(columns[c], given.lsb.get(c), resolution_of(c)), columns, _ROWS)
+    plans = dict(zip(columns, found, strict=True))
+    if per == 1 and sum(p.rate for p in plans.values()) * samples <= budget:
+        channels = each(lambda c: whole(c, columns[c], plans[c]), columns, _ROWS)
+        if sum(c.size for c in channels) <= budget:
             return channels
-        chosen = _whole_columns(channels, plans, samples, budget - sum(c.size for c in channels))
-        full = {c.name: c for c in pool.map(lambda c: whole(c, columns[c], plans[c]), chosen)}
+
+    def run(stride: int) -> list[Channel]:
+        return each(lambda c: reduced(c, columns[c], plans[c], per, stride), columns, _ROWS)
+
+    stride = max(_STRIDE, per)
+    while samples // stride > _BLOCKS:
+        stride *= 2
+    while True:
+        channels = run(stride)
+        left = budget - sum(c.size for c in channels)
+        if left >= 0 or samples // stride <= _FEWEST:
+            break
+        stride *= 2
+    spans = _affordable(given, plans, left * (_AROUND if per == 1 and samples <= _MOST_WHOLE else _MOST))
+
+    def near(channel: Channel) -> Channel:
+        return with_pieces(channel, given.pieces(channel.name, spans[channel.name]), plans[channel.name])
+
+    channels = each(near, channels, _ROWS)
+    if per > 1 or samples > _MOST_WHOLE:
+        return channels
+    chosen = _whole_columns(channels, plans, samples, budget - sum(c.size for c in channels))
+    full = {c.name: c for c in each(lambda c: whole(c, columns[c], plans[c]), chosen, _ROWS)}
     return [full.get(c.name, c) for c in channels]
 
 

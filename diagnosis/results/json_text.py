@@ -12,7 +12,9 @@ def writable(document: Any) -> Any:
     """A document whose texts, keys too, can be written as UTF-8; arrays and numbers stay as they are."""
     if isinstance(document, str):
         return document if document.isascii() else document.encode("utf-8", "backslashreplace").decode()
-    if isinstance(document, Mapping):
+    if document is None or document.__class__ in (float, int, bool):
+        return document
+    if isinstance(document, dict | Mapping):
         return {writable(key): writable(value) for key, value in document.items()}
     if isinstance(document, list | tuple):
         return [writable(value) for value in document]

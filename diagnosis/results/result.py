@@ -204,6 +204,9 @@ class MissionResult:
     layout: Layout | None = None
 
 
+_LEAVES = frozenset({str, int, bool, type(None)})
+
+
 def _plain(value: Any) -> Any:
     """JSON value of a dataclass field: no NaN, no NumPy types, floats rounded to nine digits."""
     if isinstance(value, dict):
@@ -211,7 +214,7 @@ def _plain(value: Any) -> Any:
     if isinstance(value, list | tuple):
         return [_plain(v) for v in value]
     if isinstance(value, float | np.floating):
-        return float(f"{float(value):.9g}") if np.isfinite(value) else None
+        return float(f"{float(value):.9g}") if math.isfinite(value) else None
     if isinstance(value, np.integer):
         return int(value)
     if isinstance(value, np.bool_):
@@ -221,6 +224,10 @@ def _plain(value: Any) -> Any:
 
 def to_json(value: Any) -> Any:
     """Turn a dataclass, mapping or sequence into plain JSON values; NaN becomes null."""
+    if (kind := value.__class__) in _LEAVES:
+        return value
+    if kind is float:
+        return _plain(value)
     if hasattr(value, "__dataclass_fields__"):
         return {name: to_json(getattr(value, name)) for name in value.__dataclass_fields__}
     if isinstance(value, Mapping):

@@ -19,7 +19,7 @@ _FAULTY = 0.1  # of the windows: a valve that does not obey in more has an openi
 _OBEYED, _NEARLY = 4.0, 1e-3  # standard deviations and opening [fraction] by which a healthy valve may differ
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", nogil=True)
 def _window_angles(u, pace, valve, lag, play, dt, length):  # type: ignore[no-untyped-def]
     """Means over windows of `length` blocks of the measured angle, from a start at 0: lag, cylinder, play; rates times `pace`."""
     out = np.zeros(u.size // length)
@@ -38,7 +38,7 @@ def _window_angles(u, pace, valve, lag, play, dt, length):  # type: ignore[no-un
     return out
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", nogil=True)
 def lagged(x, decay):  # type: ignore[no-untyped-def]
     """First-order lag of x from 0 [unit of x], shape (n,): what is left of the former value after a step is `decay` [1]."""
     out = np.empty(x.size)
@@ -49,7 +49,7 @@ def lagged(x, decay):  # type: ignore[no-untyped-def]
     return out
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", nogil=True)
 def _window_slopes(u, pace, valve, lag, play, dt, length):  # type: ignore[no-untyped-def]
     """What `_window_angles` gives, (w,), and its derivatives by slopes, dead bands, limits (up, down), lag and play, (w, 8).
 

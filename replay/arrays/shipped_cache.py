@@ -22,6 +22,7 @@ from numba.core.caching import (
     InTreeCacheLocator,
     UserProvidedCacheLocator,
 )
+from numba.core.runtime import rtsys
 
 from replay.arrays.lazy_linking import link_lazily
 from replay.progress import compiling_begins
@@ -62,6 +63,18 @@ def kind_of_this_machine() -> Kind | None:
 
 class ShippedCache(FunctionCache):  # type: ignore[misc]
     """numba's cache of one kernel, which looks into the wheel's kernels too where there is nothing for this processor."""
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """The kernel, or None, without the tables of all that numba can compile.
+
+        numba fills them before it looks into a cache: 200 modules and half a unit of CPU time, for a compiler that a warm run does not
+        call; where it is called, it fills them itself. Machine code needs the addresses of the runtime and of the hash's key alone.
+        """
+        rtsys.initialize(target_context)
+        from numba.cpython import hashing  # noqa: F401 - which makes them known
+
+        with self._guard_against_spurious_io_errors():
+            return self._load_overload(sig, target_context)
 
     def _load_overload(self, sig: Any, target_context: Any) -> Any:
         link_lazily(target_context.codegen())

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from replay.arrays.blocks import blocks, release
 from replay.arrays.column_store import ColumnStore
 from replay.arrays.envelope import envelope, in_buckets, rows_of
+from replay.arrays.processors import each
 from replay.control import mfhca
 from replay.control.kinematics import CommandState, wheel_angles, wheel_commands
 from replay.control.law_choice import Reading, choose_law
@@ -250,8 +251,8 @@ def _scan(
     columns = {name: store.column(np.float64, (wheels,), rows_of(len(v), bucket)) for name in names}
     for part in parts:
         found = {name: np.full((part.stop - part.start, wheels), np.nan) for name in names}
-        for i, scan in scans.items():
-            block = next(scan)
+        done = each(lambda scan: next(scan), scans.values(), len(v))
+        for i, block in zip(scans, done, strict=True):
             for name in names[:-1]:
                 found[name][:, i] = getattr(block, name)
             found["u_difference"][:, i] = u[part, i] - block.u

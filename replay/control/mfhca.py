@@ -127,7 +127,7 @@ def fill_forward(x: Array, first: float = 0.0) -> Array:
     return out
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _scan_fill(x, last, out):  # type: ignore[no-untyped-def]
     for k in range(x.size):
         if np.isfinite(x[k]):
@@ -135,7 +135,7 @@ def _scan_fill(x, last, out):  # type: ignore[no-untyped-def]
         out[k] = last
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _scan_forced(rho, e, dt, gain, psi, lead):  # type: ignore[no-untyped-def]
     """Ψ̂ ← Ψ̂·exp(−ρ dt) + gain·e²·dt; NaN inputs leave the forcing out. Returns values and the state."""
     out = np.empty(rho.size)
@@ -178,7 +178,7 @@ def forced_psi(
     return np.asarray(out), float(state)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _scan_event_reset(rho, implied, dt, threshold, run, state, count):  # type: ignore[no-untyped-def]
     """Decay Ψ̂² by exp(−2ρ dt); take the implied value after `run` steps in a row beyond the threshold."""
     out = np.empty(rho.size)

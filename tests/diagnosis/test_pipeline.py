@@ -17,8 +17,10 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 import diagnosis
+from diagnosis.output import write_result
 from diagnosis.pipeline import diagnose, diagnose_mission
 from diagnosis.results.result import MissionResult
+from replay.arrays import processors
 from replay.errors import ConfigError, LogError
 from replay.export.mission import write_mission
 from replay.faults import FaultMode, FaultSpec, Side, State
@@ -436,3 +438,19 @@ def test_the_diagnosis_never_sees_simulation_or_truth() -> None:
             assert hidden == set(), path.name
         assert not any(n.startswith("replay.simulation") for n in names), path.name
         assert not any(n == "cli" or n.startswith("cli.") for n in names), path.name
+
+
+@pytest.mark.parametrize("evidence", ["base", "direct"])
+def test_two_processors_find_what_one_finds(
+    evidence: EvidenceLevel, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(processors, "_alone", False)
+    written, told = {}, {}
+    for count in (1, 2):
+        monkeypatch.setattr(processors, "processors", lambda count=count: count)
+        told[count] = []
+        result = diagnose_mission(in_memory(simulated(evidence)), PAPER, progress=told[count].append)
+        files = write_result(result, tmp_path / str(count))
+        written[count] = [file.read_bytes() for file in files]
+    assert written[1] == written[2]
+    assert told[1] == told[2]
