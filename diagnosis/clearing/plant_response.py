@@ -7,7 +7,7 @@ import numpy as np
 from diagnosis.clearing.cells import Array, Cells
 from diagnosis.clearing.measure import lowest_passed
 from diagnosis.clearing.responses import LAG_S, Responses
-from diagnosis.wheels.valve_map import effective
+from diagnosis.estimation.valve_map import effective
 from replay.machine.config import WheelPlant
 
 #: Of the loss that counts [ln]: oil, load and supply change what a healthy machine gives by more than wheels differ.

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from diagnosis.channels.noise import white_part
 from diagnosis.channels.sample_status import PAIR, SILENT, SKIP
-from diagnosis.wheels.valve_map import effective
+from diagnosis.estimation.valve_map import effective
 from replay.arrays.blocks import block_means, framed, release
 from replay.arrays.column_store import ColumnStore
 from replay.arrays.numeric import carried
@@ -43,7 +43,7 @@ class WheelBlocks:
     jitter : Array, shape (n, wheels)
         Mean squared step between consecutive new samples [m²/s²].
     u : Array, shape (n·width, wheels)
-        Effective valve opening of every sample [fraction] (see `diagnosis.wheels.valve_map`); 0 where unknown.
+        Effective valve opening of every sample [fraction] (see `diagnosis.estimation.valve_map`); 0 where unknown.
     unseen : Array, shape (n, wheels)
         Part of it that lies beyond what a healthy wheel was seen with [fraction].
     unsteady : Array, shape (n, wheels)

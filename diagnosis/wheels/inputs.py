@@ -13,12 +13,12 @@ from diagnosis.channels.habit import Habit
 from diagnosis.channels.liveness import alive
 from diagnosis.channels.sample_status import sample_status
 from diagnosis.estimation.lag import low_passed_on
+from diagnosis.estimation.valve_map import effective
 from diagnosis.results.wheel_model import WheelModelFit
 from diagnosis.wheels.body import MeasuredBody
 from diagnosis.wheels.identification import demand
 from diagnosis.wheels.motion import MOST_AGAINST, against_command, in_motion
 from diagnosis.wheels.readings import SpeedNoise, habits_of, news, speed_noises
-from diagnosis.wheels.valve_map import effective
 from diagnosis.wheels.wheel_channels import WheelChannels
 from replay.arrays.column_store import ColumnStore
 from replay.arrays.numeric import without_nan

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from diagnosis.estimation.valve_map import KNOTS, RAMPS
 from diagnosis.wheels.plant_windows import Drive, Windows, regressors, rows_of
 from diagnosis.wheels.robust_fit import Trimmed, misfits, solve
-from diagnosis.wheels.valve_map import KNOTS, RAMPS
 from replay.machine.config import WheelPlant
 
 Array = NDArray[np.float64]

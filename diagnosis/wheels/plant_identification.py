@@ -13,10 +13,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from diagnosis.estimation.valve_map import RAMPS
 from diagnosis.wheels.plant_constants import PlantFit, Trial, penalty, plants_of
 from diagnosis.wheels.plant_windows import Drive, usual_driving, windows_of
 from diagnosis.wheels.robust_fit import Trimmed, misfits, solve, trimmed
-from diagnosis.wheels.valve_map import RAMPS
 
 _LAGS = (0.02, 0.05, 0.12, 0.3, 0.7)
 _PLAYS = (0.0, 0.005, 0.01, 0.015, 0.02, 0.03, 0.04)

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.estimation.lag import low_passed
+from diagnosis.estimation.valve_map import KNOTS, RAMPS, lagged_ramps, played
 from diagnosis.wheels.robust_fit import Normal, mode, normal_equations
-from diagnosis.wheels.valve_map import KNOTS, RAMPS, lagged_ramps, played
 from replay.arrays.numeric import without_nan
 
 Array = NDArray[np.float64]

@@ -8,12 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.channels.one_value import TURNS
+from diagnosis.estimation.valve_map import effective
 from diagnosis.results.alike import or_shifted
 from diagnosis.results.assessment import Finding
 from diagnosis.results.limited import limited
 from diagnosis.wheels.inputs import WheelsData
 from diagnosis.wheels.slowing import or_held
-from diagnosis.wheels.valve_map import effective
 from replay.arrays.blocks import blocks
 from replay.faults import FaultMode, Side
 

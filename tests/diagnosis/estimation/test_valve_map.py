@@ -9,7 +9,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from diagnosis.estimation.lag import low_passed
-from diagnosis.wheels.valve_map import KNOTS, RAMPS, effective, lagged_ramps, played
+from diagnosis.estimation.valve_map import KNOTS, RAMPS, effective, lagged_ramps, played
 from replay.machine.config import WheelPlant
 
 DT = 0.01

@@ -1,0 +1,53 @@
+"""Speed per opening against the machine file's [plant]: a loss of all wheels shows, one that no file speaks of is not asked for."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from diagnosis.clearing.checks import cells_of, checks_of
+from diagnosis.results.clearing import Check, Checked
+from diagnosis.results.machine_words import HYDRAULIC
+from replay.arrays.envelope import bucket_of
+from replay.control.loop import replay_loop
+from replay.faults import FaultMode, FaultSpec, Side
+from replay.machine.config import Machine, Plant, WheelPlant, haulotte
+from replay.signals.timeline import align
+from tests.diagnosis.clearing.missions import LENGTH, signals_of, simulated
+
+GAIN = 1.0  # of the file, to find what the simulated wheels have
+
+
+def by_file(gain: float | None, *faults: FaultSpec, base: bool = False) -> list[Checked]:
+    """The checks beside a file whose wheels all have this gain [m/s]."""
+    machine: Machine = haulotte()
+    plant = {} if gain is None else {w: WheelPlant(gain, 0.1) for w in machine.wheels}
+    machine = replace(machine, plant=Plant(wheels=plant))
+    timeline = align(signals_of(simulated(*faults), base=base))
+    cells = cells_of(timeline, replay_loop(timeline, machine, bucket_of(timeline.size)), machine)
+    return [c for c in checks_of(cells, HYDRAULIC) if c.check is Check.PLANT_RESPONSE]
+
+
+@pytest.fixture(scope="module")
+def own_gain() -> float:
+    """Gain of the simulated wheels: a file that says half of it is off by a factor of two."""
+    found = by_file(GAIN)
+    assert len(found) == 4
+    worst = sorted(c.worst for c in found if c.worst is not None)
+    return next(
+        g for g in (GAIN * 2.718281828 ** (s * worst[1]) for s in (-1.0, 1.0)) if all(c.passed for c in by_file(g))
+    )
+
+
+@pytest.mark.parametrize("base", [True, False])
+def test_what_all_wheels_lose_shows_beside_the_file(own_gain: float, *, base: bool) -> None:
+    assert all(c.passed for c in by_file(own_gain, base=base))
+    lost = [FaultSpec(w, Side.SENSOR, FaultMode.INEFFICIENT, 0.0, LENGTH, 0.3) for w in haulotte().wheels]
+    found = by_file(own_gain, *lost, base=base)
+    assert [c.passed for c in found] == [False] * 4
+    assert all("off that of [plant] in the machine file by a factor of 1." in c.text for c in found)
+
+
+def test_without_a_file_nothing_is_asked() -> None:
+    assert by_file(None) == []
