@@ -17,7 +17,7 @@ from replay.signals.candidate import source_of
 from replay.signals.name_parts import first_indices
 from replay.signals.named_units import bare_name
 from replay.signals.signal import Signal, Signals
-from replay.signals.symbol_rules import valve_current
+from replay.signals.symbol_rules import is_measured, valve_current
 from replay.signals.to_si import peak_of
 
 #: By quantity: the unit, from and up to which largest value it is taken, and what the values would be in SI.
@@ -28,6 +28,7 @@ _USUAL = {
 }
 _MOST_VOLTS = 10.5  # what an analogue signal of 10 V may reach
 _LEAST_MA, _MOST_MA = 3.5, 21.0  # between which a current of 4 to 20 mA keeps
+_MIDDLE_MA = 12.0
 _OVER = 1.1  # of full opening, which no command exceeds
 _TOO_FAST = 100.0  # m/s
 _SPEEDS = ("v", "v_ref", "v_true")
@@ -50,17 +51,30 @@ def valve_currents(
         As found by their names: valves whose openings are logged keep these.
     """
     first = first_indices(channels)
-    named = {name: c for c in channels.values() if (name := valve_current(c, machine, first)) is not None}
+    told = [(name, c) for c in channels.values() if (name := valve_current(c, machine, first)) is not None]
+    asks = {name: c for name, c in told if not is_measured(c, machine)}
+    measures = {name: c for name, c in told if is_measured(c, machine)}
+    named = {**measures, **asks}
+    positions = {f"{n}_applied": c for n, c in measures.items() if n in asks and _is_position(c)}
     out: dict[str, SignalSource] = {}
     shown: list[str] = []
     for kind in ("wheel", "steer"):
         alike = {n: c for n, c in named.items() if n.startswith(kind) and n not in found.items}
         peak = max((peak_of(c.values) for c in alike.values()), default=0.0)
+        volts = 5.0 < peak <= _MOST_VOLTS and all(_unit(c) == "V" for c in alike.values())
         if peak > 0 and all(_unit(c) == "%" for c in alike.values()):
             out |= {n: source_of(c, "%") for n, c in alike.items()}
             draft.ask(
                 "signals",
                 f"does 100 % of {next(iter(alike.values())).name} and the like open a valve fully? It is a current; it is taken so.",
+            )
+        elif peak > 0 and all(_unit(c) == "mA" and _is_position(c) for c in alike.values()):
+            out |= _by_transducer(draft, alike)
+        elif volts:
+            out |= {n: replace(source_of(c, "1"), gain=0.1) for n, c in alike.items()}
+            draft.ask(
+                "signals",
+                f"do 10 V of {next(iter(alike.values())).name} and the like open a valve fully? Else gain = 1 / that voltage, negative where it closes.",
             )
         elif peak > 0:
             full = float(f"{peak:.4g}")
@@ -73,7 +87,37 @@ def valve_currents(
             f"which current opens a valve fully? Valves are logged by their currents, and the largest in this log stands in "
             f"({', '.join(shown)} and the like): gain = 1 / that current, negative where it closes.",
         )
-    return out
+    return out | _by_transducer(draft, {n: c for n, c in positions.items() if n not in found.items})
+
+
+def _by_transducer(draft: Draft, measured: Mapping[str, Channel]) -> dict[str, SignalSource]:
+    """Positions of valves, measured or asked for, by a loop of 4 to 20 mA or of ±10 V, with the question that they leave."""
+    if not measured:
+        return {}
+    first = next(iter(measured.values()))
+    loop = _unit(first) == "mA"
+    spans = [np.nanquantile(c.values, (0.01, 0.99)) for c in measured.values()]
+    both = loop and any(low < _MIDDLE_MA - 1.0 and high > _MIDDLE_MA + 1.0 for low, high in spans)
+    gain, offset = (0.125, -1.5) if both else (0.0625, -0.25) if loop else (0.1, 0.0)
+    states = "12 mA close a valve and 20 mA open it" if both else "4 mA close a valve and 20 mA open it"
+    draft.ask(
+        "signals",
+        f"do {states if loop else '10 V stand for a valve open'} fully ({first.name} and the like)? "
+        f"It is taken so: gain = {gain:g}{f', offset = {offset:g}' if offset else ''}.",
+    )
+    return {n: replace(source_of(c, "1"), gain=gain, offset=offset) for n, c in measured.items()}
+
+
+def _is_position(channel: Channel) -> bool:
+    """Whether values are as a transducer of 4 to 20 mA or of 10 V gives them: the current of a coil is no position."""
+    known = np.asarray(channel.values, np.float64)
+    known = known[np.isfinite(known)]
+    if not known.size:
+        return False
+    low, most = float(np.quantile(known, 0.01)), peak_of(channel.values)
+    return (_unit(channel) == "mA" and low >= _LEAST_MA and most <= _MOST_MA) or (
+        _unit(channel) == "V" and most <= _MOST_VOLTS
+    )
 
 
 def _unit(channel: Channel) -> str:

@@ -106,6 +106,8 @@ def by_symbol(channel: Channel, machine: Machine, first: Mapping[str, int]) -> I
 def valve_current(channel: Channel, machine: Machine, first: Mapping[str, int]) -> str | None:
     """Canonical name of the command that a valve's current or voltage stands for, by its words or unit; None where a channel is none.
 
+    What a name says that it measures is a command's as well, where no other one is logged: `is_measured` tells them apart.
+
     A current opens its valve, by a scale that no name tells: it is no opening until somebody says which current is a full one.
 
     Parameters
@@ -127,6 +129,12 @@ def valve_current(channel: Channel, machine: Machine, first: Mapping[str, int]) 
         return None
     part, _ = _part(channel, said, machine, first)
     return None if part is None else f"{'steer' if said.steering else 'wheel'}.{part}.u"
+
+
+def is_measured(channel: Channel, machine: Machine) -> bool:
+    """Whether a channel's name says that it measures, rather than asks for, what it speaks of."""
+    said = _said(channel, machine)
+    return said is not None and said.asked == "act"
 
 
 @dataclass(frozen=True)

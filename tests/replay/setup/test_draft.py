@@ -311,6 +311,32 @@ def test_joints_of_a_description_are_found_by_their_positions(tmp_path: Path) ->
     assert draft.machine.signals["wheel.L.v_position"].derivative
 
 
+@pytest.mark.parametrize(
+    ("asked", "measured"),
+    [
+        (("V", 10.0, 0.0, 0.1, 0.0), ("mA", 8.0, 12.0, 0.125, -1.5)),
+        (("mA", 8.0, 12.0, 0.125, -1.5), ("V", 10.0, 0.0, 0.1, 0.0)),
+    ],
+)
+def test_a_command_in_volts_and_its_position_in_a_current_loop_are_both_mapped(
+    tmp_path: Path, asked: tuple[str, float, float, float, float], measured: tuple[str, float, float, float, float]
+) -> None:
+    u = 0.9 * np.sin(np.arange(600) * 0.05)
+    columns: dict[str, Any] = {"Zeit [s]": np.arange(600) * 0.05, "v_soll [m/s]": u}
+    for name in ("VR", "VL", "HR", "HL"):
+        columns |= {f"{name}.n_ist [1/min]": 100 * u}
+        for word, (unit, scale, rest, *_) in (("Soll", asked), ("Ist", measured)):
+            columns[f"fbRad_{name}.fVentil_{word} [{unit}]"] = rest + scale * u
+    pd.DataFrame(columns).to_csv(tmp_path / "run.csv", index=False)
+    draft = read_back(draft_machine(read_everything([tmp_path / "run.csv"])), tmp_path)
+    for leaf, (*_, gain, offset) in (("u", asked), ("u_applied", measured)):
+        source = draft.machine.signals[f"wheel.VL.{leaf}"]
+        assert (source.unit, source.gain, source.offset) == ("1", gain, offset)
+    questions = " ".join(draft.questions)
+    assert "12 mA close a valve and 20 mA open it fully" in questions
+    assert "do 10 V" in questions
+
+
 def test_currents_of_valves_in_percent_keep_their_unit(tmp_path: Path) -> None:
     v = np.repeat(np.random.default_rng(1).uniform(-0.5, 0.5, 15), 40)
     columns: dict[str, Any] = {"time": np.arange(600) * 0.05}
