@@ -36,6 +36,7 @@ _BESIDE_OTHERS = (Check.RESPONSE, Check.LASTING_RESPONSE, Check.CHANGE, Check.EX
 _FAR, _ALONE = 3.0, 2.0  # times the limit of the all-clear, and times what the next wheel deviates by
 _OTHERS = 1.5  # times the limit: where others deviate by more, speed per opening says little of this machine, ...
 _BY_FAR = 5.0  # ... unless a wheel deviates this many times as far
+_BY_FILE, _AS_FILED = 1.5, 0.5  # times the limit: a wheel that is off the machine file, and others that are not
 _STILL, _DRAGS = 2.0, 1.3  # times the limit: an axle that does not answer, and one that may drag wheels along
 _WHEELS = 3  # fewer have no others to be compared with
 _BESIDE = 0.65  # how often a partial fault beside one of the other side was right
@@ -62,7 +63,7 @@ def what_stands_out(checks: Sequence[Checked], cells: Cells, words: MachineWords
     found |= {check.component: fault_of_angle(check, cells) for check in checks if _off_second_angle(check)}
     axles = {c.component: fault_of_axle(c, cells) for c in checks if _does_not_answer(c, cells)}
     found |= {component: fault for component, fault in axles.items() if fault is not None}
-    alone = _alone(checks, cells)
+    alone = _alone(checks, cells) or _off_its_plant(checks, cells)
     wheel = alone or (None if _stated(cells) else _alone_not_following(checks, cells))
     if wheel is not None and (told := fault_of_wheel(wheel, cells, alone=alone is not None)) is not None:
         found[wheel.component] = told
@@ -148,6 +149,15 @@ def _alone(checks: Sequence[Checked], cells: Cells) -> Checked | None:
         _FAR, _ALONE * _times(second)
     )
     return first if alone else None
+
+
+def _off_its_plant(checks: Sequence[Checked], cells: Cells) -> Checked | None:
+    """The check of the one wheel that is off the machine file's [plant] by what counts, while all others give what it says."""
+    own = sorted((c for c in checks if c.check is Check.PLANT_RESPONSE), key=_times, reverse=True)
+    if len(own) < _WHEELS or _stated(cells) or any(c.check is Check.STILL and _times(c) >= _DRAGS for c in checks):
+        return None
+    first, second, *_ = own
+    return first if _times(first) >= _BY_FILE and _times(second) <= _AS_FILED else None
 
 
 def _known(check: Checked) -> bool:

@@ -185,3 +185,19 @@ def test_no_wheel_stands_out_by_others_that_stand() -> None:
         for kind, worst in ((Check.EXCESS, above), (Check.RESPONSE, 0.1))
     ]
     assert what_stands_out(checks, cells, HYDRAULIC) == {}
+
+
+@pytest.mark.parametrize(
+    ("worst", "named"),
+    [((0.4, 0.02, 0.03, 0.05), True), ((0.4, 0.3, 0.03, 0.05), False), ((0.2, 0.0, 0.0, 0.0), False)],
+)
+def test_a_wheel_that_is_off_the_machine_file_alone_is_named(worst: tuple[float, ...], *, named: bool) -> None:
+    fault = FaultSpec("FR", Side.SENSOR, FaultMode.INEFFICIENT, *WHOLE, 0.3)
+    cells = in_cells(simulated(fault), base=True)
+    checks = [
+        Checked(Kind.WHEEL, w, Side.SENSOR_OR_ACTUATOR, Check.PLANT_RESPONSE, x, 0.19)
+        for w, x in zip(cells.machine.wheels, worst, strict=True)
+    ]
+    found = what_stands_out(checks, cells, HYDRAULIC)
+    assert list(found) == (["FR"] if named else [])
+    assert all(f.mode is FaultMode.INEFFICIENT and f.side is Side.SENSOR_OR_ACTUATOR for f in found.values())
