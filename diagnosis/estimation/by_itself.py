@@ -23,6 +23,7 @@ _EDGE_S, _EDGE = (
     0.1,
 )  # at either end, where a channel goes and returns with its lag: at most so long, and of a stretch
 _NOTHING_LEFT = 0.9  # ε of a channel that is stuck or dead, whatever else would explain it
+_MOST_OFF = 0.9  # of the readings: the largest tenth of what they are off by may be a move's timing
 _ALL = 0.9  # of the deviation's power, that lies in stretches which a cause explains
 
 
@@ -52,7 +53,8 @@ def causes_where_off(finding: Finding, measured: Measured, least: float = 0.0) -
     measured : Measured
         Its channel and reference.
     least : float
-        What a stretch is off by at least to be told, root mean square [unit]. A steady loss below the limit is left out as well.
+        What a stretch is off by at least to be told, root mean square but for what the timing of moves makes [unit]. A loss below the
+        limit is left out as well.
     """
     part = slice(finding.start, finding.stop)
     off = np.abs(measured.y - measured.x)[part]
@@ -62,7 +64,7 @@ def causes_where_off(finding: Finding, measured: Measured, least: float = 0.0) -
     found, power = [], 0.0
     for start, stop in _stretches(off > max(_DEVIATES * measured.noise, _OF_ALL * usual), measured.dt):
         inside = off[start:stop]
-        if float(np.sqrt(np.sum(inside**2) / max(int(np.count_nonzero(inside)), 1))) < least:
+        if _usually(inside) < least:
             continue
         piece = replace(finding, start=finding.start + start, stop=finding.start + stop)
         cause = _cause(piece, measured)
@@ -71,6 +73,12 @@ def causes_where_off(finding: Finding, measured: Measured, least: float = 0.0) -
             if not below_limit(cause, measured):
                 found.append(joined([piece], cause))
     return found, power / max(whole, 1e-30)
+
+
+def _usually(off: NDArray[np.float64]) -> float:
+    """Root mean square of all but the largest of what a stretch is off by where it is, shape (n,) [unit]."""
+    there = np.sort(off[off > 0.0])
+    return float(np.sqrt(np.mean(there[: max(1, int(_MOST_OFF * there.size))] ** 2))) if there.size else 0.0
 
 
 def _stretches(off: NDArray[np.bool_], dt: float) -> Sequence[tuple[int, int]]:

@@ -210,8 +210,11 @@ def _loss(gains: tuple[float, float], measured: Measured) -> Cause:
 
 
 def below_limit(cause: Cause, measured: Measured) -> bool:
-    """Whether a cause may be a steady loss or gain below the limit."""
-    return cause.epsilon is not None and not cause.changes and abs(cause.epsilon.value) < measured.least_loss
+    """Whether a cause may be a loss or gain below the limit, at first and at last."""
+    if cause.epsilon is None:
+        return False
+    ends = cause.epsilon.low + _ABOUT, cause.epsilon.high - _ABOUT
+    return max(abs(x) for x in ends) < measured.least_loss
 
 
 def power(off: Array, measured: Measured) -> float:

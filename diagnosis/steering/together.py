@@ -21,7 +21,12 @@ _COMMON = 0.7  # of the time of the longer one
 #: What axles lack together: rad that both must be told to turn, of that, and of what the accused one lacks.
 _TRAVEL, _LACKS, _LIKEWISE = 0.05, 0.1, 0.5
 _FEW = 5  # readings
-_BRIEF_S = 3.0  # of noise that a surge makes
+_BRIEF_S = 3.0  # of what a surge makes
+_SURGES = (
+    FaultMode.NOISY,
+    FaultMode.INEFFICIENT,
+    FaultMode.OUTSIDE_TABLE,
+)  # of two valves at once; a stuck one is none
 _MOST, _NO_SURER = 0.5, 0.6  # of the mission; of a partial fault while so much of it is one on two axles
 _NO_MODEL = "The steering model finds such faults on two axles for most of this mission: that it does not fit the machine is as probable."
 
@@ -55,7 +60,7 @@ def not_together(
 def not_shaken_together(
     found: Mapping[str, Mapping[Side, SideFindings]], length: int, dt: float
 ) -> dict[str, dict[Side, SideFindings]]:
-    """Findings by axle and side without brief noise of a valve that another axle's has at the same time: a supply that surges, not two valves.
+    """Findings by axle and side without brief noise, losses and offsets of a valve that another axle's has at the same time: a supply that surges.
 
     Parameters
     ----------
@@ -68,7 +73,7 @@ def not_shaken_together(
     """
     side = Side.ACTUATOR
     brief = {
-        name: [f for f in sides[side].findings if f.mode is FaultMode.NOISY and (f.stop - f.start) * dt < _BRIEF_S]
+        name: [f for f in sides[side].findings if f.mode in _SURGES and (f.stop - f.start) * dt < _BRIEF_S]
         for name, sides in found.items()
     }
     out: dict[str, dict[Side, SideFindings]] = {}

@@ -94,3 +94,20 @@ def test_other_rows_stay(mode: FaultMode) -> None:
     own = noisy()
     own = Finding(own.start, own.stop, own.side, mode, 0.9, own.hypotheses, None, None, (), Tier.DIRECT)
     assert told_by_itself(own, measured(in_spells(lambda t, x: x + 0.12))) == [own]
+
+
+@pytest.mark.parametrize(("last", "told"), [(1.08, False), (1.25, True), (0.93, False), (0.8, True)])
+def test_a_gain_that_changes_counts_by_its_ends(last: float, *, told: bool) -> None:
+    """From 1.0 on within 3 s; 0.1 counts."""
+    channel = measured(in_spells(lambda t, x: (1.0 + (last - 1.0) * np.minimum(t / 3.0, 1.0)) * x))
+    found, _ = causes_where_off(noisy(), channel)
+    assert bool(found) is told
+
+
+@pytest.mark.parametrize(("offset", "told"), [(0.031, False), (0.08, True)])
+def test_what_a_stretch_is_off_by_is_what_it_usually_is(offset: float, *, told: bool) -> None:
+    """Moves that come late make one reading in twenty-five large."""
+    late = np.where(np.arange(SIZE) % 25 == 0, 0.2, 0.0)
+    channel = measured(in_spells(lambda t, x: x + offset + late))
+    found, _ = causes_where_off(noisy(), channel, 0.05)
+    assert bool(found) is told

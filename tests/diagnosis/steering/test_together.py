@@ -54,9 +54,16 @@ def test_what_both_axles_do_at_once_is_a_fault_of_neither(mode: FaultMode, start
 
 @pytest.mark.parametrize(
     ("mode", "stop", "kept"),
-    [(FaultMode.NOISY, 1110, False), (FaultMode.NOISY, 1900, True), (FaultMode.STUCK, 1110, True)],
+    [
+        (FaultMode.NOISY, 1110, False),
+        (FaultMode.OUTSIDE_TABLE, 1150, False),
+        (FaultMode.INEFFICIENT, 1150, False),
+        (FaultMode.NOISY, 1900, True),
+        (FaultMode.OUTSIDE_TABLE, 1900, True),
+        (FaultMode.STUCK, 1110, True),
+    ],
 )
-def test_brief_noise_of_both_valves_is_the_supplys_though_their_openings_are_measured(
+def test_brief_surges_of_both_valves_are_the_supplys_though_their_openings_are_measured(
     mode: FaultMode, stop: int, *, kept: bool
 ) -> None:
     out = not_shaken_together({"front": sides(mode, 1000, stop), "rear": sides(mode, 1010, stop)}, LENGTH, DT)
