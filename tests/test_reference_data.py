@@ -292,10 +292,8 @@ def test_the_whole_diagnosis_with_a_fitted_machine_file(
         lenient = replace(fitted, limits=replace(fitted.limits, clear_at=0.4))
         verdict = diagnose_signals(signals, lenient).report["verdict"]
         assert verdict["status"] == "ready"
-        assert [c[:30] for c in verdict["caveats"]] == [
-            "A load on the M drive motor, o",
-            "The machine file's limits clea",
-        ]
+        assert "A load on the M drive motor, o" in verdict["text"]
+        assert [c[:30] for c in verdict["caveats"]] == ["The machine file's limits clea"]
     else:
         fault = result.report["intervals"][0]
         assert (fault["side"], fault["tier"]) == ("sensor", "drive")

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from diagnosis.clearing.cells import Array, Cells
 from diagnosis.clearing.limits import Limits, measured_twice, response_limits
@@ -194,9 +195,14 @@ class Roughness(NamedTuple):
 
 
 def roughness_of(cells: Cells, speed: Array, reference: Array | None = None) -> Roughness:
-    """Quick changes of speeds (cells, wheels); a lone drive, beside which no other shows it, may jump as its command did just before."""
+    """Quick changes of speeds (cells, wheels); a lone drive, beside which no other shows it, may jump as its command did just before.
+
+    Where that is not recorded, what only rises or falls may be what it was told: noise goes back and forth.
+    """
     frame, floor = cells.frame, FLOOR * cells.machine.max_speed
     quick = _quick(speed)
+    if speed.shape[1] == 1 and not np.isfinite(cells.reference).any():
+        quick = np.where(_turns(speed), quick, 0.0)
     if reference is not None and speed.shape[1] == 1:
         asked, late = np.abs(np.nan_to_num(_quick(reference))), round(_ANSWER_S / cells.dt)
         jumps = np.where(asked > ROUGH * cells.machine.max_speed, asked, 0.0)
@@ -212,6 +218,14 @@ def _quick(x: Array) -> Array:
     quick = np.full(x.shape, np.nan)
     quick[1:-1] = x[1:-1] - (x[:-2] + x[1:-1] + x[2:]) / 3.0
     return quick
+
+
+def _turns(x: Array) -> NDArray[np.bool_]:
+    """Whether a cell is above both of its neighbours, or below both, shape of `x` (cells, wheels)."""
+    out: NDArray[np.bool_] = np.zeros(x.shape, np.bool_)
+    with np.errstate(invalid="ignore"):
+        out[1:-1] = (x[1:-1] - x[:-2]) * (x[1:-1] - x[2:]) > 0.0
+    return out
 
 
 def _rough_beside_others(r: Roughness) -> Array:

@@ -195,7 +195,8 @@ def decide(
     caveats = caveats_of(against, assessments, decided_s, driven, axles, limits, short_named=said)
     if _modelled(assessments) and model is not None and model.identified:
         caveats += (by_model(assessments, shown, words),)
-    caveats += smallest_loads(assessments, words)
+    loads = smallest_loads(assessments, words)
+    caveats += () if found.status is Verdict.READY else loads
     caveats += limits_of(limits)
     hidden = (_NO_YAW,) if any(_offset_hidden(checks, axle) for axle in axles) else ()
     if not told:
@@ -203,7 +204,7 @@ def decide(
     if found.status is Verdict.READY:
         exempt = exempt_axles(assessments, decided_s, driven, axles, limits, words, open_state=against.open_state)
         behind = behind_drives(assessments, axles, checks, model, words)
-        found = replace(found, text=" ".join((found.text, *exempt, *behind, *hidden)))
+        found = replace(found, text=" ".join((found.text, *exempt, *behind, *loads, *hidden)))
     else:
         caveats += hidden
     caveats = tuple(c for c in caveats if c != found.text)

@@ -26,6 +26,7 @@ _LEAST_BLOCKS = 60  # that turn
 _STANDS = 12  # blocks at rest that show the constant of the gyro
 _PARTS = 4  # of the mission: in one of them at least it may be sound
 _KEPT, _ROUNDS = 0.6, 4
+_REFITS, _SAME = 3, 0.02  # of a gain, by what nothing is found wrong in
 _FITS = 0.3  # misfit of the yaw rate, by its own size
 _TURN, _SPEED = 0.12, 0.03  # of the yaw rate by the sides, and of the speed: what slip and load make of it
 _CHANGE = 0.4  # of a change from block to block
@@ -110,7 +111,7 @@ def scaled_sides(
     if turning is None:
         return Sought()
     sides = _sides(judged, faults, turning)
-    ways = [(about, *_path(sides, about)) for about in _relations(sides)]
+    ways = [_settled(sides, about) for about in _relations(sides)]
     if not ways:
         return Sought()
     about, path, _ = max(ways, key=lambda x: x[2])
@@ -141,8 +142,7 @@ def _sides(judged: Mapping[str, Judged], faults: Mapping[str, Sequence[Spell]], 
 def _relations(sides: _Sides) -> Iterable[_Relation]:
     """How the yaw rate may belong to the sides: as in all of the mission, or as in a part of it that is sound."""
     apart, turns = sides.right - sides.left, np.abs(sides.right - sides.left)
-    still = sides.sound & (sides.right == 0.0) & (sides.left == 0.0)
-    rest = float(np.median(sides.yaw[still])) if np.count_nonzero(still) >= _STANDS else None
+    rest = _rest(sides)
     usual = float(np.quantile(turns[sides.sound], 0.9)) if sides.sound.any() else 0.0
     moved = np.flatnonzero(sides.sound & (turns > 0.2 * usual))
     if moved.size < _LEAST_BLOCKS:
@@ -157,6 +157,24 @@ def _relations(sides: _Sides) -> Iterable[_Relation]:
         if found is not None:
             yield found
     yield from _two_gains(sides, rest)
+
+
+def _settled(sides: _Sides, about: _Relation) -> tuple[_Relation, NDArray[np.intp], float]:
+    """A relation as it is where it calls nothing wrong, the path with it, and its log-likelihood: what is found off decides no gain."""
+    path, score = _path(sides, about)
+    for _ in range(_REFITS):
+        again = _relation(sides, sides.sound & (path == 0), _rest(sides))
+        if again is None or abs(again.gain / about.gain - 1.0) < _SAME:
+            break
+        about = again
+        path, score = _path(sides, about)
+    return about, path, score
+
+
+def _rest(sides: _Sides) -> float | None:
+    """Constant of the gyro as the machine at rest shows it [rad/s]; None where it hardly rests."""
+    still = sides.sound & (sides.right == 0.0) & (sides.left == 0.0)
+    return float(np.median(sides.yaw[still])) if np.count_nonzero(still) >= _STANDS else None
 
 
 def _two_gains(sides: _Sides, rest: float | None) -> Iterable[_Relation]:

@@ -30,6 +30,7 @@ _STILL = 0.05  # of the usual yaw rate: a spread below that is one value
 _NOTHING = 0.1  # of what the wheels make
 _SAME, _ASIDE = 0.2, 0.15  # of one: a gain that is as before; of the usual yaw rate: a constant that matters
 _SOUND = 0.55  # of the mission, in which the gyro is sound
+_HELD = ", unless something held it and the {wheels} slipped"
 _NEVER, _TURNED_S = 0.2, 20.0  # of the wheels' yaw rate, over a mission that turns for so long
 
 
@@ -119,8 +120,9 @@ def _kind(about: _Spread, part: slice, sound: Flags, block_s: float) -> str:
     turns = np.count_nonzero(np.abs(made) > _TURNS * about.usual) * block_s >= _TURNING_S
     if np.std(measured) < max(2.0 * about.noise, _STILL * about.usual) and turns and np.ptp(made) > about.usual:
         value = float(np.mean(measured))
-        said = "gives next to nothing" if abs(value) < _ASIDE * about.usual else f"stays at {value:.2g} rad/s"
-        return f"{said} while the {{wheels}} turn the machine at up to {np.max(np.abs(made)):.2g} rad/s"
+        none = abs(value) < _ASIDE * about.usual
+        said, held = ("gives next to nothing", _HELD) if none else (f"stays at {value:.2g} rad/s", "")
+        return f"{said} while the {{wheels}} turn the machine at up to {np.max(np.abs(made)):.2g} rad/s{held}"
     size = float(np.sqrt(np.mean((measured - made) ** 2)))
     constant = float(np.mean(measured - made))
     gain = float(made @ measured) / max(float(made @ made), 1e-12)
@@ -133,7 +135,7 @@ def _kind(about: _Spread, part: slice, sound: Flags, block_s: float) -> str:
     if not turns or abs(gain - 1.0) < _SAME:
         return ""
     if abs(gain) < _NOTHING:
-        return f"gives next to nothing while the {{wheels}} turn the machine at up to {np.max(np.abs(made)):.2g} rad/s"
+        return f"gives next to nothing while the {{wheels}} turn the machine at up to {np.max(np.abs(made)):.2g} rad/s{_HELD}"
     ground = ", unless the ground let them slip" if 0.0 < gain < 1.0 else ""
     return f"reads {gain:.2f} × what the {{wheels}} make{ground}"
 

@@ -37,6 +37,11 @@ _AT_ONCE_S = 5e-3
 _HIDDEN = "a controller that holds the speed hides a weak drive, and the effort of a healthy one is not known"
 _ROLLS = Reason("its effort is nothing from end to end while others pull: no {valve} is seen there", Lack.DRIVE)
 _ALONE = "a controller that holds the speed hides a weak drive; name its current, duty or torque as its command (`wheel.{name}.u`) to have it judged"
+_UNANSWERED = Reason(
+    "how it answers its command does not show in this log, which is too short, or has too few changes of the command, so that only a speed that is "
+    "frozen, wild or noisy shows",
+    Lack.ANSWER,
+)
 _UNSEEN = "without its command or another {wheel} of its side only a speed that is frozen, wild or noisy shows"
 
 
@@ -192,7 +197,7 @@ def _assessment(
     unseen = not r.answered and one.speed is None
     late = "at once" if r.delay < _AT_ONCE_S else f"after {r.delay:.2g} s"
     note = (
-        f"{one.data.name} has no command"
+        f"{one.data.name} has no command{'' if not np.isfinite(one.data.commands).any() else ' that it was found to answer'}"
         if not r.answered
         else (
             f"{one.data.name} answers its command {late} with a lag of {r.lag:.2g} s, up to {r.limit:.3g} {{speed_unit}} and "
@@ -211,7 +216,9 @@ def _assessment(
         State.NOT_EXCITED: _at_rest(one),
         State.NO_DATA: "no samples",
     }
-    return Assessment(states, reasons, findings, pictured.columns, Tier.RESPONSE, notes, closeups=pictured.closeups)
+    made = Assessment(states, reasons, findings, pictured.columns, Tier.RESPONSE, notes, closeups=pictured.closeups)
+    asked = unseen and bool(np.isfinite(one.data.commands).all(axis=1).any())
+    return made.reasoned(State.NOT_ASSESSED, _UNANSWERED) if asked else made
 
 
 def _at_rest(one: Judged) -> str:

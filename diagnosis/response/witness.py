@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from diagnosis.response.body import BodySpeed
 from diagnosis.response.inputs import FollowerData, cells
+from diagnosis.response.pulses import in_pulses
 from replay.machine.config import Limits
 
 Array = NDArray[np.float64]
@@ -166,6 +167,8 @@ def witnessed(
         Steps of a block, ``driving_speed``, step [s].
     """
     width, limits, dt = steps
+    if ignored and (pulses := in_pulses(drives)):
+        return (), (pulses,)
     wrong = tuple(ignored) if witness.mostly else ()
     other = contradicted(speeds, drives, width, limits) if ignored and not wrong else ""
     said = (other,) if other else denied(witness, idle, drives, wrong, dt)

@@ -76,6 +76,8 @@ class Lack(StrEnum):
     SIGNALS = "signals"
     #: What the part is told is not in the log.
     COMMAND = "command"
+    #: How the part answers its command did not show.
+    ANSWER = "answer"
     #: A signal has a wrong unit or is a wrong channel.
     UNIT = "unit"
     #: The mission contradicts the unit of all valves' openings, or the machine file leaves it open.

@@ -169,8 +169,9 @@ def align(signals: Signals, start_s: float | None = None, stop_s: float | None =
         raise LogError(f"no speed of a wheel has two samples: {empty}")
     if not wheel:
         raise LogError(
-            "no wheel signal with at least two samples was found; `mfhca config init --log LOG -o machine.toml` writes a machine "
-            "file for the wheels of a log (then -m machine.toml), and `mfhca channels LOG --all` lists what it holds"
+            "no wheel signal with at least two samples was found; `mfhca channels LOG --all` lists what the log holds: where wheels or odometry "
+            "are among it, `mfhca config init --log LOG -o machine.toml` writes a machine file for them (then -m machine.toml); where none are, "
+            "record /joint_states or odometry as well"
         )
     notes = list(check_overlap(signals))
     periods = _Periods()

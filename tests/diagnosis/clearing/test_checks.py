@@ -373,9 +373,24 @@ def test_a_lone_drive_may_jump_as_its_command_does(wheels: int, *, spikes: bool,
     if spikes:
         speed[::7] += 0.6
     beside = [np.full((100, wheels - 1), 0.5)]
-    cells = SimpleNamespace(frame=Frame(100, 30, 5), machine=SimpleNamespace(max_speed=1.2), dt=0.1)
+    cells = SimpleNamespace(
+        frame=Frame(100, 30, 5), machine=SimpleNamespace(max_speed=1.2), dt=0.1, reference=np.repeat(asked, wheels, 1)
+    )
     rough = roughness_of(cells, np.hstack([speed, *beside]), np.hstack([asked, *beside]))  # type: ignore[arg-type]
     assert bool(np.nanmax(rough.quick[:, 0] / rough.size[:, 0]) > ROUGH) is doubted
+
+
+@pytest.mark.filterwarnings("ignore:Mean of empty slice")  # no other wheel
+@pytest.mark.parametrize("noisy", [False, True])
+def test_a_lone_drive_without_commands_may_start_and_stop_but_not_go_back_and_forth(*, noisy: bool) -> None:
+    speed = np.convolve(np.where(np.arange(100) % 40 < 20, 1.0, 0.0), [0.3, 0.7], mode="same")[:, None]
+    if noisy:
+        speed = speed + np.random.default_rng(1).normal(0.0, 0.3, speed.shape)
+    cells = SimpleNamespace(
+        frame=Frame(100, 30, 5), machine=SimpleNamespace(max_speed=1.2), dt=0.1, reference=np.full((100, 1), np.nan)
+    )
+    rough = roughness_of(cells, speed)  # type: ignore[arg-type]
+    assert bool(np.nanmax(rough.quick[:, 0] / rough.size[:, 0]) > ROUGH) is noisy
 
 
 @pytest.mark.parametrize(("told_by", "open_"), [(None, True), ("u", False), ("phi_true", False), ("yaw", False)])

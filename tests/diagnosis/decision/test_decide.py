@@ -11,7 +11,7 @@ import pytest
 from diagnosis.decision.decide import Decision, decide
 from diagnosis.decision.intervals import intervals_of
 from diagnosis.results.assessment import CODE, Assessment, Finding, unassessed
-from diagnosis.results.detectability import Detectable, Deviation
+from diagnosis.results.detectability import Detectable, Deviation, Power, Powers
 from diagnosis.results.machine_event import not_following
 from diagnosis.results.machine_words import HYDRAULIC
 from diagnosis.results.result import Epsilon, Hypothesis, Sat
@@ -420,3 +420,27 @@ def test_open_driving_has_the_reason_that_it_has_while_driving() -> None:
             open_state={("FL", "actuator"): state},
         )
         assert any(f"were not judged ({reason})" in c for c in got.caveats)
+
+
+def test_what_an_all_clear_by_effort_does_not_see_stands_in_its_text() -> None:
+    row = Power(Deviation.INEFFICIENT, None, 0.22, "1", 1.0, 1)
+    drive = replace(assessed(), tier=Tier.DRIVE, powers=Powers((row,), Side.ACTUATOR))
+    got = verdict(machine(FR_actuator=drive))
+    assert got.status == "ready"
+    assert "lasts the whole mission shows from 22 % of the effort on" in got.text
+    assert not any("of the effort on" in c for c in got.caveats)
+
+
+def test_what_does_not_show_of_sensors_that_are_called_healthy_is_said_with_them() -> None:
+    hidden = "A factor would not show in this log."
+    parts = machine(FR_sensor=replace(assessed(), hidden=hidden), FL_sensor=replace(assessed(), hidden=hidden))
+    got = verdict(parts)
+    assert got.text.count(hidden) == 1
+    assert hidden not in got.caveats
+    stuck = verdict(
+        parts
+        | machine(FR_actuator=assessed(finding(Side.ACTUATOR, FaultMode.STUCK)))
+        | {("FL", "sensor"): parts["FL", "sensor"]}
+    )
+    assert hidden not in stuck.text
+    assert stuck.caveats.count(hidden) == 1

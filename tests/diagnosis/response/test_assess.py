@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 from diagnosis.response.assess import Judgement, assess_response
-from diagnosis.results.assessment import CODE, Finding
+from diagnosis.results.assessment import CODE, Finding, Lack
 from diagnosis.results.detectability import Deviation, Powers
 from replay.faults import FaultMode, Side, State
 from replay.machine.config import Limits
@@ -241,3 +241,15 @@ def test_a_wheel_that_drives_while_no_command_is_known_and_nothing_else_shows_it
         moving = np.abs(measured[w][silent]) > 0.1
         assert not np.any((sensor.states[silent] == CODE[State.HEALTHY])[moving])
         assert np.any(sensor.states[: silent.start] == CODE[State.HEALTHY])
+
+
+def test_a_log_too_short_to_show_how_drives_answer_says_that_and_not_that_the_command_is_missing() -> None:
+    measured, asked, body = speeds(3, ("R", "L"))
+    part = slice(200, 420)
+    j = judged({w: y[part] for w, y in measured.items()}, {w: y[part] for w, y in asked.items()}, body[part])
+    for sensor, _ in j.parts.values():
+        assert "how it answers its command does not show" in sensor.reasons[State.NOT_ASSESSED]
+        assert sensor.lacks[State.NOT_ASSESSED] is Lack.ANSWER
+    without = judged(measured, {w: np.full(y.size, np.nan) for w, y in asked.items()}, np.full(body.shape, np.nan))
+    for sensor, _ in without.parts.values():
+        assert "without its command" in sensor.reasons[State.NOT_ASSESSED]
