@@ -96,7 +96,7 @@ def _by_transducer(draft: Draft, measured: Mapping[str, Channel]) -> dict[str, S
         return {}
     first = next(iter(measured.values()))
     loop = _unit(first) == "mA"
-    spans = [np.nanquantile(c.values, (0.01, 0.99)) for c in measured.values()]
+    spans = [np.nanquantile(np.asarray(c.values, np.float64), (0.01, 0.99)) for c in measured.values()]
     both = loop and any(low < _MIDDLE_MA - 1.0 and high > _MIDDLE_MA + 1.0 for low, high in spans)
     gain, offset = (0.125, -1.5) if both else (0.0625, -0.25) if loop else (0.1, 0.0)
     states = "12 mA close a valve and 20 mA open it" if both else "4 mA close a valve and 20 mA open it"
