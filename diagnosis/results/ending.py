@@ -35,8 +35,13 @@ def how_it_ends(stop_s: float, duration_s: float, healthy_s: float) -> Ending:
     return Ending.ENDED if healthy_s >= HEALTHY_S else Ending.UNSEEN
 
 
-def healthy_after(component: str, side: Side, after_s: float, states: Sequence[StateRow]) -> float:
-    """For how long every side of a part that was judged at all was healthy behind a time of the mission [s], the least of them [s]."""
+def healthy_after(
+    component: str, side: Side, after_s: float, states: Sequence[StateRow], *, of_judged: bool = False
+) -> float:
+    """For how long every side of a part was healthy behind a time of the mission [s], the least of them [s].
+
+    `of_judged`: a side that was never judged is left out, where the other one was.
+    """
     healthy = dict.fromkeys(((component, s.value) for s in side.sides), 0.0)
     judged = set()
     for row in states:
@@ -45,7 +50,7 @@ def healthy_after(component: str, side: Side, after_s: float, states: Sequence[S
             judged.add(key)
         if key in healthy and row["state"] == State.HEALTHY:
             healthy[key] += max(0.0, row["stop_s"] - max(after_s, row["start_s"]))
-    return min(seconds for key, seconds in healthy.items() if key in judged or not judged)
+    return min(seconds for key, seconds in healthy.items() if key in judged or not judged or not of_judged)
 
 
 def ending_of(fault: IntervalRow, report: ReportDocument) -> Ending:
@@ -58,5 +63,5 @@ def ending_of(fault: IntervalRow, report: ReportDocument) -> Ending:
     report : ReportDocument
         The document.
     """
-    after = healthy_after(fault["component"], Side(fault["side"]), fault["stop_s"], report["states"])
+    after = healthy_after(fault["component"], Side(fault["side"]), fault["stop_s"], report["states"], of_judged=True)
     return how_it_ends(fault["stop_s"], report["log"]["duration_s"], after)

@@ -6,7 +6,8 @@ from typing import Any
 
 import pytest
 
-from diagnosis.results.ending import Ending, ending_of
+from diagnosis.results.ending import Ending, ending_of, healthy_after
+from replay.faults import Side
 from tests import report_samples as samples
 
 
@@ -31,3 +32,13 @@ def test_a_fault_ended_only_where_its_part_was_healthy_behind_it(
     report = samples.report_with(intervals=[fault], states=states)
     report["log"]["duration_s"] = 60.0
     assert ending_of(fault, report) is ending
+
+
+def test_a_side_that_was_never_judged_hides_no_end() -> None:
+    states = [
+        {"component": "FR", "side": "sensor", "state": "healthy", "start_s": 15.0, "stop_s": 60.0, "reason": ""},
+        {"component": "FR", "side": "actuator", "state": "not_assessed", "start_s": 0.0, "stop_s": 60.0, "reason": ""},
+    ]
+    either = Side.SENSOR_OR_ACTUATOR
+    assert healthy_after("FR", either, 10.0, states, of_judged=True) == 45.0  # type: ignore[arg-type]
+    assert healthy_after("FR", either, 10.0, states) == 0.0  # type: ignore[arg-type]
