@@ -36,7 +36,7 @@ _ENTER = 8.0  # log-odds of a change of state
 _FACTORS = tuple(f for x in (1.12, 1.25, 1.43, 1.7, 2.0, 2.5) for f in (x, 1.0 / x))
 _GAINS = (-1.0, 0.0, 0.3, 0.5, 0.7, 1.3, 1.7, 2.2)
 _CONSTANTS = tuple(s * x for x in (0.1, 0.2, 0.35, 0.6, 1.0) for s in (1.0, -1.0))
-_LEAST_FACTOR = 1.15
+_LEAST_FACTOR, _STATED = 1.15, 1.2  # what is told, and what is said to show: an estimate errs
 _LEAST_S = 6.0  # of motion
 _SURE, _TELLS = 5.0, 5.0  # log-odds against a fault of the gyro, and of the other side
 _SOME = 0.15  # of the driving, in which nothing is scaled: less does not tell which of two sides is right
@@ -111,9 +111,11 @@ def scaled_sides(
     if turning is None:
         return Sought()
     sides = _sides(judged, faults, turning)
-    ways = [_settled(sides, about) for about in _relations(sides)]
-    if not ways:
+    relations = list(_relations(sides))
+    if not relations:
         return Sought()
+    noise = np.median([about.noise for about in relations], axis=0)  # one for all: that of a smaller gain is smaller
+    ways = [_settled(sides, about._replace(noise=noise)) for about in relations]
     about, path, _ = max(ways, key=lambda x: x[2])
     moves = sides.sound & (np.maximum(np.abs(sides.right), np.abs(sides.left)) > 0.0)
     whole = np.count_nonzero(moves & (path == 0)) < _SOME * np.count_nonzero(moves)
@@ -166,7 +168,7 @@ def _settled(sides: _Sides, about: _Relation) -> tuple[_Relation, NDArray[np.int
         again = _relation(sides, sides.sound & (path == 0), _rest(sides))
         if again is None or abs(again.gain / about.gain - 1.0) < _SAME:
             break
-        about = again
+        about = again._replace(noise=about.noise)
         path, score = _path(sides, about)
     return about, path, score
 
@@ -244,9 +246,8 @@ def _scores(sides: _Sides, about: _Relation, yaw: Array) -> Array:
 
 
 def _path(sides: _Sides, about: _Relation) -> tuple[NDArray[np.intp], float]:
-    """The most probable state of each block, shape (b,), and its log-likelihood beside the noise that it takes."""
+    """The most probable state of each block, shape (b,), and its log-likelihood."""
     score = _scores(sides, about, _states(sides, about))
-    score -= np.where(sides.sound, np.log(about.noise), 0.0)[:, np.newaxis] / _ALIKE
     n, m = score.shape
     best, back = np.where(np.arange(m) > 0, -_ENTER, 0.0) + score[0], np.zeros((n, m), np.intp)
     for k in range(1, n):
@@ -321,5 +322,5 @@ def _smallest(sides: _Sides, about: _Relation, block_s: float, wheels: int) -> f
             sizes.append(float(np.quantile(2.0 * _ALIKE * (_ENTER + _SURE) / np.maximum(total, 1e-12), 0.95)))
     if not sizes:
         return np.inf
-    factor = 1.0 + wheels * max(_LEAST_FACTOR - 1.0, float(np.sqrt(max(sizes))))
+    factor = 1.0 + wheels * max(_STATED - 1.0, float(np.sqrt(max(sizes))))
     return factor if factor < _LARGEST else np.inf
