@@ -34,6 +34,8 @@ from replay.machine.config import Limits
 
 Array = NDArray[np.float64]
 
+#: Said of what the trees claim although the Kalman filter of that row does not.
+NOT_PREFERRED = "Its Kalman model alone would not be preferred to that of a healthy {wheel}."
 _ODD_COST = 2.0  # by which an unusual load must explain more than the usual one
 _WEAK_GAIN = 0.35  # a sensor's gain below this hides what the valve does
 _LEAST_SIDE, _LEAST_ROW = 0.7, 0.5  # probabilities of a side and of its row from which on a finding is stated
@@ -252,7 +254,7 @@ def _sentences(
         words = f"{names[0]} is {times_as_probable(ahead)} by its Kalman model as by that of a healthy {{wheel}}."
         lines.append(Sentence(About.TIMES, words))
     else:
-        lines.append("Its Kalman model alone would not be preferred to that of a healthy {wheel}.")
+        lines.append(NOT_PREFERRED)
     if m == S_NONE and not known.size:
         lines.append(f"{names[0]} delivered nothing in this time.")
     elif m in TOTAL_SENSOR and known.size:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -11,6 +13,7 @@ from diagnosis.results.result import Epsilon, Hypothesis
 from diagnosis.results.vocabulary import Tier
 from diagnosis.wheels.claims import as_claimed
 from diagnosis.wheels.findings import WheelFindings
+from diagnosis.wheels.isolation import NOT_PREFERRED
 from replay.faults import FaultMode, Side
 
 CLEAR_AT = 0.25
@@ -89,3 +92,10 @@ def test_a_loss_that_is_not_sure_is_of_the_sensor_or_the_valve(p: float, measure
         told = {(h.side, h.mode): h.p for h in got.hypotheses}
         assert told["actuator", "stuck"] == told["sensor", "outside_table"] == pytest.approx((p - 0.62) / 2)
         assert sum(told.values()) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize(("mode", "p"), [(FaultMode.STUCK, 0.6), (FaultMode.NO_SIGNAL, 0.6), (FaultMode.NOISY, 0.9)])
+def test_a_sensor_that_gives_one_value_by_the_trees_alone_is_less_sure(mode: FaultMode, p: float) -> None:
+    f = finding(Side.SENSOR, mode, 0.9)
+    assert claimed(f) is f
+    assert claimed(replace(f, evidence=(*f.evidence, NOT_PREFERRED))).probability == pytest.approx(p)
