@@ -85,12 +85,12 @@ def test_a_loss_that_is_not_sure_is_of_the_sensor_or_the_valve(p: float, measure
     assert (got.side, got.mode, got.probability) == (
         side,
         FaultMode.INEFFICIENT,
-        pytest.approx(0.62 if either else p),
+        pytest.approx(0.7 if either else p),
     )
     if either:
-        assert [(h.side, h.p) for h in got.hypotheses[:2]] == [("sensor", 0.31), ("actuator", 0.31)]
+        assert [(h.side, h.p) for h in got.hypotheses[:2]] == [("sensor", 0.35), ("actuator", 0.35)]
         told = {(h.side, h.mode): h.p for h in got.hypotheses}
-        assert told["actuator", "stuck"] == told["sensor", "outside_table"] == pytest.approx((p - 0.62) / 2)
+        assert told["actuator", "stuck"] == told["sensor", "outside_table"] == pytest.approx((p - 0.7) / 2)
         assert sum(told.values()) == pytest.approx(1.0)
 
 
