@@ -18,9 +18,10 @@ from replay.faults import Side, State
 Part = tuple[str, str]
 
 _SOUND = "No speed sensor fault seen, drives not judged"
+_OPEN = "No speed sensor fault seen, but a check is open; drives not judged"
 _DOUBTED = "A sensor is in doubt, drives not judged"
 #: Titles of such a mission.
-TITLES = _SOUND, _DOUBTED
+TITLES = _SOUND, _OPEN, _DOUBTED
 
 
 def sensors_alone(
@@ -56,9 +57,11 @@ def sensors_alone(
     unjudged = f"{who} not judged, for {why}."
     faults = [f for f in intervals if Side.SENSOR in f.side.sides]
     checks = [c for c in against.open if c.worst is not None and Side.SENSOR in c.side.sides]
-    seen = against.words.fill(f"No fault was seen in the {{wheel.sensor}}s over at least {least:.0f} s of {{moving}}; ")
+    seen = against.words.fill(f"No fault was seen in the {{wheel.sensor}}s over at least {least:.0f} s of {{moving}}")
     if not faults and not checks:
-        return _SOUND, seen + unjudged
+        return _SOUND, f"{seen}; {unjudged}"
+    if not faults and not any(c.component in axles for c in checks):  # a bump, or slip, may be all of it
+        return _OPEN, f"{seen}, but {open_words(checks)}; {unjudged}"
     doubt = join_words(
         [
             *(
@@ -69,7 +72,7 @@ def sensors_alone(
             *([open_words(checks)] if checks else []),
         ]
     )
-    rest = seen + unjudged if _all_of(axles, faults, checks) else unjudged[0].upper() + unjudged[1:]
+    rest = f"{seen}; {unjudged}" if _all_of(axles, faults, checks) else unjudged[0].upper() + unjudged[1:]
     return _DOUBTED, f"{doubt[0].upper()}{doubt[1:]}. {rest}"
 
 

@@ -32,6 +32,7 @@ from diagnosis.response.gyro import wrong_gyro
 from diagnosis.response.holds import with_habits
 from diagnosis.response.inputs import FollowerData, cell_of, cells
 from diagnosis.response.joint import rolling
+from diagnosis.response.joint_gain import scaled_channels, told_gain, without_gains
 from diagnosis.response.late import late_neighbour, late_wheels, left_open, smallest_delay
 from diagnosis.response.machine import Judged, lasting_losses, otherwise, paused, standstills, unexplained, unlike
 from diagnosis.response.models import (
@@ -121,6 +122,7 @@ def assess_response(
     if not data:
         return Judgement({}, ())
     width, cell = max(1, round(BLOCK_S / dt)), cell_of(dt)
+    data = without_gains(data, scales := scaled_channels(data, dt))
     drives = list(data.values())
     left_out = standing(data, limits.driving_speed, dt)
     idle = spans_of(np.logical_or.reduce(list(left_out.values())))
@@ -182,8 +184,8 @@ def assess_response(
     least = max(1, round(_LEAST_S / BLOCK_S))
     asked = {w: _asked(j, limits) for w, j in judged.items()}
     bare = {w: j.posterior if j.speed is None else None for w, j in judged.items()}
-    rolls = {w: (x, rolling(x, judged[w].joint, MOVES * limits.driving_speed)) for w, x in asked.items()}
-    kept = {w: where_asked(spells, rolls[w], least, bare[w]) for w, spells in kept.items()}
+    moves = {w: (x, rolling(x, judged[w].joint, MOVES * limits.driving_speed)) for w, x in asked.items()}
+    kept = {w: where_asked(spells, moves[w], least, bare[w]) for w, spells in kept.items()}
     kept = {w: until_back(spells, judged[w].wheel.blocks.dead, asked[w]) for w, spells in kept.items()}
     kept = {w: [s for s in spells if not stands_with_all(s, w, judged, asked)] for w, spells in kept.items()}
     turning = turning_of(judged, geometry, bodies.yaw if not sideways else None)
@@ -236,9 +238,8 @@ def assess_response(
         doubts = dict.fromkeys(judged, Reason(_EXCHANGED)) | doubts
     for w, why in doubts.items():
         parts[w] = doubted(parts[w][0], [slice(None)], why), parts[w][1]
-    parts |= {
-        w: (unproved(parts[w][0], one, DISPUTED), parts[w][1]) for w, one in disputed_steps(judged, width * dt).items()
-    }
+    disputed = disputed_steps(judged, width * dt)
+    parts |= {w: (unproved(parts[w][0], one, DISPUTED), parts[w][1]) for w, one in disputed.items()}
     lasting = lasting_losses(judged)
     for w, (sensor, drive) in parts.items():
         j, about = judged[w], asked[w]
@@ -259,6 +260,7 @@ def assess_response(
     )
     ignored, said = witnessed(ignored, witness, seen, drives, speeds, (width, limits, dt))
     scaled = told(sought, turning, width * dt)
+    parts |= {w: told_gain(parts[w], data[w].name, gain) for w, gain in scales.items() if w in parts}
     return Judgement(parts, (*stood, *(astray if lasts else ()), *ignored), gyro, said, scaled)
 
 

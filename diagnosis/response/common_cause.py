@@ -11,8 +11,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnosis.channels.standstill import STILL, not_followed, stood_still
-from diagnosis.response.channel import samples_of
+from diagnosis.channels.standstill import not_followed, stood_still, without_noise
 from diagnosis.response.inputs import FollowerData
 from diagnosis.response.machine import Judged
 from diagnosis.response.models import LEAST_P
@@ -23,7 +22,6 @@ from diagnosis.results.assessment import Finding
 from diagnosis.results.clearing import after_s
 from replay.faults import FaultMode
 
-Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 _LEAST_TOGETHER = 2  # wheels that stand still, beside one that seems not to
@@ -33,9 +31,6 @@ _AFTER_S, _LESS = (
     10.0,
     0.85,
 )  # after another wheel's fault, and by how much what begins then is less sure to be one more
-
-_NORMAL = 0.6745  # median of the size of a normal variable, by its standard deviation
-_NOISY_STILL, _OF_ASKED = 4.5, 0.08  # times the noise of a sample, and share of what is asked: no more is standstill
 
 
 def standing(data: Mapping[str, FollowerData], driving_speed: float, dt: float) -> dict[str, Flags]:
@@ -51,7 +46,7 @@ def standing(data: Mapping[str, FollowerData], driving_speed: float, dt: float) 
         Step [s].
     """
     out = {w: np.zeros(d.y.size, np.bool_) for w, d in data.items()}
-    seen = {w: _without_noise(d, driving_speed) for w, d in data.items()}
+    seen = {w: without_noise(d.y, d.fresh, d.asked, driving_speed) for w, d in data.items()}
     groups = [list(data)] + [[o for o in data if o != w] for w in data if len(data) > _LEAST_TOGETHER]
     for group in groups:
         speeds, asked = [seen[w] for w in group], [data[w].asked for w in group]
@@ -64,17 +59,6 @@ def standing(data: Mapping[str, FollowerData], driving_speed: float, dt: float) 
                 if goes_nowhere(data[other], slice(start, stop), driving_speed, dt):
                     out[w][start:stop] = out[other][start:stop] = True
     return out
-
-
-def _without_noise(data: FollowerData, driving_speed: float) -> Array:
-    """Speed by which a wheel is seen to stand, shape (n,): so much less than its readings as their noise alone is more than standstill."""
-    white = np.abs(samples_of(data.y, data.fresh).white)
-    if not white.size or not np.isfinite(data.asked).any():
-        return data.y
-    noise = min(
-        _NOISY_STILL * float(np.median(white)) / _NORMAL, _OF_ASKED * float(np.nanquantile(np.abs(data.asked), 0.9))
-    )
-    return data.y * min(1.0, STILL * driving_speed / max(noise, 1e-12))
 
 
 def spans_of(there: Flags) -> list[tuple[int, int]]:

@@ -56,3 +56,10 @@ def test_an_open_check_of_an_angle_speaks_against_its_sensor_but_one_that_shows_
     off = Checked(Kind.STEER, "front", Side.SENSOR_OR_ACTUATOR, Check.LASTING_YAW, 0.15, 0.04)
     assert said(checks=[off])[0] == "A sensor is in doubt, drives not judged"
     assert said(checks=[replace(off, worst=None)])[0] == "No speed sensor fault seen, drives not judged"
+
+
+def test_an_open_check_of_a_speed_is_said_with_what_was_seen() -> None:
+    rough = Checked(Kind.WHEEL, WHEELS[0], Side.SENSOR, Check.ROUGHNESS, 0.3, 0.15)
+    title, text = said(checks=[rough])
+    assert title == "No speed sensor fault seen, but a check is open; drives not judged"
+    assert text.startswith("No fault was seen in the speed sensors over at least 20 s of driving, but ")
