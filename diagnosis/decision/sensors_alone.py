@@ -51,10 +51,10 @@ def sensors_alone(
     ):
         return None
     least = min(decided_s.get(p, 0.0) for p in assessments if p[0] not in axles and p[1] == Side.SENSOR)
-    drives = [c for c, _ in against.short]
-    who = f"the drive of {drives[0]} was" if len(drives) == 1 else f"the drives of {join_words(drives)} were"
-    why = join_words(list(dict.fromkeys(assessments[p].reasons.get(State.NOT_ASSESSED, "") for p in against.short)))
-    unjudged = f"{who} not judged, for {why}."
+    drives: dict[str, list[str]] = {}
+    for part in against.short:
+        drives.setdefault(assessments[part].reasons.get(State.NOT_ASSESSED, ""), []).append(part[0])
+    unjudged = "; ".join(f"{_drives(who)} not judged, for {why}" for why, who in drives.items()) + "."
     faults = [f for f in intervals if Side.SENSOR in f.side.sides]
     checks = [c for c in against.open if c.worst is not None and Side.SENSOR in c.side.sides]
     seen = against.words.fill(f"No fault was seen in the {{wheel.sensor}}s over at least {least:.0f} s of {{moving}}")
@@ -74,6 +74,10 @@ def sensors_alone(
     )
     rest = f"{seen}; {unjudged}" if _all_of(axles, faults, checks) else unjudged[0].upper() + unjudged[1:]
     return _DOUBTED, f"{doubt[0].upper()}{doubt[1:]}. {rest}"
+
+
+def _drives(wheels: Sequence[str]) -> str:
+    return f"the drive of {wheels[0]} was" if len(wheels) == 1 else f"the drives of {join_words(wheels)} were"
 
 
 def _all_of(axles: Sequence[str], faults: Sequence[FaultInterval], checks: Sequence[Checked]) -> bool:
