@@ -82,4 +82,4 @@ def _drives(wheels: Sequence[str]) -> str:
 
 def _all_of(axles: Sequence[str], faults: Sequence[FaultInterval], checks: Sequence[Checked]) -> bool:
     """Whether all of them are about steering axles."""
-    return all(x.component in axles for x in (*faults, *checks))
+    return all(c in axles for c in (*(f.component for f in faults), *(c.component for c in checks)))

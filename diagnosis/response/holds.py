@@ -40,7 +40,10 @@ def usual_hold(wheel: str, holds: Mapping[str, Array]) -> float:
 
 
 def with_habits(found: Mapping[str, Judged], holds: Mapping[str, Array]) -> dict[str, Judged]:
-    """Wheels with how long healthy channels stay at one value, and from which length on a hold is none of that; parameters as of `usual_hold`."""
+    """Wheels with how long healthy channels stay at one value, and from which length on a hold is none of that.
+
+    `holds` as of `usual_hold`, of shape (holds,) each [s].
+    """
     out = {}
     for w, j in found.items():
         habit = usual_hold(w, holds)
