@@ -58,11 +58,12 @@ def init(
     preset: Annotated[
         Preset | None, typer.Option("--preset", help="Kind of machine. Default: found in the log.", show_default=False)
     ] = None,
+    force: Annotated[bool, typer.Option("--force", help="Replace the file where it exists.")] = False,
     quiet: Quiet = False,
     verbose: Verbose = False,
 ) -> None:
     """Write a machine file: from a log, or a commented starter with every key, its unit and default."""
-    run_init(terminal_of(context), output, log or [], preset)
+    run_init(terminal_of(context), output, log or [], preset, force=force)
 
 
 def check(

@@ -25,8 +25,10 @@ def starter() -> str:
     return resources.files("cli.commands").joinpath("starter.toml").read_text(encoding="utf-8")
 
 
-def run_init(terminal: Terminal, output: Path | None, logs: Sequence[Path], preset: Preset | None) -> None:
-    """Write a machine file, or print it where no file is named.
+def run_init(
+    terminal: Terminal, output: Path | None, logs: Sequence[Path], preset: Preset | None, *, force: bool = False
+) -> None:
+    """Write a machine file, or print it where no file is named; `force` replaces one.
 
     Raises
     ------
@@ -36,8 +38,8 @@ def run_init(terminal: Terminal, output: Path | None, logs: Sequence[Path], pres
         Where a log cannot be read, or holds no wheel.
     """
     name = None if output is None or output == _STDOUT else output
-    if name is not None and name.exists():
-        raise ConfigError(f"{name}: exists and was not changed; give another name")
+    if name is not None and name.exists() and not force:
+        raise ConfigError(f"{name}: exists and was not changed; give another name, or --force to replace it")
     if not logs and preset is None:
         _give(terminal, name, starter())
         if name is not None:

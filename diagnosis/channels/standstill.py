@@ -17,20 +17,61 @@ _LEAST_S = 2.0  # longer than drives take to answer
 STILL = 0.2  # of the driving speed
 _ASKED = 2.0  # driving speeds
 _TAIL_S = 3.0  # a command that has just begun proves nothing
+_LEAST_SAMPLES = 20
+_NORMAL = 0.6745  # median of the size of a normal variable, by its standard deviation
+_NOISE, _OF_ASKED = (
+    4.5,
+    0.08,
+)  # times the noise of a sample, and share of what is asked: no more than either is standstill
 
 
 def together_idle(mission: MissionView) -> Flags:
     """Steps in which the machine as a whole did not follow, shape (n,); see `not_followed`."""
     out = np.zeros(mission.timeline.size, np.bool_)
     names = [f"wheel.{w}.v" for w in mission.machine.wheels]
-    speeds = [mission.values(n) for n in names]
     commands = [mission.command(w) for w in mission.machine.wheels]
-    for start, stop in not_followed(speeds, commands, mission.machine.limits.driving_speed, mission.timeline.dt):
+    readings = [mission.values(n) for n in names]
+    least = mission.machine.limits.driving_speed
+    speeds = [
+        without_noise(mission.values(n), mission.timeline.fresh[n], c, least)
+        if mission.logged(n)
+        else mission.values(n)
+        for n, y, c in zip(names, readings, commands, strict=True)
+    ]
+    for start, stop in not_followed(speeds, commands, least, mission.timeline.dt, readings):
         out[start:stop] = True
     return out
 
 
-def not_followed(speeds: Sequence[Array], commands: Sequence[Array], driving_speed: float, dt: float) -> list[Span]:
+def without_noise(y: Array, fresh: Flags, asked: Array, driving_speed: float) -> Array:
+    """Readings by which a wheel is seen to stand, shape (n,) [m/s]: where their noise alone is more than standstill, so much smaller.
+
+    Parameters
+    ----------
+    y : Array, shape (n,)
+        Measured speed [m/s]; NaN where not known.
+    fresh : Flags, shape (n,)
+        Steps with a new sample.
+    asked : Array, shape (n,)
+        Commanded speed [m/s].
+    driving_speed : float
+        Commanded speed from which a drive is driving [m/s].
+    """
+    value = y[fresh & np.isfinite(y)]
+    if value.size < _LEAST_SAMPLES or not np.isfinite(asked).any():
+        return y
+    noise = float(np.median(np.abs(np.diff(value, 2)))) / (np.sqrt(6.0) * _NORMAL)
+    most = min(_NOISE * noise, _OF_ASKED * float(np.nanquantile(np.abs(asked), 0.9)))
+    return y * min(1.0, STILL * driving_speed / most) if most > 0.0 else y
+
+
+def not_followed(
+    speeds: Sequence[Array],
+    commands: Sequence[Array],
+    driving_speed: float,
+    dt: float,
+    readings: Sequence[Array] | None = None,
+) -> list[Span]:
     """Steps [start, stop) in which all of several drives stand still although every one of them was commanded in that time.
 
     Parameters
@@ -41,14 +82,22 @@ def not_followed(speeds: Sequence[Array], commands: Sequence[Array], driving_spe
         Commanded speed from which a drive is driving [m/s].
     dt : float
         Step [s].
+    readings : Sequence[Array] or None, each of shape (n,)
+        What the speeds are in the log, where they are without its noise: their means must be standstill, too [m/s].
     """
-    return stood_still(speeds, commands, driving_speed, dt) if len(speeds) > 1 else []
+    return stood_still(speeds, commands, driving_speed, dt, readings) if len(speeds) > 1 else []
 
 
-def stood_still(speeds: Sequence[Array], commands: Sequence[Array], driving_speed: float, dt: float) -> list[Span]:
+def stood_still(
+    speeds: Sequence[Array],
+    commands: Sequence[Array],
+    driving_speed: float,
+    dt: float,
+    readings: Sequence[Array] | None = None,
+) -> list[Span]:
     """Steps [start, stop) in which some drives, or a single one, stand still although each was commanded; parameters of `not_followed`.
 
-    `speeds`, `commands` of shape (n,) each [m/s]; `driving_speed` in m/s, `dt` in s.
+    `speeds`, `commands`, `readings` of shape (n,) each [m/s]; `driving_speed` in m/s, `dt` in s.
     """
     still = np.logical_and.reduce([np.abs(np.nan_to_num(y, nan=np.inf)) <= STILL * driving_speed for y in speeds])
     asked = [np.abs(np.nan_to_num(c)) > _ASKED * driving_speed for c in commands]
@@ -59,6 +108,7 @@ def stood_still(speeds: Sequence[Array], commands: Sequence[Array], driving_spee
         first = np.flatnonzero(np.logical_or.reduce(wanted))
         if first.size and first.size * dt >= _LEAST_S and all(w.any() for w in wanted):
             begin = start + int(first[0])
-            if (stop - begin) * dt >= _TAIL_S:
+            means = [abs(float(np.nanmean(y[start:stop]))) for y in readings or ()]
+            if (stop - begin) * dt >= _TAIL_S and all(m <= STILL * driving_speed for m in means):
                 out.append((begin, start + int(first[-1]) + 1))
     return out

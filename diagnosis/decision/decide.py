@@ -18,6 +18,7 @@ from diagnosis.decision.caveats import (
 )
 from diagnosis.decision.endings import endings_of
 from diagnosis.decision.open_checks import open_words, stands_out
+from diagnosis.decision.sensors_alone import TITLES, sensors_alone
 from diagnosis.decision.short import SAID_S, ToClear, beside_nothing, exempt_axles
 from diagnosis.decision.to_clear import to_clear
 from diagnosis.decision.wording import actions_of, count_faults, join_words, misplaced_words, sentence_of
@@ -45,7 +46,6 @@ _UNEXPLAINED_S = 0.5
 _MOSTLY = 0.5
 _NO_YAW = "An offset of a steering sensor that is there from start to end, or grows slowly, does not show in this log; a yaw rate (imu.yaw_rate) would show it."
 
-_SENSORS_ALONE = "No sensor fault seen, drives not judged"
 _BESIDE_NOTHING = "No second speed to compare with"
 
 
@@ -184,9 +184,9 @@ def decide(
     )
     open_points = to_clear(against, assessments, decided_s, driven, axles, limits, intervals)
     found = _with_faults(intervals, against, endings_of(intervals, assessments, end_s)) or _without_faults(
-        assessments, decided_s, axles, against
+        assessments, decided_s, axles, against, intervals
     )
-    said = found.title == _SENSORS_ALONE  # which parts are not judged, and why
+    said = found.title in TITLES  # which parts are not judged, and why
     unseen = tuple(dict.fromkeys(a.hidden for a in assessments.values() if a.hidden))
     told = said or found.status is Verdict.READY  # which call sensors healthy
     found = replace(found, text=" ".join((found.text, *unseen))) if told else found
@@ -289,14 +289,15 @@ def _without_faults(
     decided_s: Mapping[Part, float],
     axles: Sequence[str],
     against: Reservations,
+    intervals: Sequence[FaultInterval],
 ) -> Decision:
     """The verdict where no fault is worth an action: the first reservation that there is, else ``ready``."""
     if against.events:
         return Decision(Verdict.NOT_ASSESSED, against.events[0].title, against.events[0].text)
     if against.hints:
         return Decision(Verdict.NOT_ASSESSED, "The machine's settings do not fit the log", against.hints[0])
-    if against.short and (seen := _sensors_alone(assessments, decided_s, axles, against)):
-        return Decision(Verdict.NOT_ASSESSED, _SENSORS_ALONE, seen)
+    if (seen := sensors_alone(assessments, decided_s, axles, against, intervals)) is not None:
+        return Decision(Verdict.NOT_ASSESSED, *seen)
     if against.short:
         who = against.words.listed(Kind.WHEEL, against.short)
         if against.beside_nothing:
@@ -341,19 +342,3 @@ def _without_faults(
         f"The {{wheel.sensor}} and the {{wheel.actuator}} of every {{wheel}} were judged healthy over at least {least:.0f} s of {{moving}}."
     )
     return Decision(Verdict.READY, "No fault found", text, cleared=True)
-
-
-def _sensors_alone(
-    assessments: Mapping[Part, Assessment], decided_s: Mapping[Part, float], axles: Sequence[str], against: Reservations
-) -> str:
-    """What to say where every speed sensor was judged long enough and what is missing are drives without effort; else empty."""
-    if not all(side == Side.ACTUATOR and assessments[c, side].tier is Tier.RESPONSE for c, side in against.short):
-        return ""
-    least = min(decided_s.get(p, 0.0) for p in assessments if p[0] not in axles and p[1] == Side.SENSOR)
-    drives = [c for c, _ in against.short]
-    who = f"the drive of {drives[0]} was" if len(drives) == 1 else f"the drives of {join_words(drives)} were"
-    why = join_words(list(dict.fromkeys(assessments[p].reasons.get(State.NOT_ASSESSED, "") for p in against.short)))
-    return (
-        against.words.fill(f"No fault was seen in the {{wheel.sensor}}s over at least {least:.0f} s of {{moving}}; ")
-        + f"{who} not judged, for {why}."
-    )

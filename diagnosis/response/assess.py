@@ -29,7 +29,10 @@ from diagnosis.response.encoder_scale import scaled_sides
 from diagnosis.response.encoder_scale_words import by_the_gyro, told
 from diagnosis.response.ground import by_drag, by_slip
 from diagnosis.response.gyro import wrong_gyro
+from diagnosis.response.holds import with_habits
 from diagnosis.response.inputs import FollowerData, cell_of, cells
+from diagnosis.response.joint import rolling
+from diagnosis.response.joint_gain import scaled_channels, told_gain, without_gains
 from diagnosis.response.late import late_neighbour, late_wheels, left_open, smallest_delay
 from diagnosis.response.machine import Judged, lasting_losses, otherwise, paused, standstills, unexplained, unlike
 from diagnosis.response.models import (
@@ -61,7 +64,6 @@ from replay.machine.geometry import Geometry
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
-_OWN, _OTHERS = 4, 2  # holds of a channel that may be faults: of the one in question, and of each other
 _LEAST_S = 1.0
 _UNDIRECTED = (
     "{name} is never below 0, also where it is told to go backwards: it tells no direction and is read with that of its command, so that a "
@@ -124,6 +126,7 @@ def assess_response(
     if not data:
         return Judgement({}, ())
     width, cell = max(1, round(BLOCK_S / dt)), cell_of(dt)
+    data = without_gains(data, scales := scaled_channels(data, dt))
     drives = list(data.values())
     left_out = standing(data, limits.driving_speed, dt)
     idle = spans_of(np.logical_or.reduce(list(left_out.values())))
@@ -142,13 +145,13 @@ def assess_response(
     lone = (
         len(data) == _PAIR and len(found) == _PAIR and turns_by_wheels(*(j.wheel.blocks.mean for j in found.values()))
     )
-    found = {w: j._replace(wheel=j.wheel._replace(habit=_habit(w, holds), lone=lone)) for w, j in found.items()}
+    found = {w: j._replace(wheel=j.wheel._replace(lone=lone)) for w, j in with_habits(found, holds).items()}
     means, turned_by = {w: j.wheel.blocks.mean for w, j in found.items()}, None if yaw is None else cells(yaw, width)
     rollers = any(d.commands.shape[1] > BODY_COMMANDS for d in drives)
     sideways = rollers or goes_sideways(means, geometry, width * dt)
     exchanged = sideways and not rollers and crossed(means, geometry, turned_by)
-    rolls = drives[0].stretch if len(drives) == 1 else None
-    bodies = Bodies(speeds, turned_by, width * dt, sideways, None if rolls is None else cells(rolls, width))
+    stretch = drives[0].stretch if len(drives) == 1 else None
+    bodies = Bodies(speeds, turned_by, width * dt, sideways, None if stretch is None else cells(stretch, width))
     efforts = {  # what stands with the machine pulls nothing, and one noise is by chance less than another
         w: cells(np.where(left_out[w], np.nan, j.data.effort), width)
         for w, j in found.items()
@@ -185,7 +188,8 @@ def assess_response(
     least = max(1, round(_LEAST_S / BLOCK_S))
     asked = {w: _asked(j, limits) for w, j in judged.items()}
     bare = {w: j.posterior if j.speed is None else None for w, j in judged.items()}
-    kept = {w: where_asked(spells, asked[w], least, bare[w]) for w, spells in kept.items()}
+    moves = {w: (x, rolling(x, judged[w].joint, MOVES * limits.driving_speed)) for w, x in asked.items()}
+    kept = {w: where_asked(spells, moves[w], least, bare[w]) for w, spells in kept.items()}
     kept = {w: until_back(spells, judged[w].wheel.blocks.dead, asked[w]) for w, spells in kept.items()}
     kept = {w: [s for s in spells if not stands_with_all(s, w, judged, asked)] for w, spells in kept.items()}
     turning = turning_of(judged, geometry, bodies.yaw if not sideways else None)
@@ -238,9 +242,8 @@ def assess_response(
         doubts = dict.fromkeys(judged, Reason(_EXCHANGED)) | doubts
     for w, why in doubts.items():
         parts[w] = doubted(parts[w][0], [slice(None)], why), parts[w][1]
-    parts |= {
-        w: (unproved(parts[w][0], one, DISPUTED), parts[w][1]) for w, one in disputed_steps(judged, width * dt).items()
-    }
+    disputed = disputed_steps(judged, width * dt)
+    parts |= {w: (unproved(parts[w][0], one, DISPUTED), parts[w][1]) for w, one in disputed.items()}
     lasting = lasting_losses(judged)
     for w, (sensor, drive) in parts.items():
         j, about = judged[w], asked[w]
@@ -261,6 +264,7 @@ def assess_response(
     )
     ignored, said = witnessed(ignored, witness, seen, drives, speeds, (width, limits, dt))
     scaled = told(sought, turning, width * dt)
+    parts |= {w: told_gain(parts[w], data[w].name, gain) for w, gain in scales.items() if w in parts}
     return Judgement(parts, (*stood, *(astray if lasts else ())), gyro, said, ignored, scaled)
 
 
@@ -286,12 +290,6 @@ def _drives(
     for more in (unanswered(wheel, judged, known, block_s), running_on(wheel, judged, known[0], block_s)):
         told = told + [f for f in more if not any(f.start < g.stop and g.start < f.stop for g in told)]
     return told
-
-
-def _habit(wheel: str, holds: Mapping[str, Array]) -> float:
-    """How long healthy channels stay at one value [s]: some holds may be faults, fewer of them another wheel's."""
-    longest = [x[k] for w, x in holds.items() if x.size > (k := _OWN if w == wheel else _OTHERS)]
-    return float(max(longest, default=0.0))
 
 
 def _asked(one: Judged, limits: Limits) -> Flags:

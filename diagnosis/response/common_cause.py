@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnosis.channels.standstill import not_followed, stood_still
+from diagnosis.channels.standstill import not_followed, stood_still, without_noise
 from diagnosis.response.inputs import FollowerData
 from diagnosis.response.machine import Judged
 from diagnosis.response.models import LEAST_P
@@ -46,15 +46,16 @@ def standing(data: Mapping[str, FollowerData], driving_speed: float, dt: float) 
         Step [s].
     """
     out = {w: np.zeros(d.y.size, np.bool_) for w, d in data.items()}
+    seen = {w: without_noise(d.y, d.fresh, d.asked, driving_speed) for w, d in data.items()}
     groups = [list(data)] + [[o for o in data if o != w] for w in data if len(data) > _LEAST_TOGETHER]
     for group in groups:
-        speeds, asked = [data[w].y for w in group], [data[w].asked for w in group]
-        for start, stop in not_followed(speeds, asked, driving_speed, dt):
+        speeds, asked = [seen[w] for w in group], [data[w].asked for w in group]
+        for start, stop in not_followed(speeds, asked, driving_speed, dt, [data[w].y for w in group]):
             for w in group:
                 out[w][start:stop] = True
     if len(data) == _LEAST_TOGETHER:  # the other one has to show itself that it stands, whatever it reads
         for w, other in (tuple(data), tuple(data)[::-1]):
-            for start, stop in stood_still([data[w].y], [data[w].asked], driving_speed, dt):
+            for start, stop in stood_still([seen[w]], [data[w].asked], driving_speed, dt, [data[w].y]):
                 if goes_nowhere(data[other], slice(start, stop), driving_speed, dt):
                     out[w][start:stop] = out[other][start:stop] = True
     return out

@@ -11,6 +11,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from diagnosis.response.as_told import in_share, with_another
 from diagnosis.response.beside import same_side
 from diagnosis.response.body_limits import at_body_limit
 from diagnosis.response.ground import dragged
@@ -148,6 +149,7 @@ def unanswered(
     there &= np.logical_and.reduce([x < _CLOSER * off for x in others]) if others else True
     there &= _off_asked(one, block_s) > _CLOSER * off
     there &= ~_eager(one, blocks)
+    there &= ~with_another(one, [j for w, j in judged.items() if w != wheel], off, top)
     limit = at_body_limit(judged, block_s)
     there &= True if limit is None else ~limit
     # where all wheels stand the machine stands, and one of them is no worse than the others
@@ -262,9 +264,10 @@ def _finding(
     gain = float(y @ asked) / power if power > 0.0 else np.inf
     size = float(np.median(np.abs(y)))
     steady = float(np.std(y)) < _STEADY * size
+    held = steady and np.ptp(np.quantile(asked, _MOST_OF)) > size and not in_share(y, asked, gain)
     mode = (
         FaultMode.NO_SIGNAL if abs(gain) < _STANDS and size < _STANDS * float(np.max(np.abs(asked)))
-        else FaultMode.INEFFICIENT if _STANDS <= gain < _FULL and not (steady and np.ptp(asked) > size)
+        else FaultMode.INEFFICIENT if _STANDS <= gain < _FULL and not held
         else FaultMode.STUCK if steady else FaultMode.OUTSIDE_TABLE
     )  # fmt: skip
     epsilon = {

@@ -11,7 +11,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnosis.response.effort_changes import answers, unanswered
+from diagnosis.response.effort_changes import answers, is_noise, unanswered
 from diagnosis.response.inputs import FollowerData
 from diagnosis.response.machine import Judged
 from diagnosis.results.assessment import Finding
@@ -29,6 +29,7 @@ _NOTHING, _OWN = 0.06, 0.9  # of that quantile of its own effort: next to nothin
 _NOISE, _MOST = 3.0, 0.12  # standard errors of the mean of a block; of its usual effort, however noisy it is
 _BRIEFLY, _BRIEF_BLOCKS = 2.0, 3  # times that much, in so many blocks, ends no run of nothing
 _NO_DRIVE = 1e-3  # of the largest usual effort on the machine: never more is no drive at all
+_NOISE_ALONE = 0.1  # of the same: below that an effort may be its noise alone
 _OWN_RUNS, _OTHER_RUNS = 4, 2  # runs of next to nothing that may be faults: of the drive in question, and of each other
 _LONGER = 3  # times as long as what is left of such runs
 _AROUND = 1  # block to each side of one, of which the median counts: a drive that is needed for a moment answers
@@ -96,7 +97,7 @@ def _beside(e: Array, other: Array, driving: NDArray[np.bool_]) -> Array | None:
 
 
 def powered(efforts: Mapping[str, Array]) -> tuple[dict[str, Array], tuple[str, ...]]:
-    """Efforts of the wheels that have a drive, and the wheels that have none: their effort is nothing from end to end.
+    """Efforts of the wheels that have a drive, and the wheels that have none: their effort is nothing from end to end, or its noise.
 
     Parameters
     ----------
@@ -105,7 +106,13 @@ def powered(efforts: Mapping[str, Array]) -> tuple[dict[str, Array], tuple[str, 
     """
     usual = {w: float(np.nanquantile(np.abs(e), _USUAL)) if np.isfinite(e).any() else 0.0 for w, e in efforts.items()}
     least = _NO_DRIVE * max(usual.values(), default=0.0)
-    none = tuple(w for w, e in efforts.items() if not np.nanmax(np.abs(e), initial=0.0) > least)
+    most = _NOISE_ALONE * max(usual.values(), default=0.0)
+    none = tuple(
+        w
+        for w, e in efforts.items()
+        if not np.nanmax(np.abs(e), initial=0.0) > least
+        or (usual[w] < most and is_noise(e, [x for o, x in efforts.items() if o != w]))
+    )
     return {w: e for w, e in efforts.items() if w not in none}, none
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -15,6 +17,7 @@ _MOST_CHANGE, _LEAVES, _FINEST = (
     0.02,
 )  # of its largest change; usual deviations of an effort; of its usual size, which those are at least
 _WINDOW, _APART = 8, 7.0  # blocks; standard errors by which means of so many differ, of the many that a span has
+_MANY, _CHANCE = 80, 3.5  # blocks; standard errors of a correlation that is none
 _USUAL = 0.9  # quantile of an effort that is its usual size
 
 
@@ -54,6 +57,24 @@ def answers(effort: Array, load: Array, span: tuple[int, int]) -> bool:
     middle = sound[_WINDOW // 2 : _WINDOW // 2 + means.size]
     noise = float(np.std(middle - means)) / np.sqrt(1.0 - 1.0 / _WINDOW)
     return bool(np.ptp(means) > max(_APART * noise / np.sqrt(_WINDOW), 2.0 * finest))
+
+
+def is_noise(effort: Array, others: Sequence[Array]) -> bool:
+    """Whether an effort has nothing of what any other one does, and nothing of its own that lasts. Each of shape (b,)."""
+    known = np.isfinite(effort)
+    if np.count_nonzero(known) < _MANY:
+        return False
+    own = effort[known]
+    pairs = [(own, x[known]) for x in others] + [(own[1:], own[:-1])]
+    return all(abs(_alike(*pair)) < _CHANCE / np.sqrt(own.size) for pair in pairs)
+
+
+def _alike(a: Array, b: Array) -> float:
+    """Correlation of what is known of both [1], 0 where one of them does not change. Both of one shape (k,)."""
+    known = np.isfinite(a) & np.isfinite(b)
+    if np.count_nonzero(known) < _MANY or min(np.std(a[known]), np.std(b[known])) == 0.0:
+        return 0.0
+    return float(np.corrcoef(a[known], b[known])[0, 1])
 
 
 def _followed(effort: Array, load: Array, use: Flags) -> tuple[float, float]:

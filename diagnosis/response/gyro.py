@@ -31,6 +31,7 @@ _NOTHING = 0.1  # of what the wheels make
 _SAME, _ASIDE = 0.2, 0.15  # of one: a gain that is as before; of the usual yaw rate: a constant that matters
 _SOUND = 0.55  # of the mission, in which the gyro is sound
 _HELD = ", unless something held it and the {wheels} slipped"
+_APART = 0.05  # of the speed: sides that differ by less turn nothing worth a word
 _NEVER, _TURNED_S = 0.2, 20.0  # of the wheels' yaw rate, over a mission that turns for so long
 
 
@@ -82,7 +83,8 @@ def wrong_gyro(
         sound[start:stop] = False
     found = fitted(apart, turning.yaw, sound, _SOUND)
     if found is None:
-        return _never(apart, turning.yaw, sound, block_s)
+        speed = np.max([np.abs(j.wheel.blocks.mean) for j in judged.values()], axis=0)[sound]
+        return _never(apart, turning.yaw, sound, block_s) if _turns(apart[sound], speed) else ()
     gain, offset, noise = found
     usual = float(np.quantile(np.abs(gain * apart[sound]), 0.9))
     about = _Spread(gain * apart, turning.yaw - offset, usual, noise)
@@ -138,6 +140,11 @@ def _kind(about: _Spread, part: slice, sound: Flags, block_s: float) -> str:
         return f"gives next to nothing while the {{wheels}} turn the machine at up to {np.max(np.abs(made)):.2g} rad/s{_HELD}"
     ground = ", unless the ground let them slip" if 0.0 < gain < 1.0 else ""
     return f"reads {gain:.2f} × what the {{wheels}} make{ground}"
+
+
+def _turns(apart: Array, speed: Array) -> bool:
+    """Whether sides go apart by more than tyres and readings of a machine that goes straight ahead differ; of shape (k,) each [m/s]."""
+    return bool(apart.size and np.quantile(np.abs(apart), 0.9) > _APART * np.nanquantile(speed, 0.9))
 
 
 def _never(apart: Array, yaw: Array, sound: Flags, block_s: float) -> tuple[str, ...]:

@@ -18,6 +18,7 @@ from diagnosis.results.assessment import Lack, Reason
 from replay.faults import FaultMode
 
 Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
 
 _LEAST_BLOCKS = 80
 _SMOOTH_BLOCKS = 9
@@ -115,6 +116,21 @@ def cut(spells: Sequence[Spell], joint: Joint | None, blocks: Blocks) -> list[Sp
             at = b
         out += [s._replace(start=at, kin=bool(inside))] if at < s.stop else []
     return out
+
+
+def rolling(asked: Flags, joint: Joint | None, still: float) -> Flags:
+    """Blocks in which motion is asked for, or the position of the joint goes on, shape (b,).
+
+    Parameters
+    ----------
+    asked : Flags, shape (b,)
+        Where motion is asked for.
+    joint : Joint or None
+        What the position says.
+    still : float
+        What counts as standstill [m/s].
+    """
+    return asked if joint is None else asked | (np.abs(np.nan_to_num(joint.view.speed)) > still)
 
 
 def _goes_on(spell: Spell, joint: Joint) -> bool:

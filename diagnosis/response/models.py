@@ -61,6 +61,8 @@ class Blocks(NamedTuple):
         Root mean square of what changes from sample to sample, and the usual one [m/s].
     habitual : bool
         Whether values that are held for long may be the channel's habit, as other wheels have it.
+    long_s : float
+        Time from which on a value is held for long [s].
     """
 
     start: NDArray[np.intp]
@@ -74,6 +76,7 @@ class Blocks(NamedTuple):
     rough: Array
     usual: Array
     habitual: bool = True
+    long_s: float = _LONG_S
 
     @property
     def white(self) -> Array:
@@ -261,6 +264,8 @@ def hold_shares(blocks: Blocks, driving: Flags, block_s: float) -> tuple[float, 
     before = np.r_[False, blocks.held[:-1] & use[:-1]]
     after = [blocks.held[kept & (before == was)] for was in (False, True)]
     shares = [float(np.clip((x.sum() + 0.5) / (x.size + 1.0), 0.02, 0.95)) for x in after]
+    if not after[1].size:  # nothing was held even once
+        shares[1] = float(np.sqrt(shares[0]))
     return shares[0], max(shares)
 
 
@@ -279,7 +284,7 @@ def _long_holds(blocks: Blocks, driving: Flags, block_s: float) -> tuple[Flags, 
     edge: NDArray[np.intp] = np.flatnonzero(np.diff(np.r_[False, blocks.held & use, False].astype(np.int8)))
     long = np.zeros(use.size, np.bool_)
     starts, stops = edge[::2], edge[1::2]
-    for k in np.flatnonzero((stops - starts) * block_s > _LONG_S):
+    for k in np.flatnonzero((stops - starts) * block_s > blocks.long_s):
         long[starts[k] : stops[k]] = True
     return use, long
 

@@ -32,6 +32,11 @@ _MOSTLY, _AWAY_S = 0.25, 2.0  # ... for as much of the time, and for so long
 _FOLLOWS = 0.7  # of the time, in which another wheel is as near to its own command as it should
 _OTHERS = 2
 _P, _SENSOR = 0.85, 0.1
+_LEAST_BLOCKS, _MOST_OF = 40, 0.8  # that show a share of what is asked; of them that it explains
+_WEAK, _IN_SHARE = (
+    0.9,
+    0.05,
+)  # share of what is asked below which a drive is weak; of what is asked, as near to such a share
 
 
 def running_on(wheel: str, judged: Mapping[str, Judged], blocks: Blocks | None, block_s: float) -> list[Finding]:
@@ -81,7 +86,45 @@ def running_on(wheel: str, judged: Mapping[str, Judged], blocks: Blocks | None, 
             found[-1] = (found[-1][0], stop, found[-1][2])
         elif float(np.ptp(told)) >= _ASKED * top:
             found.append((start, stop, speed))
+    gain = _share(y, asked, alive, 2.0 * tolerance) if found else None
+    if gain is not None:
+        return [_weak(one, gain, (int(found[0][0]), int(found[-1][1])), block_s)]
     return [_finding(one, span, asked, block_s) for span in found]
+
+
+def _share(y: Array, asked: Array, alive: Flags, tolerance: Array) -> float | None:
+    """One share of what is asked that a speed is all through the mission [1], also where that changes; None where none is. Of shape (b,) each."""
+    told = np.abs(np.gradient(np.nan_to_num(asked))) < tolerance
+    use = alive & np.isfinite(asked) & told & (np.abs(asked) > _ASKED * float(np.nanmax(np.abs(asked))))
+    if np.count_nonzero(use) < _LEAST_BLOCKS:
+        return None
+    gain = float(np.median(y[use] / asked[use]))
+    explained = float(np.mean(np.abs(y - gain * asked)[use] < np.maximum(tolerance, _IN_SHARE * np.abs(asked))[use]))
+    return gain if 0.1 < gain < _WEAK and explained > _MOST_OF else None
+
+
+def _weak(one: Judged, gain: float, span: tuple[int, int], block_s: float) -> Finding:
+    """A finding of a wheel that makes one share of its command, of which a stretch at one speed is a part; in blocks `span`."""
+    start, stop = span
+    width, loss = int(one.wheel.blocks.start[1]), 1.0 - gain
+    text = (
+        f"{one.data.name} is {gain:.2f} × what its command makes the other {{wheels}} do, at whatever speed, also in the "
+        f"{(stop - start) * block_s:.1f} s in which it keeps one. A weak drive and a wrong sensor look the same."
+    )
+    rest = Hypothesis("none", State.HEALTHY.value, 1.0 - _P)
+    side, mode = Side.SENSOR_OR_ACTUATOR, FaultMode.INEFFICIENT
+    return Finding(
+        start=start * width,
+        stop=min(stop * width, one.data.y.size),
+        side=side,
+        mode=mode,
+        probability=_P,
+        hypotheses=(Hypothesis(side.value, mode.value, _P), rest),
+        epsilon=Epsilon(loss, max(loss - 0.1, 0.0), min(loss + 0.1, 1.0)),
+        sat=None,
+        evidence=(text,),
+        tier=Tier.RESPONSE,
+    )
 
 
 def _astray(blocks: Blocks, top: float) -> Flags:

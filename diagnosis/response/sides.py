@@ -35,7 +35,9 @@ _ROLLS_P = 0.92  # that a wheel without a drive which reads nothing is read wron
 _DOUBT_S = 0.5  # around a spell that is judged no fault
 _AT_ONCE_S = 5e-3
 _HIDDEN = "a controller that holds the speed hides a weak drive, and the effort of a healthy one is not known"
-_ROLLS = Reason("its effort is nothing from end to end while others pull: no {valve} is seen there", Lack.DRIVE)
+_ROLLS = Reason(
+    "its effort is nothing from end to end while others pull: no {valve} is seen there, or it is dead", Lack.DRIVE
+)
 _ALONE = "a controller that holds the speed hides a weak drive; name its current, duty or torque as its command (`wheel.{name}.u`) to have it judged"
 _UNANSWERED = Reason(
     "how it answers its command does not show in this log, which is too short, or has too few changes of the command, so that only a speed that is "

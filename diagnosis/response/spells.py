@@ -64,7 +64,9 @@ def _mean_probability(posterior: Array, mode: FaultMode) -> float:
     return float(np.mean(posterior[:, same].sum(axis=1)))
 
 
-def where_asked(spells: Sequence[Spell], asked: Flags, least: int, posterior: Array | None) -> list[Spell]:
+def where_asked(
+    spells: Sequence[Spell], asked: tuple[Flags, Flags], least: int, posterior: Array | None
+) -> list[Spell]:
     """Spells without those of a silent or scaled speed in which no motion is expected, and the ends of such spells cut to it.
 
     A wheel at rest shows neither scale nor health, so that what it does before and after says nothing of how probable the spell is.
@@ -73,8 +75,9 @@ def where_asked(spells: Sequence[Spell], asked: Flags, least: int, posterior: Ar
     ----------
     spells : Sequence[Spell]
         Spells.
-    asked : Flags, shape (b,)
-        Blocks in which command or other wheels make the wheel move.
+    asked : tuple[Flags, Flags], each of shape (b,)
+        Blocks in which command or other wheels make the wheel move; with those in which the position of its joint goes on, for what
+        that contradicts.
     least : int
         Blocks of expected motion that a spell needs.
     posterior : Array or None, shape (b, states)
@@ -85,7 +88,7 @@ def where_asked(spells: Sequence[Spell], asked: Flags, least: int, posterior: Ar
         if s.mode is FaultMode.STUCK or s.mode is FaultMode.NOISY:
             out.append(s)
             continue
-        places = s.start + np.flatnonzero(asked[s.start : s.stop])
+        places = s.start + np.flatnonzero(asked[s.own][s.start : s.stop])
         if places.size >= least:
             first, stop = int(places[0]), int(places[-1]) + 1
             p = s.p

@@ -27,9 +27,17 @@ from replay.setup.one_clock import lags
 from replay.setup.preset import Preset
 from replay.setup.read import options_of
 from replay.setup.robot_description import RobotDescription, parse_description
-from replay.setup.structure import ONE, Structure, described_structure, named_structure, preset_structure
+from replay.setup.structure import (
+    ONE,
+    Structure,
+    described_structure,
+    named_structure,
+    preset_structure,
+    steering_names,
+)
 from replay.setup.unstated_units import usual_units, valve_currents
 from replay.setup.unsure_signals import unsure_signals
+from replay.setup.unused_steering import ask_about_steering
 from replay.signals.file_names import named_channels
 from replay.signals.like_wheels import like_wheels
 from replay.signals.mapping import by_number, map_signals
@@ -102,6 +110,7 @@ def draft_machine(logs: Sequence[RawLog], preset: Preset | None = None) -> Draft
     empty = unfilled(channels)
     given = given_signals(structure, {n: c for n, c in channels.items() if n not in empty}, logs)
     ask_about_odometry(structure, channels, draft)
+    ask_about_steering(structure, steering_names(channels), draft)
     for array in dict.fromkeys(empty.values()):
         draft.say("signals", f"Not used: {unfilled_note(array)}.")
     raw = replace(structure.machine(1.0), signals=given)

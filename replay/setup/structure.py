@@ -207,8 +207,8 @@ def _covered(channels: Mapping[str, Channel], wheels: tuple[str, ...], by_name: 
     return set(found)
 
 
-def _steering_names(channels: Mapping[str, Channel]) -> set[str]:
-    """Names of channels and joints that speak of steering."""
+def steering_names(channels: Mapping[str, Channel]) -> set[str]:
+    """Names of channels and joints of a log that speak of steering. `channels` by name."""
     names = set()
     for c in channels.values():
         inner = re.search(r"\[([^\[\]]+)\]$", c.field)
@@ -220,12 +220,12 @@ def _steering_names(channels: Mapping[str, Channel]) -> set[str]:
 
 def _steering_ends(channels: Mapping[str, Channel]) -> set[tuple[str | None, str | None]]:
     """Front or rear, and left or right, of the names that speak of steering."""
-    return {(end_of(n), position(n)[1]) for n in _steering_names(channels)}
+    return {(end_of(n), position(n)[1]) for n in steering_names(channels)}
 
 
 def _steered(channels: Mapping[str, Channel], wheels: Sequence[str]) -> Mapping[str, str]:
     """Steering axle of each steered wheel: its own, where each has an angle, else that of its end of the machine."""
-    names = _steering_names(channels)
+    names = steering_names(channels)
     ends = _steering_ends(channels)
     if any(c.type_name.rpartition("/")[2].startswith("AckermannDrive") for c in channels.values()):
         ends.add((None, None))

@@ -79,6 +79,9 @@ def test_init_writes_once(tmp_path: Path, capsys: pytest.CaptureFixture[str]) ->
     assert file.read_text(encoding="utf-8") == starter()
     assert run(["config", "init", "-o", str(file)]) == 2
     assert "exists and was not changed" in capsys.readouterr().err
+    file.write_text("", encoding="utf-8")
+    assert run(["config", "init", "--force", "-o", str(file)]) == 0
+    assert file.read_text(encoding="utf-8") == starter()
 
 
 def test_init_prints_without_a_name(capsys: pytest.CaptureFixture[str]) -> None:

@@ -91,6 +91,6 @@ def test_what_a_wheel_does_at_rest_makes_a_scale_no_less_probable() -> None:
     posterior[10:30, NOISY + 1 + SCALES.index(0.48)] = 1.0
     asked = np.zeros(40, np.bool_)
     asked[10:30] = True
-    (found,) = where_asked([Spell(0, 40, FaultMode.INEFFICIENT, 0.78)], asked, 4, posterior)
+    (found,) = where_asked([Spell(0, 40, FaultMode.INEFFICIENT, 0.78)], (asked, asked), 4, posterior)
     assert (found.start, found.stop, found.p) == (10, 30, 1.0)
-    assert where_asked([Spell(0, 40, FaultMode.INEFFICIENT, 0.78)], asked & False, 4, posterior) == []
+    assert where_asked([Spell(0, 40, FaultMode.INEFFICIENT, 0.78)], (asked & False, asked), 4, posterior) == []

@@ -1,0 +1,85 @@
+"""What is said where the speed sensors were judged long enough, and only drives without effort were not."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from diagnosis.decision.caveats import Reservations
+from diagnosis.decision.open_checks import open_words
+from diagnosis.decision.wording import fault_words, join_words
+from diagnosis.results.assessment import Assessment
+from diagnosis.results.clearing import Checked
+from diagnosis.results.durations import seconds_words
+from diagnosis.results.result import FaultInterval
+from diagnosis.results.vocabulary import Tier
+from replay.faults import Side, State
+
+#: A component and its side.
+Part = tuple[str, str]
+
+_SOUND = "No speed sensor fault seen, drives not judged"
+_OPEN = "No speed sensor fault seen, but a check is open; drives not judged"
+_DOUBTED = "A sensor is in doubt, drives not judged"
+#: Titles of such a mission.
+TITLES = _SOUND, _OPEN, _DOUBTED
+
+
+def sensors_alone(
+    assessments: Mapping[Part, Assessment],
+    decided_s: Mapping[Part, float],
+    axles: Sequence[str],
+    against: Reservations,
+    intervals: Sequence[FaultInterval],
+) -> tuple[str, str] | None:
+    """Title and text where every speed sensor was judged long enough and what is missing are drives without effort; else None.
+
+    Parameters
+    ----------
+    assessments : Mapping
+        By (component, side).
+    decided_s : Mapping
+        Seconds of driving in which each was decided.
+    axles : Sequence[str]
+        Steering axles.
+    against : Reservations
+        What stands against ``ready``.
+    intervals : Sequence[FaultInterval]
+        Faults, none of them worth an action.
+    """
+    if not against.short or not all(
+        side == Side.ACTUATOR and assessments[c, side].tier is Tier.RESPONSE for c, side in against.short
+    ):
+        return None
+    least = min(decided_s.get(p, 0.0) for p in assessments if p[0] not in axles and p[1] == Side.SENSOR)
+    drives: dict[str, list[str]] = {}
+    for part in against.short:
+        drives.setdefault(assessments[part].reasons.get(State.NOT_ASSESSED, ""), []).append(part[0])
+    unjudged = "; ".join(f"{_drives(who)} not judged, for {why}" for why, who in drives.items()) + "."
+    faults = [f for f in intervals if Side.SENSOR in f.side.sides]
+    checks = [c for c in against.open if c.worst is not None and Side.SENSOR in c.side.sides]
+    seen = against.words.fill(f"No fault was seen in the {{wheel.sensor}}s over at least {least:.0f} s of {{moving}}")
+    if not faults and not checks:
+        return _SOUND, f"{seen}; {unjudged}"
+    if not faults and not any(c.component in axles for c in checks):  # a bump, or slip, may be all of it
+        return _OPEN, f"{seen}, but {open_words(checks)}; {unjudged}"
+    doubt = join_words(
+        [
+            *(
+                f"the {against.words.part_words(f.kind, f.component, f.side)} may have been {fault_words(f)} for "
+                f"{seconds_words(f.stop_s - f.start_s)} (p = {f.probability:.2f})"
+                for f in faults[:1]
+            ),
+            *([open_words(checks)] if checks else []),
+        ]
+    )
+    rest = f"{seen}; {unjudged}" if _all_of(axles, faults, checks) else unjudged[0].upper() + unjudged[1:]
+    return _DOUBTED, f"{doubt[0].upper()}{doubt[1:]}. {rest}"
+
+
+def _drives(wheels: Sequence[str]) -> str:
+    return f"the drive of {wheels[0]} was" if len(wheels) == 1 else f"the drives of {join_words(wheels)} were"
+
+
+def _all_of(axles: Sequence[str], faults: Sequence[FaultInterval], checks: Sequence[Checked]) -> bool:
+    """Whether all of them are about steering axles."""
+    return all(c in axles for c in (*(f.component for f in faults), *(c.component for c in checks)))
