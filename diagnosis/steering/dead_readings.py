@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from diagnosis.steering.excitation import asked
+from diagnosis.steering.excitation import asked, exercised
 from diagnosis.steering.fault_size import level_of
 from diagnosis.steering.filter_state import Array
 from diagnosis.steering.path import AxleFilter
@@ -12,6 +12,8 @@ from diagnosis.steering.path import AxleFilter
 LEAST_ASKED_S = 0.35  # for how long a motion must be asked for, to see that it does not come
 _FEW_READINGS, _LAPSE_S = 3, 0.1  # readings that agree, seconds without any: no more may be chance, or a message lost
 _STEP = 0.01  # of the full angle: what a sensor that dies leaps by is more
+_TREMBLES = 5  # changes of a reading that lives
+_RESTS = 10  # blocks in which nobody asks it to turn
 _REPEATS = 3  # times as long as elsewhere does an angle repeat itself whose sensor is dead
 
 
@@ -25,7 +27,8 @@ def at_rest(axle: AxleFilter, start: int, stop: int, *, command_logged: bool) ->
     """Whether an angle merely stays where nobody asks it to leave: an angle without noise, as servos report it, does that in health.
 
     Where the valve's command is not logged, nothing else tells a dead sensor from an axle that is told to stay; where it is, an angle
-    of few digits may still repeat itself for about as long as it does elsewhere, or always where it never changes. Blocks [start, stop).
+    of few digits may still repeat itself for about as long as it does elsewhere at rest, or always where it never changes there; one that
+    goes on trembling lives. Blocks [start, stop).
     """
     blocks = axle.blocks
     if asked(axle, start, stop)[2] >= LEAST_ASKED_S:
@@ -40,10 +43,14 @@ def at_rest(axle: AxleFilter, start: int, stop: int, *, command_logged: bool) ->
     stays = bool(np.all(np.abs(blocks.mean[beside] - level) < _STEP * axle.model.stop))
     if not (stays and command_logged):
         return stays
-    elsewhere = blocks.mean[before], blocks.mean[after]
-    if not any(np.diff(mean).any() for mean in elsewhere):
-        return True  # nothing shows how it reads in health
-    return inside.size < _REPEATS * max(_longest_alike(mean) for mean in elsewhere)
+    means = blocks.mean[inside]
+    if np.count_nonzero(np.diff(means)) >= _TREMBLES and _longest_alike(means) < 0.5 * means.size:
+        return True
+    resting = ~exercised(axle)
+    elsewhere = [blocks.mean[side[resting[side]]] for side in (before, after)]
+    if sum(mean.size for mean in elsewhere) < _RESTS or not any(np.diff(mean).any() for mean in elsewhere):
+        return True  # nothing shows how it reads in health where it rests
+    return _longest_alike(means) < _REPEATS * max(_longest_alike(mean) for mean in elsewhere)
 
 
 def _longest_alike(mean: Array) -> int:

@@ -35,3 +35,12 @@ def test_an_angle_that_never_changes_says_nothing_where_nobody_asks_it_to(
     assert at_rest(axle(mean, command), 20, N, command_logged=True) is rests
     if not first:
         assert at_rest(axle(mean, command), 0, N, command_logged=True) is rests
+
+
+def test_an_angle_that_trembles_where_it_rests_lives_and_one_that_only_ever_moved_elsewhere_shows_nothing() -> None:
+    mean, command = np.zeros(N), np.zeros(N)
+    mean[0:900:2], mean[900:] = 2e-4, np.linspace(0.0, 0.3, 100)
+    command[900:] = 0.3
+    assert at_rest(axle(mean, command), 0, 900, command_logged=True)
+    mean[:900] = 0.0
+    assert at_rest(axle(mean, command), 0, 900, command_logged=True)
