@@ -17,7 +17,7 @@ _LEAST_S = 2.0  # longer than drives take to answer
 STILL = 0.2  # of the driving speed
 _ASKED = 2.0  # driving speeds
 _TAIL_S = 3.0  # a command that has just begun proves nothing
-_LEAST_SAMPLES = 20
+_LEAST_SAMPLES, _ERRORS = 20, 4.0  # samples that show a noise; standard errors of a mean
 _NORMAL = 0.6745  # median of the size of a normal variable, by its standard deviation
 _NOISE, _OF_ASKED = (
     4.5,
@@ -83,7 +83,7 @@ def not_followed(
     dt : float
         Step [s].
     readings : Sequence[Array] or None, each of shape (n,)
-        What the speeds are in the log, where they are without its noise: their means must be standstill, too [m/s].
+        What the speeds are in the log, where they are without its noise: they must differ from 0 by noise alone [m/s].
     """
     return stood_still(speeds, commands, driving_speed, dt, readings) if len(speeds) > 1 else []
 
@@ -108,7 +108,16 @@ def stood_still(
         first = np.flatnonzero(np.logical_or.reduce(wanted))
         if first.size and first.size * dt >= _LEAST_S and all(w.any() for w in wanted):
             begin = start + int(first[0])
-            means = [abs(float(np.nanmean(y[start:stop]))) for y in readings or ()]
-            if (stop - begin) * dt >= _TAIL_S and all(m <= STILL * driving_speed for m in means):
+            long = (stop - begin) * dt >= _TAIL_S
+            if long and all(_about_nothing(y[start:stop], STILL * driving_speed) for y in readings or ()):
                 out.append((begin, start + int(first[-1]) + 1))
     return out
+
+
+def _about_nothing(y: Array, still: float) -> bool:
+    """Whether readings are standstill each, or their mean differs from 0 by no more than their noise makes it. Of shape (k,) [m/s]."""
+    known = y[np.isfinite(y)]
+    if not known.size or float(np.max(np.abs(known))) <= still:
+        return True
+    number = np.count_nonzero(np.diff(known)) + 1
+    return bool(abs(float(np.mean(known))) <= _ERRORS * float(np.std(known)) / np.sqrt(number))

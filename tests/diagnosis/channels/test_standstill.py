@@ -17,7 +17,7 @@ def test_noise_is_no_motion() -> None:
     asked = [_asked()] * 4
     assert not not_followed(speeds, asked, 0.05, _DT)
     seen = [without_noise(y, fresh, c, 0.05) for y, c in zip(speeds, asked, strict=True)]
-    ((first, stop),) = not_followed(seen, asked, 0.05, _DT)
+    ((first, stop),) = not_followed(seen, asked, 0.05, _DT, speeds)
     assert (first, stop) == (61, _N)
 
 
@@ -27,3 +27,10 @@ def test_slow_motion_is_no_noise_and_a_quiet_speed_is_as_it_is() -> None:
     assert not not_followed([without_noise(slow, fresh, _asked(), 0.05)] * 2, [_asked()] * 2, 0.05, _DT)
     quiet = np.full(_N, 0.015)
     assert np.array_equal(without_noise(quiet, fresh, _asked(), 0.05), quiet)
+
+
+def test_readings_that_are_not_about_nothing_are_no_standstill() -> None:
+    rng, fresh = np.random.default_rng(3), np.ones(_N, np.bool_)
+    creeps = [np.abs(rng.normal(0.0, 0.02, _N)) for _ in range(2)]
+    seen = [without_noise(y, fresh, _asked(), 0.05) for y in creeps]
+    assert not not_followed(seen, [_asked()] * 2, 0.05, _DT, creeps)
