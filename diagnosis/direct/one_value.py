@@ -17,14 +17,17 @@ from diagnosis.results.assessment import CODE, Assessment, Finding
 from diagnosis.results.result import Epsilon, Hypothesis, Sat
 from diagnosis.results.vocabulary import Tier
 from replay.faults import FaultMode, Side, State
+from replay.signals.resolution import rounding_step
 
 Array = NDArray[np.float64]
 
 _OTHERS = 2  # sensors beside this one
 _TREMBLES = 0.3  # of the readings of a wheel that turns, which are not the one before
 _LEAST_S, _FAR = 1.0, 8.0  # of one value, and times its own longest other run
+_STEPS = 1.0  # of the reading, by which all of them tremble: by less one value may be held between two steps
 _INSIDE = 0.5  # of its time: said already
 _P = 0.96  # as of frozen speeds that have no second one
+_FEW, _SECOND = 5, 6.0 * 0.455  # readings; median of the square of a second difference of unit noise
 _OPEN = (CODE[State.HEALTHY], CODE[State.NOT_ASSESSED], CODE[State.NOT_EXCITED])
 
 
@@ -64,17 +67,22 @@ def _alone(found: Mapping[str, IdentifiedPair], wheel: str, r: Frozen) -> bool:
     inside = np.zeros(one.pair.y.size, np.bool_)
     inside[r.start : r.stop] = True
     others = [_trembling(pair, inside) for name, pair in found.items() if name != wheel]
-    known = [share for share in others if share is not None]
+    known = [t for t in others if t is not None]
     own = _trembling(one, ~inside)
-    return len(known) >= _OTHERS and min(known) >= _TREMBLES and own is not None and own >= _TREMBLES
+    if own is None or len(known) < _OTHERS:
+        return False
+    steps = min(size for _, size in known) / max(rounding_step(one.pair.y[one.pair.fresh]), 1e-12)
+    return min(share for share, _ in (*known, own)) >= _TREMBLES and steps >= _STEPS
 
 
-def _trembling(one: IdentifiedPair, where: NDArray[np.bool_]) -> float | None:
-    """Share of new readings of a wheel that turns that are not the one before; None without any."""
+def _trembling(one: IdentifiedPair, where: NDArray[np.bool_]) -> tuple[float, float] | None:
+    """Share of new readings of a wheel that turns that are not the one before, and their noise [m/s]; None without any."""
     y = one.pair.y[where & one.pair.fresh]
     y = y[np.isfinite(y)]
     turning = np.abs(y[:-1]) > TURNS * one.pair.span
-    return float(np.mean(np.diff(y)[turning] != 0.0)) if turning.any() else None
+    if not turning.any() or y.size < _FEW:
+        return None
+    return float(np.mean(np.diff(y)[turning] != 0.0)), float(np.sqrt(np.median(np.diff(y, 2) ** 2) / _SECOND))
 
 
 def _with(a: Assessment, one: IdentifiedPair, r: Frozen) -> Assessment:

@@ -80,6 +80,8 @@ class Cause:
         What is lost; None: it is no loss.
     changes, late : bool
         Whether it changes with time; whether it is a delay or a lag.
+    seconds : float
+        Of such a delay or lag [s].
     alone, clear : bool
         Whether no other one explains as much; whether none of another row does but such as change likewise.
     start, stop : int or None
@@ -95,6 +97,7 @@ class Cause:
     epsilon: Epsilon | None = None
     changes: bool = False
     late: bool = False
+    seconds: float = 0.0
     alone: bool = True
     clear: bool = True
     start: int | None = None
@@ -145,14 +148,14 @@ def causes(y: Array, x: Array, at: NDArray[np.intp], measured: Measured) -> Iter
     words = f"It departs from {reference} by {amount(float(drift[1]), measured.unit, 2)} a second, whatever that is: a drift."
     yield leaves(off - line @ drift, Cause(FaultMode.OUTSIDE_TABLE, words, changes=True))
     seconds, rest = _least(_delayed(at, x, measured), y, measured)
-    yield leaves(rest, _late(f"It comes {1e3 * seconds:.0f} ms after {reference}: a delay."))
+    yield leaves(rest, _late(f"It comes {1e3 * seconds:.0f} ms after {reference}: a delay.", seconds))
     seconds, rest = _least(_lagged(at, x, measured), y, measured)
-    yield leaves(rest, _late(f"It follows {reference} with a time constant of {seconds:.2g} s: a lag."))
+    yield leaves(rest, _late(f"It follows {reference} with a time constant of {seconds:.2g} s: a lag.", seconds))
 
 
-def _late(words: str) -> Cause:
-    """A reading that comes late."""
-    return Cause(FaultMode.OUTSIDE_TABLE, words, changes=True, late=True)
+def _late(words: str, seconds: float) -> Cause:
+    """A reading that comes late [s]."""
+    return Cause(FaultMode.OUTSIDE_TABLE, words, changes=True, late=True, seconds=seconds)
 
 
 def _least(trials: Iterable[tuple[float, Array]], y: Array, measured: Measured) -> tuple[float, Array]:
@@ -210,7 +213,10 @@ def _loss(gains: tuple[float, float], measured: Measured) -> Cause:
 
 
 def below_limit(cause: Cause, measured: Measured) -> bool:
-    """Whether a cause may be a loss or gain below the limit, at first and at last."""
+    """Whether a cause may be a loss or gain below the limit, at first and at last, or a delay of less than two readings are apart."""
+    if cause.late:
+        apart = np.diff(np.flatnonzero(measured.use))
+        return bool(apart.size) and cause.seconds < measured.dt * float(np.median(apart))
     if cause.epsilon is None:
         return False
     ends = cause.epsilon.low + _ABOUT, cause.epsilon.high - _ABOUT
