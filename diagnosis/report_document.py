@@ -28,9 +28,9 @@ from diagnosis.results.detectability import Detectability, detectability_table
 from diagnosis.results.document import SCHEMA, CoverageRow, MachineRow, ReportDocument
 from diagnosis.results.loss import loss_rows
 from diagnosis.results.result import FaultInterval, to_json
-from diagnosis.results.vocabulary import Tier
+from diagnosis.results.vocabulary import Kind, Tier
 from replay.control.loop import Replay
-from replay.faults import State
+from replay.faults import Side, State
 from replay.machine.config import Machine
 from replay.mission import Mission
 from replay.setup.places import place_doubts
@@ -143,7 +143,7 @@ def report_of_mission(judged: Judged, identity: MachineRow) -> ReportDocument:
         "machine": identity,
         "readings": to_json(replay.readings),
         "verdict": _decision(judged, coverage, decided_s, metrics.open_states(found.assessments, moving, machine)).row(
-            [*more_caveats(mission, judged.recorded.first_ns, machine), *_told_scale(judged.scale)]
+            [*more_caveats(mission, judged.recorded.first_ns, machine), *_told_scale(judged)]
         ),
         "intervals": to_json(judged.intervals),
         "states": to_json(spans_of(found.assessments, timeline.step_ns)),
@@ -174,8 +174,12 @@ def report_of_mission(judged: Judged, identity: MachineRow) -> ReportDocument:
     return plain
 
 
-def _told_scale(scale: Scale | None) -> list[str]:
-    """A scale that is contradicted, unless it stands among the reasons of the verdict already."""
+def _told_scale(judged: Judged) -> list[str]:
+    """A scale that is contradicted, unless it stands among the reasons of the verdict already, or a speed that reads a share for long makes it."""
+    scale, length = judged.scale, judged.mission.timeline.size * judged.mission.timeline.dt
+    for f in judged.intervals:
+        if f.kind is Kind.WHEEL and f.side is Side.SENSOR and f.mode.scaled and 2.0 * (f.stop_s - f.start_s) > length:
+            return []
     return [scale.sentence] if scale is not None and scale.sentence and not scale.gross else []
 
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from diagnosis.response.channel import Samples
 from diagnosis.response.inputs import cells
 from diagnosis.response.lasting_noise import quiet_level
-from diagnosis.response.machine import Judged
+from diagnosis.response.machine import Judged, unlike_others
 from diagnosis.response.models import Beside, Blocks, held_long
 from diagnosis.response.pairs import anothers
 from diagnosis.response.spells import Spell
@@ -101,6 +101,8 @@ def others_fault(spell: Spell, wheel: str, judged: Mapping[str, Judged]) -> bool
     one = judged[wheel]
     if spell.own or (not spell.mode.scaled and spell.mode is not FaultMode.OUTSIDE_TABLE):
         return False
+    if not jumped(one, spell) and any(o != wheel for o in unlike_others(judged)):
+        return True  # one that reads a share all the time makes others look off whenever the sides differ
     for other, j in judged.items():
         for s in j.spells if other != wheel else ():
             overlap = min(s.stop, spell.stop) - max(s.start, spell.start)

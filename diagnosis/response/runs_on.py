@@ -33,6 +33,7 @@ _FOLLOWS = 0.7  # of the time, in which another wheel is as near to its own comm
 _OTHERS = 2
 _P, _SENSOR = 0.85, 0.1
 _LEAST_BLOCKS, _MOST_OF = 40, 0.8  # that show a share of what is asked; of them that it explains
+_TWICE = 2.0  # tolerances, by which two wheels at one speed differ
 _WEAK, _IN_SHARE = (
     0.9,
     0.05,
@@ -74,6 +75,9 @@ def running_on(wheel: str, judged: Mapping[str, Judged], blocks: Blocks | None, 
         part = slice(start, stop)
         told = asked[part][np.isfinite(asked[part])]
         alone = all(float(np.mean(x[part])) > _FOLLOWS for x in others)
+        alone &= not any(
+            _with(y[part], j.wheel.blocks.mean[part], tolerance[part]) for w, j in judged.items() if w != wheel
+        )
         off = int(np.count_nonzero(away[part]))
         if abs(speed) < _TURNS * top or not told.size or not alone:
             continue
@@ -90,6 +94,11 @@ def running_on(wheel: str, judged: Mapping[str, Judged], blocks: Blocks | None, 
     if gain is not None:
         return [_weak(one, gain, (int(found[0][0]), int(found[-1][1])), block_s)]
     return [_finding(one, span, asked, block_s) for span in found]
+
+
+def _with(y: Array, other: Array, tolerance: Array) -> bool:
+    """Whether another wheel, which follows, does the same: both go as the machine does. Of shape (k,) each [m/s]."""
+    return bool(np.mean(np.abs(y - other) < _TWICE * tolerance) > _MOST_OF)
 
 
 def _share(y: Array, asked: Array, alive: Flags, tolerance: Array) -> float | None:

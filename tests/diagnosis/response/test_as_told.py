@@ -41,3 +41,11 @@ def test_a_wheel_with_a_share_of_its_command_is_nowhere_stuck(seed: int) -> None
     found = [(w, f.mode) for w, sides in parts.items() for a in sides for f in a.findings]
     assert {w for w, _ in found} <= {"FL"}
     assert FaultMode.STUCK not in {mode for _, mode in found}
+
+
+@pytest.mark.parametrize("seed", [71, 72])
+def test_beside_a_wheel_that_reads_a_share_all_the_time_no_other_is_named(seed: int) -> None:
+    measured, asked, body = speeds(seed)
+    measured["RR"] = np.round(0.65 * measured["RR"], 3)
+    parts = assess_response(followers_of(measured, asked, body), geometry(WHEELS), None, Limits(), DT).parts
+    assert {w for w, sides in parts.items() for a in sides for _ in a.findings} <= {"RR"}
