@@ -15,6 +15,7 @@ from replay.faults import Side
 _GONE = Epsilon(1.0, 1.0, 1.0)
 _OPENING = "of full opening"
 _LEAST_MISFIT = 0.01
+_CONSTANT = 0.01  # of full opening, by which a healthy valve's zero is off (one standard deviation); set by hand
 
 
 def estimate_size(
@@ -58,7 +59,7 @@ def _valve_size(row: int, a: int, b: int, axle: AxleFilter, path: SteeringPath) 
         gain = axle.model.plant.gain
         level, half = stuck_opening(float(last[3]), axle), 1.96 * float(np.sqrt(var[3])) / gain
         return _GONE, Sat(level, abs(level), level - half, level + half, _OPENING)
-    epsilon = _epsilon(float(last[2]), float(np.sqrt(var[2])), axle)
+    epsilon = _epsilon(float(last[2]), float(np.hypot(np.sqrt(var[2]), _by_a_constant(axle.blocks.u[a:b]))), axle)
     if row == INEFFICIENT:
         return epsilon, None
     return epsilon, _sat(path.mean[a:b, 3] / axle.model.plant.gain / max(epsilon.value, 0.1), _OPENING)
@@ -68,6 +69,12 @@ def _epsilon(gain: float, std: float, axle: AxleFilter) -> Epsilon:
     """ε̂ = 1 − δ̂ with its 95 % bounds: what the plant leaves unexplained does not average out over a fault."""
     half = 1.96 * float(np.hypot(std, gain * max(axle.model.plant.misfit, _LEAST_MISFIT)))
     return Epsilon(1 - gain, 1 - gain - half, 1 - gain + half)
+
+
+def _by_a_constant(u: Array) -> float:
+    """Standard deviation of a valve's share by what its opening is off by at rest, of openings u, shape (k,) [1]."""
+    opened = np.abs(u[np.abs(u) > _CONSTANT])
+    return _CONSTANT / float(np.sqrt(np.mean(opened**2))) if opened.size else 0.0
 
 
 def _sat(values: Array, unit: str) -> Sat | None:
