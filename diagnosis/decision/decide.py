@@ -189,7 +189,7 @@ def decide(
     said = found.title in TITLES  # which parts are not judged, and why
     unseen = tuple(dict.fromkeys(a.hidden for a in assessments.values() if a.hidden))
     told = said or found.status is Verdict.READY  # which call sensors healthy
-    found = replace(found, text=" ".join((found.text, *unseen))) if told else found
+    found = replace(found, text=_with_limits(found.text, unseen)) if told else found
     if found.status is Verdict.NOT_ASSESSED and open_points and not against.misplaced:  # which says it itself
         found = replace(found, text=f"{found.text} To clear it: {open_points[0].act}.")
     caveats = caveats_of(against, assessments, decided_s, driven, axles, limits, short_named=said)
@@ -216,6 +216,11 @@ def decide(
         actions=actions,
         to_clear=() if found.status is Verdict.READY else open_points,
     )
+
+
+def _with_limits(text: str, limits: Sequence[str]) -> str:
+    """A verdict's sentence that goes on with what it does not say."""
+    return "; ".join((text.removesuffix("."), *(f"{x[:1].lower()}{x[1:]}".removesuffix(".") for x in limits))) + "."
 
 
 def _offset_hidden(checks: Sequence[Checked], axle: str) -> bool:

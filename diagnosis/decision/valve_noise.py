@@ -42,7 +42,7 @@ def _doubted(a: Assessment, dt: float) -> Assessment:
 
 
 def _told(f: Finding, others: list[Finding], dt: float) -> Finding:
-    if (f.side, f.mode) != (Side.ACTUATOR, FaultMode.NOISY):
+    if (f.side, f.mode) != (Side.ACTUATOR, FaultMode.NOISY) or f.probability <= _MOST_BRIEF:
         return f
     if any(g.mode is not f.mode and _gap(f, g) * dt < _TOUCHES_S for g in others):
         return _or_in_no_row(f)
