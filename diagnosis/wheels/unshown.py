@@ -34,6 +34,7 @@ _RESTS = "The machine stood nine tenths of that time: a sensor that is off by a 
 _STEADY_S, _REPEATS = 0.5, 0.3  # before; of the readings of a wheel that turns
 _GOES_ON = "Nothing else moves meanwhile, and it reads on what it read before, as its rounding lets it at one speed: a healthy sensor does, too."
 _OPENED, _MOVED = 0.1, 0.05  # of full opening, of the largest speed: something else changes meanwhile
+_ABOUT = 0.15  # of a speed: about it
 _STEPS = 4.0  # of the reading, by which others move at least
 
 
@@ -117,7 +118,7 @@ def _with_company(data: WheelsData, i: int, f: Finding) -> Finding:
         return or_shifted(f, _RESTS)
     if moves_on(data, i, part):
         return f
-    step = _least_step(data.y[:, i])
+    step = _step_at(data.y[:, i], level)
     near = max(_STEPS * step if np.isfinite(step) else 0.0, _AS_OTHERS * abs(level))
     if abs(level - float(np.nanmedian(others))) <= near:
         return limited(f, _TREMBLING, _ALL_STAY)
@@ -168,6 +169,16 @@ def moves_on(data: WheelsData, i: int, part: slice) -> bool:
     opened = float(np.quantile(opening, 0.95) - np.quantile(opening, 0.05)) if opening.size else 0.0
     far = max(_MOVED * data.span, _STEPS * step if np.isfinite(step) else 0.0)
     return opened > _OPENED or bool(moved and float(np.median(moved)) > far)
+
+
+def _step_at(y: Array, level: float) -> float:
+    """Smallest distance of values about a level [m/s], which grows with the speed where times are counted; infinite where there are few.
+
+    A channel whose noise moves it at every reading has as many values as readings, and no steps that matter.
+    """
+    every = y[:: -(-len(y) // _MANY)]
+    values = np.unique(every[np.abs(np.abs(every) - abs(level)) < _ABOUT * abs(level)])
+    return float(np.min(np.diff(np.abs(values[np.sign(values) == np.sign(level)])), initial=np.inf))
 
 
 def _least_step(y: Array) -> float:

@@ -184,6 +184,20 @@ def test_a_coarse_reading_that_goes_on_at_one_speed_is_hardly_stuck(step: float,
     assert any(f.probability > 0.8 for f in told) is sure
 
 
+def test_times_that_are_counted_are_coarse_at_speed_alone() -> None:
+    """The tick is the same, the step of the speed grows with its square: slow readings of a log say nothing of quick ones."""
+    slow = 0.3 + 0.2 * np.sin(2 * np.pi * T / 30.0)
+    slow[1000:1100], slow[1990:2600] = 1.9, 2.1
+    noise = 0.002 * np.random.default_rng(1).standard_normal((N, 4))
+    v = slow[:, np.newaxis] * np.array([1.0, 0.93, 0.93, 0.93]) + noise
+    y = 15.0 / np.round(15.0 / v)
+    rows = (Hypothesis("sensor", FaultMode.STUCK, 0.9), Hypothesis("none", "healthy", 0.1))
+    stuck = Finding(2000, 2600, Side.SENSOR, FaultMode.STUCK, 0.9, rows, None, None, (), Tier.MODEL)
+    before = {i: WheelFindings(findings=[stuck] if i == 0 else []) for i in range(4)}
+    told = with_frozen(data(y, 0.3 * np.broadcast_to(slow[:, np.newaxis], y.shape).copy()), before)[0].findings
+    assert all(f.probability < 0.5 for f in told)
+
+
 def test_a_sensor_that_freezes_again_and_again_makes_no_habit_of_it() -> None:
     y = speeds()
     for k in range(5):
