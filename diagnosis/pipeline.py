@@ -181,7 +181,7 @@ def _walk(
     publish(Progress(Stage.REPLAYING_LOOP))
     replay = replay_loop(timeline, machine, bucket_of(timeline.size))
     found = _outside_gaps(
-        assess_components(timeline, replay, machine, chosen, publish, mission.signals.items), timeline
+        assess_components(timeline, replay, machine, chosen, publish, mission.signals.items), machine.axles, timeline
     )
     found = found if doubt is None else _without_valves(found, doubt)
     found = found if scale is None else _with_scale(found, scale)
@@ -214,12 +214,12 @@ def _with_scale(found: ComponentResult, doubt: SpeedDoubt) -> ComponentResult:
     return replace(found, events=(*found.events, speeds_doubted(doubt.text, doubt.act).worded(found.words)))
 
 
-def _outside_gaps(found: ComponentResult, timeline: Timeline) -> ComponentResult:
+def _outside_gaps(found: ComponentResult, axles: tuple[str, ...], timeline: Timeline) -> ComponentResult:
     """Nothing is judged where nothing was recorded; findings that are one fault are one."""
     gaps = recording_gaps(timeline)
     told = with_silent_sensors(found.assessments, timeline)
     seen = {key: without_gaps(a, gaps, timeline) for key, a in told.items()}
-    joined = with_doubted_noise(with_episodes(seen, timeline.dt), timeline.dt)
+    joined = with_doubted_noise(with_episodes(seen, timeline.dt), axles, timeline.dt)
     joined = with_chains_as_one(joined, timeline.dt)
     return replace(found, assessments=with_second_onsets(joined, timeline.dt))
 

@@ -13,8 +13,8 @@ from .findings import assessed, finding
 DT = 0.001
 
 
-def told(*findings: Finding, side: str = "actuator") -> list[Finding]:
-    return list(with_doubted_noise({("FR", side): assessed(*findings)}, DT)["FR", side].findings)
+def told(*findings: Finding, side: str = "actuator", part: str = "FR") -> list[Finding]:
+    return list(with_doubted_noise({(part, side): assessed(*findings)}, ("front",), DT)[part, side].findings)
 
 
 def noise(start: int, stop: int, side: Side = Side.ACTUATOR) -> Finding:
@@ -40,6 +40,8 @@ def test_noise_that_passes_into_another_row_may_be_of_none() -> None:
 def test_brief_noise_is_less_sure() -> None:
     (brief,) = told(noise(1_000, 3_000))
     assert brief.probability == pytest.approx(0.6)
+    (longer,), (steered,) = (told(noise(1_000, 4_500), part=part) for part in ("FR", "front"))
+    assert (longer.probability, steered.probability) == (0.96, pytest.approx(0.6))
 
 
 def test_a_sensors_noise_is_left_as_it_is() -> None:
