@@ -13,6 +13,7 @@ TURNS = 0.02  #: Of the largest speed: a wheel that turns.
 _LEAST_S, _READINGS = 0.5, 20  # of one value, and readings at the channel's usual rate
 _LONGER = 2.5  # times the longest other run of one value, that is not this value
 _FREEZES, _PARTED = 12, 4.0  # other runs that may be a frozen sensor's, too; times the next one
+_FEW, _SECOND = 5, 6.0 * 0.455  # readings; median of the square of a second difference of unit noise
 _OF_MOST = 0.97  # of its own largest: an end of its range
 
 
@@ -56,17 +57,37 @@ def frozen_of(y: Array, span: float, dt: float) -> list[Frozen]:
     return out
 
 
+def trembling(y: Array, least: float) -> tuple[float, float] | None:
+    """Share of readings of a turning wheel that are not the one before [1], and their noise [m/s]; None where it stands.
+
+    Noise by second differences, of which what toggles between two steps has less than one step.
+
+    Parameters
+    ----------
+    y : Array, shape (n,)
+        Readings [m/s]; NaN where unknown.
+    least : float
+        From here on a wheel turns [m/s].
+    """
+    y = y[np.isfinite(y)]
+    turning = np.abs(y[:-1]) > least
+    if y.size < _FEW or not turning.any():
+        return None
+    return float(np.mean(np.diff(y)[turning] != 0.0)), float(np.sqrt(np.median(np.diff(y, 2) ** 2) / _SECOND))
+
+
 def _habit(others: Array, length: float, usual: float) -> float | None:
     """Longest run of other values that is none of a frozen sensor; None where a run of this length [all s] is no longer than the habit.
 
     A sensor that freezes again and again has a few such runs, and far shorter ones after them.
     """
     ranked = np.r_[np.sort(others)[::-1][: _FREEZES + 1], usual]
+    found = None
     for k, longest in enumerate(ranked):
         parted = k == 0 or ranked[k - 1] >= max(_LEAST_S, _PARTED * longest)
         if parted and length >= (_LONGER if k == 0 else _PARTED) * max(longest, usual):
-            return float(max(longest, usual))
-    return None
+            found = float(max(longest, usual))
+    return found
 
 
 def _usual(starts: NDArray[np.intp], stops: NDArray[np.intp], steps: int) -> float:

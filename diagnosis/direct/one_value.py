@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnosis.channels.one_value import TURNS, Frozen, frozen_of
+from diagnosis.channels.one_value import TURNS, Frozen, frozen_of, trembling
 from diagnosis.direct.identification import IdentifiedPair
 from diagnosis.results.assessment import CODE, Assessment, Finding
 from diagnosis.results.result import Epsilon, Hypothesis, Sat
@@ -27,7 +27,6 @@ _LEAST_S, _FAR = 1.0, 8.0  # of one value, and times its own longest other run
 _STEPS = 1.0  # of the reading, by which all of them tremble: by less one value may be held between two steps
 _INSIDE = 0.5  # of its time: said already
 _P = 0.96  # as of frozen speeds that have no second one
-_FEW, _SECOND = 5, 6.0 * 0.455  # readings; median of the square of a second difference of unit noise
 _OPEN = (CODE[State.HEALTHY], CODE[State.NOT_ASSESSED], CODE[State.NOT_EXCITED])
 
 
@@ -76,13 +75,8 @@ def _alone(found: Mapping[str, IdentifiedPair], wheel: str, r: Frozen) -> bool:
 
 
 def _trembling(one: IdentifiedPair, where: NDArray[np.bool_]) -> tuple[float, float] | None:
-    """Share of new readings of a wheel that turns that are not the one before, and their noise [m/s]; None without any."""
-    y = one.pair.y[where & one.pair.fresh]
-    y = y[np.isfinite(y)]
-    turning = np.abs(y[:-1]) > TURNS * one.pair.span
-    if not turning.any() or y.size < _FEW:
-        return None
-    return float(np.mean(np.diff(y)[turning] != 0.0)), float(np.sqrt(np.median(np.diff(y, 2) ** 2) / _SECOND))
+    """`trembling` of new readings."""
+    return trembling(one.pair.y[where & one.pair.fresh], TURNS * one.pair.span)
 
 
 def _with(a: Assessment, one: IdentifiedPair, r: Frozen) -> Assessment:

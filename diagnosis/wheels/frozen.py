@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 
-from diagnosis.channels.one_value import Frozen, frozen_of
+import numpy as np
+
+from diagnosis.channels.one_value import TURNS, Frozen, frozen_of, trembling
 from diagnosis.results.assessment import Finding
 from diagnosis.results.result import Epsilon, Hypothesis, Sat
 from diagnosis.results.vocabulary import Tier
@@ -14,8 +16,14 @@ from diagnosis.wheels.inputs import WheelsData
 from diagnosis.wheels.slowing import or_held_together
 from diagnosis.wheels.unshown import as_shown, followed, moves_on
 from replay.faults import FaultMode, Side, State
+from replay.signals.resolution import rounding_step
 
 _INSIDE = 0.5  # of a finding's time
+_OTHERS, _CHANGES, _AS_OFTEN = (
+    2,
+    40,
+    0.5,
+)  # wheels; changes that each other speed makes meanwhile, and as often as this one elsewhere
 _P, _VALVE = 0.96, 0.02  # that the sensor is frozen, and that its valve is; set by hand, not calibrated
 _FAR, _P_NEAR = (
     8.0,
@@ -36,7 +44,12 @@ def with_frozen(data: WheelsData, found: Mapping[int, WheelFindings]) -> dict[in
     held = {i: frozen_of(data.y[:, i], data.span, data.dt) for i in found}
     out = {}
     for i, wheel in found.items():
-        own = [r for r in held[i] if moves_on(data, i, followed(data, r.start, r.stop)) and not _all_held(held, i, r)]
+        own = [
+            r
+            for r in held[i]
+            if (moves_on(data, i, followed(data, r.start, r.stop)) or _others_tremble(data, i, r))
+            and not _all_held(held, i, r)
+        ]
         kept = [
             as_shown(data, i, f, wheel.findings)
             for f in wheel.findings
@@ -50,6 +63,25 @@ def with_frozen(data: WheelsData, found: Mapping[int, WheelFindings]) -> dict[in
         out[i] = replace(wheel, findings=sorted(findings, key=lambda f: f.start))
     told_of_all = or_held_together([wheel.findings for wheel in out.values()], data.dt)
     return {i: replace(wheel, findings=fs) for (i, wheel), fs in zip(out.items(), told_of_all, strict=True)}
+
+
+def _others_tremble(data: WheelsData, i: int, r: Frozen) -> bool:
+    """Whether all other speeds, and this one elsewhere, change again and again by a step of the reading and more, as none does meanwhile."""
+    seconds = (r.stop - r.start) * data.dt
+    inside = data.y[r.start : r.stop]
+    elsewhere = np.concatenate([data.y[: r.start, i], data.y[r.stop :, i]])
+    usual = trembling(elsewhere, TURNS * data.span)
+    others = [trembling(inside[:, j], TURNS * data.span) for j in range(data.y.shape[1]) if j != i]
+    if usual is None or len(others) < _OTHERS or any(t is None for t in others):
+        return False
+    known = [t for t in others if t is not None]
+    step = rounding_step(elsewhere[np.r_[True, np.diff(elsewhere) != 0.0]])
+    rates = min(share for share, _ in known) / data.dt
+    return bool(
+        rates * seconds >= _CHANGES
+        and min(share for share, _ in known) >= _AS_OFTEN * usual[0]
+        and min(size for _, size in known) >= max(step, 1e-12)
+    )
 
 
 def _all_held(held: Mapping[int, list[Frozen]], i: int, r: Frozen) -> bool:

@@ -68,13 +68,15 @@ def test_a_frozen_speed_is_told_as_the_sensors_whatever_a_model_says(spells: int
     assert sum(h.p for h in told[0].hypotheses) == pytest.approx(1.0)
 
 
-@pytest.mark.parametrize(("other", "sure"), [(20, True), (100, False)])
-def test_hardly_longer_than_its_habit_is_no_claim(other: int, sure: bool) -> None:
-    """A run of 3 s beside another of .2 s, or of 1 s."""
+@pytest.mark.parametrize(("others", "count"), [((20,), 1), ((100,), 1), ((40, 60, 100), 0)])
+def test_hardly_longer_than_its_habit_is_no_claim(others: tuple[int, ...], count: int) -> None:
+    """A run of 3 s beside another of .2 s, one of 1 s, which may be frozen, too, and some of many lengths, which are how it reads."""
     y = speeds()
-    y[100:400, 0], y[3100 : 3100 + other, 0] = 0.7, 0.9
-    (told,) = found(y)
-    assert (told.probability > 0.9) is sure
+    y[100:400, 0] = 0.7
+    for k, other in enumerate(others):
+        y[3100 + 500 * k : 3100 + 500 * k + other, 0] = 0.9 + 0.05 * k
+    told = found(y)
+    assert sum(f.probability > 0.9 for f in told) == count
 
 
 def test_coarse_readings_at_a_steady_speed_are_a_habit() -> None:
@@ -97,9 +99,18 @@ def test_where_all_are_held_the_log_is() -> None:
 
 def test_where_nothing_else_moves_nothing_is_told() -> None:
     y = speeds()
-    y[2000:2400] = y[2000] + 0.005 * np.round(np.random.default_rng(2).standard_normal((400, 4)))
+    trembling = 0.005 * np.round(np.random.default_rng(2).standard_normal((400, 4)))
+    y[2000:2400] = y[2000] + np.where(np.abs(trembling) > 0.006, 0.005, 0.0)
     y[2000:2400, 0] = 0.8
     assert found(y) == []
+
+
+def test_where_all_others_tremble_by_more_than_a_step_one_value_is_a_sensor_that_froze() -> None:
+    y = np.asarray(np.round(speeds() + 0.02 * np.random.default_rng(2).standard_normal((N, 4)), 3))
+    y[2000:2400] = 1.0 + 0.02 * np.random.default_rng(3).standard_normal((400, 4))
+    y[2000:2400, 0] = 1.01
+    (told,) = found(np.asarray(np.round(y, 3)))
+    assert (told.start, told.stop, told.side, told.probability) == (2000, 2400, Side.SENSOR, 0.96)
 
 
 def test_a_sensor_that_is_frozen_for_the_whole_mission() -> None:
