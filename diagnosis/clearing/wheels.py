@@ -45,6 +45,7 @@ _VALVE_ALONE, _SLOWER = 2.2, 3.0  # times the deviation of the others' valves, a
 #: Of full opening, by which a wheel may differ from the others at one speed, and times what the next one does. Healthy wheels of 14 machines
 #: (28 tuning missions) had 0.07 where no other had 0.032, and else 1.6 times the next.
 LEAST_OFFSET, _OFF_ALONE = 0.08, 2.2
+_STANDS_BEHIND, _FOLLOWS = 0.5, (0.7, 1.3)  # of its command: a wheel that hardly answers beside one that does
 VALVE = 1.4  # dead band and hysteresis of a healthy valve: the limit as a multiple of the loss that counts
 
 
@@ -71,7 +72,7 @@ def wheel_checks(cells: Cells, clear_at: float) -> Iterator[Checked]:
     offsets = opening_offsets(cells, speed, used)
     by_file = beside_plant(cells, used, responses)
     most_off = [float(x) for x in largest(offsets[0])], [float(x) for x in offsets[1]]
-    delays = late(speed, reference, cells.dt)
+    delays, made = late(speed, reference, cells.dt), made_of_commands(cells, speed, reference)
     either = Side.SENSOR_OR_ACTUATOR
     top = cells.machine.max_speed
     creeping = np.column_stack(
@@ -131,6 +132,8 @@ def wheel_checks(cells: Cells, clear_at: float) -> Iterator[Checked]:
             ):  # a drive with a command alone is judged by how it answers it, not by its lag
                 limit = alone(worst_tracking, i, _TRACKING, _TRACKING_ALONE, _SLOWER)
                 yield worst(cells, (*about, either, Check.TRACKING), tracking[:, i], limit, apart=True)
+            elif (stands := behind_all_through(made, i)) >= _STANDS_BEHIND:
+                yield lasts(cells, (*about, either, Check.TRACKING), stands, _STANDS_BEHIND)
             if delays[i] is not None:
                 yield lasts(cells, (*about, Side.SENSOR, Check.DELAY), delays[i], LATE_S)
         most_rough = alone(roughest, i, ROUGH, _LEAST_ROUGH, _ROUGH_ALONE)
@@ -181,6 +184,27 @@ def most_carried(clear_at: float) -> float:
 
 def _known(x: Array) -> bool:
     return bool(np.isfinite(x).any())
+
+
+def made_of_commands(cells: Cells, speed: Array, reference: Array) -> Array:
+    """Share of its commanded speed that each wheel usually makes while it is commanded [1], shape (wheels,); NaN where it never is.
+
+    `speed` and `reference` of shape (cells, wheels) in m/s.
+    """
+    frame, floor = cells.frame, FLOOR * cells.machine.max_speed
+    asked = frame.mean(np.abs(reference))
+    share = np.where(asked > floor, frame.mean(np.abs(speed)) / np.maximum(asked, floor), np.nan)
+    known = np.isfinite(share).any(axis=0)
+    return np.where(known, np.nanmedian(np.where(known, share, 0.0), axis=0), np.nan)
+
+
+def behind_all_through(made: Array, i: int) -> float:
+    """How much less of its command a wheel makes all through than the one that makes most [1], where that one follows; else 0.
+
+    `made` of shape (wheels,) as of `made_of_commands`.
+    """
+    most = float(np.nanmax(np.delete(made, i), initial=0.0)) if made.size > 1 else 0.0
+    return max(0.0, most - float(made[i])) if _FOLLOWS[0] < most < _FOLLOWS[1] and np.isfinite(made[i]) else 0.0
 
 
 def _tracking(cells: Cells, speed: Array, reference: Array) -> Array:

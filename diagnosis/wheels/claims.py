@@ -42,8 +42,10 @@ _EITHER = (
     "By command and speed alone, in a third of such cases the {valve} of the same {wheel} was weak instead, and in another third the {valve} "
     "was stuck or the sensor off by an offset: the {valve}'s position would tell."
 )
-_MOST_UNPREFERRED = 0.6  # of a stuck or silent sensor: none of 58 right claims from 0.85 on was without it (tuning, 15 machines), the wrong one was
-_BY_NO_MODEL = "A sensor that gives one value leaves no such doubt."
+_MOST_UNPREFERRED = (
+    0.6  # of a stuck or silent sensor: all of 58 right claims from 0.85 on were preferred by it (tuning, 15 machines)
+)
+_BY_NO_MODEL = "The filter of a sensor that gives one value has always said so as well, which makes this less probable."
 _ANSWERING = (FaultMode.INEFFICIENT, FaultMode.NOISY)
 _OTHERS = "By command and speed alone, another {wheel} or the ground was the cause in four of five such cases."
 _SMALL = "Machines of other build differ by as much where nothing is wrong with this sensor."

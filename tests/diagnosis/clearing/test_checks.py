@@ -15,7 +15,14 @@ from diagnosis.clearing.checks import checks_of
 from diagnosis.clearing.limits import usual_limits
 from diagnosis.clearing.measure import off_commands
 from diagnosis.clearing.still import commanded_still, dead_bands
-from diagnosis.clearing.wheels import ROUGH, beside_ground, most_carried, most_creeping, roughness_of
+from diagnosis.clearing.wheels import (
+    ROUGH,
+    behind_all_through,
+    beside_ground,
+    most_carried,
+    most_creeping,
+    roughness_of,
+)
 from diagnosis.results.clearing import Check, Checked
 from diagnosis.results.machine_words import HYDRAULIC
 from replay.faults import FaultMode, FaultSpec, Side
@@ -405,3 +412,11 @@ def test_an_angle_whose_scale_nothing_tells_clears_no_axle(told_by: str | None, 
     assert bool(asked) is open_
     assert not any(c.passed for c in asked)
     assert all("as large as it reads" in c.text for c in asked)
+
+
+@pytest.mark.parametrize(
+    ("made", "behind"), [((0.05, 0.98), 0.93), ((0.05, 0.1), 0.0), ((0.95, 0.98), 0.03), ((0.05,), 0.0)]
+)
+def test_a_wheel_that_hardly_answers_beside_one_that_does_is_behind(made: tuple[float, ...], behind: float) -> None:
+    """Where both do not, the machine does not follow; a lone drive has nothing beside it."""
+    assert behind_all_through(np.array(made), 0) == pytest.approx(behind)
