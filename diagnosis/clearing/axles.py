@@ -83,7 +83,8 @@ def axle_checks(cells: Cells, clear_at: float) -> Iterator[Checked]:
             off = _alone(rates.off, j) if twice else np.abs(rates.off[:, j])
             deviates = worst(cells, (*about, either, Check.RATE), off[place], brief_limit(rates, j, share, twice=twice))
             changed = lasts(cells, (*about, either, Check.RATE), rates.changes[j], changes[j])
-            parted = lasts(cells, (*about, either, Check.RATE), None if told else rates.parted[j], _CHANGED * share)
+            between = (1.0 if twice else _CHANGED) * share
+            parted = lasts(cells, (*about, either, Check.RATE), None if told else rates.parted[j], between)
             yield max([deviates, *(c for c in (changed, parted) if c.worst is not None)], key=times)
             if len(cells.machine.axles) > 1:
                 yield lasts(cells, (*about, either, Check.LASTING_RATE), rates.apart[j], RATE[twice][1] * share)

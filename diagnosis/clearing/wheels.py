@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.clearing.cells import Array, Cells
-from diagnosis.clearing.limits import Limits, measured_twice, response_limits
+from diagnosis.clearing.limits import Limits, long_limit, measured_twice, response_limits
+from diagnosis.clearing.longer import around, longer
 from diagnosis.clearing.measure import alone, compared, lasts, late, off_commands, times, worst
 from diagnosis.clearing.opening_offsets import opening_offsets
 from diagnosis.clearing.openings import openings_tell
@@ -65,6 +66,8 @@ def wheel_checks(cells: Cells, clear_at: float) -> Iterator[Checked]:
     slow = responses_of(cells, speed, used, reference, CREEPING * USUAL_TOP, over_time=False).windows
     slow[np.isfinite(windows)] = np.nan
     limits = response_limits(responses, twice, clear_at, cells.carried_shares, cells.ahead)
+    long = longer(cells, -windows)
+    long_most = [float(x) for x in largest(long)]
     tracking, rough = _tracking(cells, speed, reference), _rough_beside_others(roughness_of(cells, speed, reference))
     rough = np.fmax(rough, wild_readings(cells, speed, FLOOR * cells.machine.max_speed))
     worst_tracking, roughest = ([float(x) for x in largest(z)] for z in (tracking, rough))
@@ -105,7 +108,11 @@ def wheel_checks(cells: Cells, clear_at: float) -> Iterator[Checked]:
             response = (*about, either, Check.RESPONSE)
             driven = worst(cells, response, -windows[:, i], own.below, apart=True)
             most_slow = max(own.below, -_CREEPING_RESPONSE * float(np.log1p(-clear_at)))
-            yield max(driven, worst(cells, response, -slow[:, i], most_slow, apart=True), key=times)
+            found = [driven, worst(cells, response, -slow[:, i], most_slow, apart=True)]
+            if any(twice[i]):
+                most_long = long_limit(long_most, i, own.below)
+                found.append(around(worst(cells, response, long[:, i], most_long, apart=True)))
+            yield max(found, key=times)
             yield lasts(cells, (*about, either, Check.LASTING_RESPONSE), lasting[i].below, own.lasting_below)
             changed = lasts(cells, (*about, either, Check.CHANGE), responses.changes[i], own.changed)
             grown = lasts(cells, (*about, either, Check.CHANGE), responses.grown[i], own.grown)

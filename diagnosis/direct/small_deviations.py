@@ -17,7 +17,8 @@ from diagnosis.direct.low_speed import left_open
 from diagnosis.results.assessment import Assessment, Finding
 from replay.faults import FaultMode
 
-_SMALL = 0.1  # of the span, root mean square: a larger deviation is none of a healthy valve, whatever the others do
+_SMALL = 0.1  # of the span, root mean square: a larger deviation is none of a healthy valve, whatever is usual
+_SMALL_OTHERS = 0.15  # the same while others are off as well
 _SHARE, _SHARE_OTHERS = 0.2, 0.3  # of its command, likewise: by habit, and while others are off as well
 _WINDOW_S, _KNOWN, _WINDOWS = 2.0, 0.25, 4  # s; of it, in which readings come; fewer windows show nothing
 _USUAL, _BEYOND = 0.9, 1.8  # quantile of the windows, and times it
@@ -94,5 +95,6 @@ def _off(finding: Finding, one: IdentifiedPair) -> tuple[float | None, float]:
 def _small(finding: Finding, one: IdentifiedPair, usual: float, meanwhile: float) -> bool:
     """Whether a position is off by little beside what is usual, or meanwhile of others [unit], and by a small share of its command."""
     off, asked = _off(finding, one)
-    most = max(min(_BEYOND * usual, _SHARE * asked), min(_BEYOND_OTHERS * meanwhile, _SHARE_OTHERS * asked))
-    return off is not None and off < min(most, _SMALL * one.pair.span)
+    by_habit = min(_BEYOND * usual, _SHARE * asked, _SMALL * one.pair.span)
+    as_others = min(_BEYOND_OTHERS * meanwhile, _SHARE_OTHERS * asked, _SMALL_OTHERS * one.pair.span)
+    return off is not None and off < max(by_habit, as_others)

@@ -10,9 +10,13 @@ import pytest
 
 from diagnosis.clearing.axles import _alone
 from diagnosis.clearing.cells import Frame
-from diagnosis.clearing.limits import response_limits, usual_limits
+from diagnosis.clearing.limits import long_limit, response_limits, usual_limits
+from diagnosis.clearing.longer import LONG_S, around, longer
 from diagnosis.clearing.openings import openings_tell
 from diagnosis.clearing.responses import Responses, Usual, growth
+from diagnosis.results.clearing import Check, Checked
+from diagnosis.results.vocabulary import Kind
+from replay.faults import Side
 
 ONCE, TWICE, CLEAR_AT = (False, False), (True, True), 0.25
 
@@ -33,7 +37,8 @@ def test_a_wheel_that_deviates_alone_is_held_to_a_lower_limit() -> None:
     still = responses(0.0, 0.0, 0.0, 0.0, changes=(0.15, 0.01, 0.01, None))
     assert response_limits(still, [ONCE] * 4, CLEAR_AT)[0].changed == pytest.approx(0.035)
     half = response_limits(of, [(True, False)] * 4, CLEAR_AT)[0]
-    assert half.below == half.changed == pytest.approx(0.1)  # where openings are measured, less hangs on it
+    assert half.below == pytest.approx(0.1)  # where openings are measured, less hangs on it
+    assert half.changed == first.changed  # but not on a change
     assert (first.lasting_below, first.lasting_above) == (usual.lasting_below, usual.lasting_above)
     assert second.below == usual.below  # another wheel deviates by far more
 
@@ -49,7 +54,7 @@ def test_a_wheel_that_is_measured_twice_on_both_sides_keeps_its_limit_of_what_is
 def test_a_change_that_one_wheel_alone_makes_counts_although_it_is_measured_twice() -> None:
     of = responses(0.0, 0.0, 0.0, 0.0, changes=(0.3, 0.02, 0.01, 0.02))
     first, *others = response_limits(of, [TWICE] * 4, CLEAR_AT)
-    assert first.changed == pytest.approx(0.16)
+    assert first.changed == pytest.approx(0.044)
     assert all(limit.changed == usual_limits(TWICE, CLEAR_AT).changed for limit in others)
 
 
@@ -132,3 +137,34 @@ def test_a_loss_over_the_mission_of_one_wheel_alone_counts_where_nothing_is_meas
     alike = of._replace(usual=[Usual(0.07), Usual(0.04), Usual(0.0), Usual(0.0)])
     assert response_limits(alone, [ONCE] * 4, CLEAR_AT)[0].lasting_below == pytest.approx(0.06)
     assert response_limits(alike, [ONCE] * 4, CLEAR_AT)[0].lasting_below == usual.lasting_below
+
+
+def test_what_one_wheel_loses_for_ten_seconds_stands_out_where_three_do_not_show_it() -> None:
+    rng = np.random.default_rng(5)
+    windows = rng.normal(0.0, 0.03, (140, 4))
+    windows[40:64, 1] += 0.09  # twelve seconds
+    explained = {"FL": np.zeros(140, np.bool_)}
+    of: Any = SimpleNamespace(
+        dt=0.1,
+        frame=Frame(1425, 30, 5),
+        machine=SimpleNamespace(wheels=("FR", "FL", "RR", "RL")),
+        explained=lambda wheel: explained.get(wheel, np.zeros(140, np.bool_)),
+    )
+    long = longer(of, windows)
+    assert long.shape == windows.shape
+    assert int(np.nanargmax(long[:, 1])) == pytest.approx(52, abs=6)  # in its middle
+    assert long[52, 1] == pytest.approx(windows[45:60, 1].mean())
+    most = [float(x) for x in np.nanmax(long, axis=0)]
+    assert most[1] > long_limit(most, 1, 0.288) == pytest.approx(max(0.06, 3.0 * max(most[0], *most[2:])))
+    assert most[0] < long_limit(most, 0, 0.288)
+    explained["FL"][38:66] = True  # stated
+    assert np.nanmax(longer(of, windows)[:, 1]) < 0.06
+    explained = {wheel: np.zeros(8, np.bool_) for wheel in of.machine.wheels}
+    assert np.isnan(longer(of, windows[:8])).all()  # shorter than that
+
+
+def test_a_value_over_ten_seconds_is_told_with_all_of_them() -> None:
+    check = Checked(Kind.WHEEL, "FR", Side.SENSOR_OR_ACTUATOR, Check.RESPONSE, 0.2, 0.1, 20.0, 23.0)
+    whole = around(check)
+    assert (whole.start_s, whole.stop_s) == (16.5, 26.5)
+    assert whole.stop_s - whole.start_s == LONG_S
