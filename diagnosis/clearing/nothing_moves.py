@@ -50,15 +50,16 @@ def _nothing_moves(cells: Cells) -> Flags:
     fast = np.abs(np.nan_to_num(speed)).max(axis=1) > _HELD * cells.machine.max_speed
     rests = ~fast & (np.count_nonzero(moves, axis=1) <= (1 if count > _WHEELS else 0))
     rests &= np.isfinite(speed[:, known]).all(axis=1)
+    driven = ~(np.abs(cells.reference[:, known]) <= rest).all(axis=1)  # else held on a slope: told to stand, they stand
     axles = _axles(cells)
     turns, stands = axles.turns, axles.stands
 
     def open_(least: Array) -> NDArray[np.intp]:
         return np.asarray(np.count_nonzero((passed >= least)[:, known], axis=1))
 
-    enough = open_(np.maximum(_OPEN, least)) > 0.5 * count
+    enough = driven & (open_(np.maximum(_OPEN, least)) > 0.5 * count)
     still = _lasting(enough & rests, _cells_in(_LEAST_S, cells))
-    half = open_(np.maximum(_OPEN, _LESS * least)) >= 0.5 * count
+    half = driven & (open_(np.maximum(_OPEN, _LESS * least)) >= 0.5 * count)
     still |= _lasting(half & rests & stands, _cells_in(_LEAST_WITH_AXLE_S, cells))
     stopped = _until(_lasting(enough & rests, _cells_in(_BRIEF_S, cells)), ~rests)
     still |= _lasting(stopped & rests & stands, _cells_in(_LEAST_WITH_AXLE_S, cells))

@@ -32,7 +32,12 @@ def mission(speeds: dict[str, Array], openings: dict[str, Array], angle: Array, 
     columns |= {f"wheel.{w}.u": x for w, x in openings.items()}
     columns |= {f"steer.{AXLES[0]}.phi": angle, f"steer.{AXLES[0]}.u": steered}
     timeline = cast(Timeline, SimpleNamespace(dt=DT, size=SIZE, get=columns.get))
-    return Cells(timeline, cast(Replay, SimpleNamespace()), MACHINE)
+    return Cells(timeline, told(np.full(SIZE, np.nan)), MACHINE)
+
+
+def told(speed: Array) -> Replay:
+    """A replay in which every wheel is told such a speed [of the top speed]."""
+    return cast(Replay, SimpleNamespace(v_ref=np.outer(speed * MACHINE.max_speed, np.ones(len(WHEELS)))))
 
 
 def driving(stands: tuple[str, ...] = WHEELS, when: NDArray[np.bool_] = STALLED, steered: float = 0.4) -> Cells:
@@ -84,7 +89,7 @@ def test_axles_that_stand_together_at_rest_are_the_supplys(
         moved = np.where(stands if turns_at_rest or axle not in axles else rests, 0.0, command)
         columns |= {f"steer.{axle}.phi": 0.3 * np.cumsum(moved) * DT, f"steer.{axle}.u": command}
     timeline = cast(Timeline, SimpleNamespace(dt=DT, size=SIZE, get=columns.get))
-    cells = Cells(timeline, cast(Replay, SimpleNamespace()), MACHINE)
+    cells = Cells(timeline, told(np.full(SIZE, np.nan)), MACHINE)
     assert (supply_gone(cells) is not None) is stalls
 
 
@@ -97,6 +102,12 @@ def test_an_axle_that_stands_after_open_drives_stopped_is_the_supplys(opened_s: 
     angle = 0.3 * np.cumsum(np.where(rests, 0.0, command)) * DT
     cells = mission(dict.fromkeys(WHEELS, DRIVEN * 0.8 * ~rests), openings, angle, command)
     assert (supply_gone(cells) is not None) is stalls
+
+
+@pytest.mark.parametrize(("speed", "stalls"), [(0.0, False), (0.4, True)])
+def test_a_machine_that_is_held_on_a_slope_follows_its_command(speed: float, *, stalls: bool) -> None:
+    cells = replace(driving(), replay=told(np.where(STALLED, speed, 0.8 * DRIVEN)))
+    assert nothing_moves(cells).any() == stalls
 
 
 def test_a_moment_is_no_stall() -> None:
