@@ -21,6 +21,8 @@ _DEVIATION, _FOLLOWING = 4.0, 10
 def refined_valve(finding: Finding, deviation: Array | None, length: int) -> Finding:
     """Move a valve fault's ends, known to a block, to the samples in which its position leaves and meets its command.
 
+    Where it goes with its command for a while, the fault begins with the first sample in which it does not.
+
     Parameters
     ----------
     finding : Finding
@@ -34,6 +36,8 @@ def refined_valve(finding: Finding, deviation: Array | None, length: int) -> Fin
         return finding
     reach = 5 * length + 2
     start, size = _first_deviation(deviation, finding.start, reach), deviation.size
+    if start == finding.start:  # a valve at rest that is told to rest: what it does shows from its next command on
+        start += _first_deviation(deviation[start : finding.stop], 0, finding.stop - start)
     stop = size - _first_deviation(deviation[::-1], size - finding.stop, reach) if finding.stop < size else size
     return replace(finding, start=start, stop=stop) if start < stop else finding
 
