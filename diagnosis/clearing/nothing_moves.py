@@ -15,6 +15,7 @@ Flags = NDArray[np.bool_]
 
 _LAG_S = 0.15  # of a valve and its drive: a command that has only just come has moved nothing yet
 _RESTS, _TURNS = 0.03, 0.015  # of the top speed; rad/s
+_CREEPS, _CREEPS_S = 0.008, 0.3  # of the top speed, evened over so long: of second speeds, where the first ones are deaf to slow motion
 _HELD = 0.1  # of the top speed: one of four sensors that wait for their next edge may still read so much
 _OPEN = 0.1  # of full opening: from here on a healthy drive moves; beyond the mission's own dead bands as well ...
 _MOVES = 0.95  # ... of the openings at which a wheel moves, so many lie above them
@@ -24,6 +25,7 @@ _LEAST_WITH_AXLE_S, _STEERED, _LESS = 0.5, 0.3, 0.5
 _BRIEF_S = 0.2  # for which open drives stood before an axle does: too brief by itself
 _AXLES = 2  # that stand together where the drives are told to rest: one alone has a fault
 _EDGES = 2  # cells, for a rate
+_SECONDS = 2
 _ELSEWHERE = 5.0  # times as long do wheels move at such openings
 
 
@@ -49,7 +51,7 @@ def _nothing_moves(cells: Cells) -> Flags:
     count = np.count_nonzero(known)
     fast = np.abs(np.nan_to_num(speed)).max(axis=1) > _HELD * cells.machine.max_speed
     rests = ~fast & (np.count_nonzero(moves, axis=1) <= (1 if count > _WHEELS else 0))
-    rests &= np.isfinite(speed[:, known]).all(axis=1)
+    rests &= np.isfinite(speed[:, known]).all(axis=1) & ~_creeps(cells, second)
     driven = ~(np.abs(cells.reference[:, known]) <= rest).all(axis=1)  # else held on a slope: told to stand, they stand
     axles = _axles(cells)
     turns, stands = axles.turns, axles.stands
@@ -66,6 +68,16 @@ def _nothing_moves(cells: Cells) -> Flags:
     still |= _axles_alone(axles, rests, cells)
     drives = np.count_nonzero(enough & moves[:, known].all(axis=1))
     return _until(still, ~rests | turns) if drives > _ELSEWHERE * np.count_nonzero(still) else none
+
+
+def _creeps(cells: Cells, second: Array) -> Flags:
+    """Cells in which second speeds (cells, wheels) show that most of their wheels roll on slowly, shape (cells,); none without two."""
+    measured = np.isfinite(second).any(axis=0)
+    if np.count_nonzero(measured) < _SECONDS:
+        return np.zeros(cells.size, np.bool_)
+    evened = np.abs(np.nan_to_num(lowest_passed(second[:, measured], cells.dt, _CREEPS_S)))
+    slow = np.count_nonzero(evened > _CREEPS * cells.machine.max_speed, axis=1)
+    return np.asarray(slow > 0.5 * np.count_nonzero(measured))
 
 
 def _cells_in(seconds: float, cells: Cells) -> int:

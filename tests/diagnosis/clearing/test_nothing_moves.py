@@ -110,6 +110,19 @@ def test_a_machine_that_is_held_on_a_slope_follows_its_command(speed: float, *, 
     assert nothing_moves(cells).any() == stalls
 
 
+@pytest.mark.parametrize(("creeps", "stalls"), [(0.02, False), (0.0, True)])
+def test_second_speeds_that_creep_on_show_that_the_first_are_deaf(creeps: float, *, stalls: bool) -> None:
+    cells = driving()
+    rng = np.random.default_rng(2)
+    rolls = np.where(STALLED, creeps, 0.8 * DRIVEN) * MACHINE.max_speed + rng.normal(0.0, 0.002, SIZE)
+    columns = {f"wheel.{w}.v_true": rolls for w in WHEELS}
+    timeline = cells.timeline
+    both = cast(
+        Timeline, SimpleNamespace(dt=DT, size=SIZE, get=lambda name: columns.get(name, timeline.get(name)))
+    )
+    assert nothing_moves(replace(cells, timeline=both)).any() == stalls
+
+
 def test_a_moment_is_no_stall() -> None:
     assert supply_gone(driving(when=(T >= 40.0) & (T < 40.6))) is None
 
