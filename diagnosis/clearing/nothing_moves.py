@@ -15,7 +15,10 @@ Flags = NDArray[np.bool_]
 
 _LAG_S = 0.15  # of a valve and its drive: a command that has only just come has moved nothing yet
 _RESTS, _TURNS = 0.03, 0.015  # of the top speed; rad/s
-_CREEPS, _CREEPS_S = 0.008, 0.3  # of the top speed, evened over so long: of second speeds, where the first ones are deaf to slow motion
+_CREEPS, _CREEPS_S = (
+    0.008,
+    0.3,
+)  # of the top speed, evened over so long: of second speeds, where the first ones are deaf to slow motion
 _HELD = 0.1  # of the top speed: one of four sensors that wait for their next edge may still read so much
 _OPEN = 0.1  # of full opening: from here on a healthy drive moves; beyond the mission's own dead bands as well ...
 _MOVES = 0.95  # ... of the openings at which a wheel moves, so many lie above them

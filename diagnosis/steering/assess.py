@@ -15,6 +15,7 @@ from diagnosis.results.sizes import amount
 from diagnosis.results.vocabulary import Tier
 from diagnosis.steering.acquittal import acquitted, moves_otherwise, scatter_of
 from diagnosis.steering.agreed import without_agreed
+from diagnosis.steering.alike_angles import not_scaled_together
 from diagnosis.steering.blocks import SteeringBlocks, without_growth
 from diagnosis.steering.denied import not_denied
 from diagnosis.steering.driven import driven_by
@@ -133,6 +134,7 @@ def assess_steering(
     )
     single = {a.name for a in axles if a.redundant and not a.angle_redundant}  # their openings alone are measured
     alone |= not_shaken_together({n: one.sides for n, one in told.items() if n not in once}, length, timeline.dt)
+    alone |= not_scaled_together({n: alone[n] for n in told if n not in once}, axles, length, machine.limits.clear_at)
     alone |= not_starved({n: alone[n] for n in told if n in single}, {n: one.axle for n, one in told.items()})
     assessments: dict[Part, Assessment] = {}
     angles: list[Array] = []

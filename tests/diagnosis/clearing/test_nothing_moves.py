@@ -117,9 +117,7 @@ def test_second_speeds_that_creep_on_show_that_the_first_are_deaf(creeps: float,
     rolls = np.where(STALLED, creeps, 0.8 * DRIVEN) * MACHINE.max_speed + rng.normal(0.0, 0.002, SIZE)
     columns = {f"wheel.{w}.v_true": rolls for w in WHEELS}
     timeline = cells.timeline
-    both = cast(
-        Timeline, SimpleNamespace(dt=DT, size=SIZE, get=lambda name: columns.get(name, timeline.get(name)))
-    )
+    both = cast(Timeline, SimpleNamespace(dt=DT, size=SIZE, get=lambda name: columns.get(name, timeline.get(name))))
     assert nothing_moves(replace(cells, timeline=both)).any() == stalls
 
 

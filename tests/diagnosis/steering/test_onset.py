@@ -18,7 +18,9 @@ SIZE = 7000
 def finding(start: int, stop: int) -> Finding:
     """A valve without signal, its ends on blocks."""
     row = (Side.ACTUATOR.value, FaultMode.NO_SIGNAL.value)
-    return Finding(start, stop, Side.ACTUATOR, FaultMode.NO_SIGNAL, 0.96, (Hypothesis(*row, 0.96),), None, None, (), Tier.MODEL)
+    return Finding(
+        start, stop, Side.ACTUATOR, FaultMode.NO_SIGNAL, 0.96, (Hypothesis(*row, 0.96),), None, None, (), Tier.MODEL
+    )
 
 
 def deviation(*spans: tuple[int, int]) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
