@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from diagnosis.clearing.cells import Array, Cells
 from diagnosis.clearing.measure import lowest_passed
-from diagnosis.clearing.responses import LAG_S, Responses
+from diagnosis.clearing.responses import LAG_S, MOVING, USUAL_TOP, Responses
 from diagnosis.estimation.valve_map import effective
 from replay.machine.config import WheelPlant
 
@@ -14,10 +16,14 @@ from replay.machine.config import WheelPlant
 LIMIT = 0.65
 _LEAST_WINDOWS = 8
 _UNSEEN = 0.1  # of the expected speed, by which the file does not know it
+_HELD = 8.0  # times as much does the ground hold a wheel as its own valve drives it: its own map is hardly known, that of all wheels is
 
 
 def beside_plant(cells: Cells, opening: Array, responses: Responses) -> list[float | None]:
     """ln of each wheel's usual speed over what its [plant] gives at the same openings; None where that is not known.
+
+    Wheels that the ground holds much more than their valves drive them are asked together: a fit of one mission and another shares
+    what all of them give between them by chance.
 
     Parameters
     ----------
@@ -29,21 +35,43 @@ def beside_plant(cells: Cells, opening: Array, responses: Responses) -> list[flo
         Of the wheels, which say where they are settled.
     """
     plants = cells.machine.plant.wheels
-    return [
-        _beside(cells, i, opening[:, i], plant, responses) if (plant := plants.get(wheel)) is not None else None
-        for i, wheel in enumerate(cells.machine.wheels)
-    ]
+    wheels = list(cells.machine.wheels)
+    logs: list[float | None] = [None] * len(wheels)
+    sums: dict[int, tuple[float, float]] = {}
+    for i, wheel in enumerate(wheels):
+        if (plant := plants.get(wheel)) is None:
+            continue
+        moved, expected = _moved(cells, i, opening[:, i], plant, responses)
+        if (plant.grip or 0.0) > _HELD:
+            sums[i] = float(moved.sum()), float(expected.sum())
+        else:
+            logs[i] = _usual(cells, moved, expected, wheel)
+    together = _together(list(sums.values()), cells)
+    return [together if i in sums else log for i, log in enumerate(logs)]
 
 
-def _beside(cells: Cells, i: int, opening: Array, plant: WheelPlant, responses: Responses) -> float | None:
-    given, unseen, _ = effective(opening, plant)
-    passed = lowest_passed(plant.K * given, cells.dt, max(plant.tau, LAG_S))
-    known = np.isfinite(opening) & (unseen * plant.K <= _UNSEEN * np.abs(passed))
-    moved = responses.weight[:, i] * known
-    expected = np.where(moved > 0.0, np.abs(passed), 0.0)
+def _together(sums: Sequence[tuple[float, float]], cells: Cells) -> float | None:
+    """ln of the speeds of some wheels over what their [plant] gives, together; None where too little is known."""
+    moved, expected = (sum(x) for x in zip(*sums, strict=True)) if sums else (0.0, 0.0)
+    least = _LEAST_WINDOWS * cells.frame.hop * MOVING / USUAL_TOP * cells.machine.max_speed
+    return float(np.log(moved / expected)) if moved > least and expected > 0.0 else None
+
+
+def _usual(cells: Cells, moved: Array, expected: Array, wheel: str) -> float | None:
+    """Median of ln of a wheel's speed over the expected one in windows that are full of both; None of few."""
     frame = cells.frame
     full = frame.sums((moved > 0.0).astype(np.float64)) >= 0.5 * frame.length
     with np.errstate(divide="ignore", invalid="ignore"):
         log = np.where(full, np.log(frame.sums(moved) / frame.sums(expected)), np.nan)
-    log = log[np.isfinite(log) & ~cells.explained(cells.machine.wheels[i])]
+    log = log[np.isfinite(log) & ~cells.explained(wheel)]
     return float(np.median(log)) if log.size >= _LEAST_WINDOWS else None
+
+
+def _moved(cells: Cells, i: int, opening: Array, plant: WheelPlant, responses: Responses) -> tuple[Array, Array]:
+    """A wheel's speed, and what its [plant] gives at the same openings, where both are known and it is settled, else 0 [m/s], shape (cells,)."""
+    given, unseen, _ = effective(opening, plant)
+    lag = max(plant.tau / (1.0 + (plant.grip or 0.0)), LAG_S)  # the ground makes a wheel quicker
+    passed = lowest_passed(plant.K * given, cells.dt, lag)
+    known = np.isfinite(opening) & (unseen * plant.K <= _UNSEEN * np.abs(passed))
+    moved = responses.weight[:, i] * known
+    return moved, np.where(moved > 0.0, np.abs(passed), 0.0)

@@ -19,10 +19,13 @@ from tests.diagnosis.clearing.missions import LENGTH, signals_of, simulated
 GAIN = 1.0  # of the file, to find what the simulated wheels have
 
 
-def by_file(gain: float | None, *faults: FaultSpec, base: bool = False) -> list[Checked]:
-    """The checks beside a file whose wheels all have this gain [m/s]."""
+def by_file(gain: float | None, *faults: FaultSpec, base: bool = False, held: bool = False) -> list[Checked]:
+    """The checks beside a file whose wheels all have this gain [m/s]; `held`: one has more, one less, and the ground holds them."""
     machine: Machine = haulotte()
     plant = {} if gain is None else {w: WheelPlant(gain, 0.1) for w in machine.wheels}
+    if gain is not None and held:
+        shares = dict(zip(machine.wheels, (1.3, 0.7, 1.0, 1.0), strict=True))
+        plant = {w: WheelPlant(gain * shares[w], 2.0, grip=30.0) for w in machine.wheels}
     machine = replace(machine, plant=Plant(wheels=plant))
     timeline = align(signals_of(simulated(*faults), base=base))
     cells = cells_of(timeline, replay_loop(timeline, machine, bucket_of(timeline.size)), machine)
@@ -47,6 +50,15 @@ def test_what_all_wheels_lose_shows_beside_the_file(own_gain: float, *, base: bo
     found = by_file(own_gain, *lost, base=base)
     assert [c.passed for c in found] == [False] * 4
     assert all("off that of [plant] in the machine file by a factor of 1." in c.text for c in found)
+
+
+def test_wheels_that_the_ground_holds_are_asked_together(own_gain: float) -> None:
+    """How a fit shares among them what all of them give is chance; behind the ground they are quicker than their valves."""
+    sound = by_file(own_gain, held=True)
+    assert all(c.passed for c in sound)
+    assert len({c.worst for c in sound}) == 1
+    lost = [FaultSpec(w, Side.SENSOR, FaultMode.INEFFICIENT, 0.0, LENGTH, 0.3) for w in haulotte().wheels]
+    assert [c.passed for c in by_file(own_gain, *lost, held=True)] == [False] * 4
 
 
 def test_without_a_file_nothing_is_asked() -> None:
