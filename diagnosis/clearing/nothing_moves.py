@@ -28,7 +28,7 @@ _LEAST_WITH_AXLE_S, _STEERED, _LESS = 0.5, 0.3, 0.5
 _BRIEF_S = 0.2  # for which open drives stood before an axle does: too brief by itself
 _AXLES = 2  # that stand together where the drives are told to rest: one alone has a fault
 _EDGES = 2  # cells, for a rate
-_SECONDS = 2
+_SECONDS, _HALF = 2, 0.5
 _ELSEWHERE = 5.0  # times as long do wheels move at such openings
 
 
@@ -54,20 +54,21 @@ def _nothing_moves(cells: Cells) -> Flags:
     count = np.count_nonzero(known)
     fast = np.abs(np.nan_to_num(speed)).max(axis=1) > _HELD * cells.machine.max_speed
     rests = ~fast & (np.count_nonzero(moves, axis=1) <= (1 if count > _WHEELS else 0))
-    rests &= np.isfinite(speed[:, known]).all(axis=1) & ~_creeps(cells, second)
-    driven = ~(np.abs(cells.reference[:, known]) <= rest).all(axis=1)  # else held on a slope: told to stand, they stand
+    rests &= np.isfinite(speed[:, known]).all(axis=1)
     axles = _axles(cells)
     turns, stands = axles.turns, axles.stands
 
     def open_(least: Array) -> NDArray[np.intp]:
         return np.asarray(np.count_nonzero((passed >= least)[:, known], axis=1))
 
-    enough = driven & (open_(np.maximum(_OPEN, least)) > 0.5 * count)
+    enough = open_(np.maximum(_OPEN, least)) > 0.5 * count
     still = _lasting(enough & rests, _cells_in(_LEAST_S, cells))
-    half = driven & (open_(np.maximum(_OPEN, _LESS * least)) >= 0.5 * count)
+    half = open_(np.maximum(_OPEN, _LESS * least)) >= 0.5 * count
     still |= _lasting(half & rests & stands, _cells_in(_LEAST_WITH_AXLE_S, cells))
     stopped = _until(_lasting(enough & rests, _cells_in(_BRIEF_S, cells)), ~rests)
     still |= _lasting(stopped & rests & stands, _cells_in(_LEAST_WITH_AXLE_S, cells))
+    told_to_stand = (np.abs(cells.reference[:, known]) <= rest).all(axis=1)  # and held on a slope
+    still &= ~_mostly(still, told_to_stand | _creeps(cells, second))
     still |= _axles_alone(axles, rests, cells)
     drives = np.count_nonzero(enough & moves[:, known].all(axis=1))
     return _until(still, ~rests | turns) if drives > _ELSEWHERE * np.count_nonzero(still) else none
@@ -124,6 +125,15 @@ def _lasting(flags: Flags, least: int) -> Flags:
     out = np.zeros(flags.size, np.bool_)
     for a, b in zip(edges[::2], edges[1::2], strict=True):
         out[a:b] = b - a >= least
+    return out
+
+
+def _mostly(flags: Flags, other: Flags) -> Flags:
+    """Stretches for most of which something else holds as well."""
+    edges = np.flatnonzero(np.diff(np.r_[False, flags, False].astype(np.int8)))
+    out = np.zeros(flags.size, np.bool_)
+    for a, b in zip(edges[::2], edges[1::2], strict=True):
+        out[a:b] = np.mean(other[a:b]) > _HALF
     return out
 
 
