@@ -68,7 +68,7 @@ def _nothing_moves(cells: Cells) -> Flags:
     stopped = _until(_lasting(enough & rests, _cells_in(_BRIEF_S, cells)), ~rests)
     still |= _lasting(stopped & rests & stands, _cells_in(_LEAST_WITH_AXLE_S, cells))
     told_to_stand = (np.abs(cells.reference[:, known]) <= rest).all(axis=1)  # and held on a slope
-    still &= ~_mostly(still, told_to_stand | _creeps(cells, second))
+    still &= ~_mostly(still, told_to_stand) & ~_mostly(still, _creeps(cells, second))
     still |= _axles_alone(axles, rests, cells)
     drives = np.count_nonzero(enough & moves[:, known].all(axis=1))
     return _until(still, ~rests | turns) if drives > _ELSEWHERE * np.count_nonzero(still) else none
@@ -79,7 +79,8 @@ def _creeps(cells: Cells, second: Array) -> Flags:
     measured = np.isfinite(second).any(axis=0)
     if np.count_nonzero(measured) < _SECONDS:
         return np.zeros(cells.size, np.bool_)
-    evened = np.abs(np.nan_to_num(lowest_passed(second[:, measured], cells.dt, _CREEPS_S)))
+    width = np.ones(_cells_in(_CREEPS_S, cells)) / _cells_in(_CREEPS_S, cells)
+    evened = np.abs(np.column_stack([np.convolve(x, width, mode="same") for x in np.nan_to_num(second[:, measured]).T]))
     slow = np.count_nonzero(evened > _CREEPS * cells.machine.max_speed, axis=1)
     return np.asarray(slow > 0.5 * np.count_nonzero(measured))
 
