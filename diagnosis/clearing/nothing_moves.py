@@ -28,7 +28,7 @@ _LEAST_WITH_AXLE_S, _STEERED, _LESS = 0.5, 0.3, 0.5
 _BRIEF_S = 0.2  # for which open drives stood before an axle does: too brief by itself
 _AXLES = 2  # that stand together where the drives are told to rest: one alone has a fault
 _EDGES = 2  # cells, for a rate
-_SECONDS, _HALF = 2, 0.5
+_SECONDS, _HALF, _NEARLY_ALL = 2, 0.5, 0.8
 _ELSEWHERE = 5.0  # times as long do wheels move at such openings
 
 
@@ -68,7 +68,7 @@ def _nothing_moves(cells: Cells) -> Flags:
     stopped = _until(_lasting(enough & rests, _cells_in(_BRIEF_S, cells)), ~rests)
     still |= _lasting(stopped & rests & stands, _cells_in(_LEAST_WITH_AXLE_S, cells))
     told_to_stand = (np.abs(cells.reference[:, known]) <= rest).all(axis=1)  # and held on a slope
-    still &= ~_mostly(still, told_to_stand) & ~_mostly(still, _creeps(cells, second))
+    still &= ~_mostly(still, told_to_stand, _NEARLY_ALL) & ~_mostly(still, _creeps(cells, second), _HALF)
     still |= _axles_alone(axles, rests, cells)
     drives = np.count_nonzero(enough & moves[:, known].all(axis=1))
     return _until(still, ~rests | turns) if drives > _ELSEWHERE * np.count_nonzero(still) else none
@@ -129,12 +129,12 @@ def _lasting(flags: Flags, least: int) -> Flags:
     return out
 
 
-def _mostly(flags: Flags, other: Flags) -> Flags:
-    """Stretches for most of which something else holds as well."""
+def _mostly(flags: Flags, other: Flags, most: float) -> Flags:
+    """Stretches for more than a share of which something else holds as well."""
     edges = np.flatnonzero(np.diff(np.r_[False, flags, False].astype(np.int8)))
     out = np.zeros(flags.size, np.bool_)
     for a, b in zip(edges[::2], edges[1::2], strict=True):
-        out[a:b] = np.mean(other[a:b]) > _HALF
+        out[a:b] = np.mean(other[a:b]) > most
     return out
 
 
