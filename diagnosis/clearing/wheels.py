@@ -14,6 +14,7 @@ from diagnosis.clearing.longer import around, longer
 from diagnosis.clearing.measure import alone, compared, lasts, late, off_commands, times, worst
 from diagnosis.clearing.opening_offsets import opening_offsets
 from diagnosis.clearing.openings import openings_tell
+from diagnosis.clearing.pairs import FALLS, pairs_fall
 from diagnosis.clearing.plant_response import LIMIT, beside_plant
 from diagnosis.clearing.responses import OTHERS, USUAL_TOP, largest, others_at, responses_of
 from diagnosis.clearing.same_side import beside_its_side
@@ -71,7 +72,7 @@ def wheel_checks(cells: Cells, clear_at: float) -> Iterator[Checked]:
     tracking, rough = _tracking(cells, speed, reference), _rough_beside_others(roughness_of(cells, speed, reference))
     rough = np.fmax(rough, wild_readings(cells, speed, FLOOR * cells.machine.max_speed))
     worst_tracking, roughest = ([float(x) for x in largest(z)] for z in (tracking, rough))
-    beside = beside_its_side(cells, responses)
+    beside, together = beside_its_side(cells, responses), pairs_fall(responses)
     offsets = opening_offsets(cells, speed, used)
     by_file = beside_plant(cells, used, responses)
     most_off = [float(x) for x in largest(offsets[0])], [float(x) for x in offsets[1]]
@@ -116,7 +117,9 @@ def wheel_checks(cells: Cells, clear_at: float) -> Iterator[Checked]:
             yield lasts(cells, (*about, either, Check.LASTING_RESPONSE), lasting[i].below, own.lasting_below)
             changed = lasts(cells, (*about, either, Check.CHANGE), responses.changes[i], own.changed)
             grown = lasts(cells, (*about, either, Check.CHANGE), responses.grown[i], own.grown)
-            yield max(changed, grown, key=times)
+            both = float(together[i]) if np.isfinite(together[i]) else None
+            falls = lasts(cells, (*about, either, Check.CHANGE), both, -FALLS * float(np.log1p(-clear_at)))
+            yield max(changed, grown, falls, key=times)
             if not all(twice[i]):  # of a wheel that is measured twice on both sides, it is the ground's doing
                 yield worst(cells, (*about, either, Check.EXCESS), windows[:, i], own.above, apart=True)
                 yield lasts(cells, (*about, either, Check.LASTING_EXCESS), lasting[i].above, own.lasting_above)

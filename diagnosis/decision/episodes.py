@@ -2,7 +2,7 @@
 
 A constant loss that shows only while the wheel is driven hard is found in pieces. Between them nothing can be judged; where the part
 was seen to be healthy for longer, the pieces are faults of their own. A share lost of little is little: what is called healthy while the
-reference hardly moves counts by how far the loss would show there. Losses that touch are one that grows or fades. A shorter piece
+reference hardly moves counts by how far the loss would show there, and so by how far a delay would, while it hardly changes. Losses that touch are one that grows or fades. A shorter piece
 beside a fault, of which no row is probable enough to give it a name and that may be of the row of that fault, is the end or the
 beginning of it.
 """
@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from diagnosis.results.assessment import CODE, Assessment, Finding
 from diagnosis.results.candidates import candidates
 from diagnosis.results.result import Epsilon
-from diagnosis.results.sentence import About, stated_anew
+from diagnosis.results.sentence import About, Sentence, is_about, stated_anew
 from diagnosis.results.vocabulary import Tier
 from replay.arrays.envelope import bucket_of, step_of
 from replay.faults import TOTAL, FaultMode, State
@@ -30,6 +30,12 @@ _SEEN_BY_MODELS_S = 0.5
 _SEEN_SCALED_S = (
     0.3  # what loses a share looks healthy while its reference passes zero; seconds in which the loss would show
 )
+_AS_LATE, _EVEN_S = (
+    0.25,
+    0.5,
+)  # of a delay, by which two may differ; over which a reference is evened before it is asked how it changes
+_SEEN_LATE_S = 2.0  # likewise of a delay: the changes at both ends of the gap, evened, are such seconds
+_CHANGES = 0.1  # of ε̂: a bound that is wider than this to either side has the course of a loss in it
 _SPARE = 0.1  # of ε̂: by which two bounds may miss each other
 _NAMED = 6
 _TOUCHES_S = 0.1
@@ -132,12 +138,25 @@ def _continues(a: Finding, b: Finding, sides: Mapping[str, Assessment], dt: floa
     if (a.side, a.mode, a.tier) != (b.side, b.mode, b.tier) or b.start < a.stop:
         return False
     usual = _SEEN_HEALTHY_S.get(a.tier, _SEEN_BY_MODELS_S)
-    seen = _healthy_steps(a, b, sides) * dt >= (max(usual, _SEEN_SCALED_S) if a.mode.scaled else usual)
+    least = _SEEN_LATE_S if _late_s(a) > 0.0 else max(usual, _SEEN_SCALED_S) if a.mode.scaled else usual
+    seen = _healthy_steps(a, b, sides, dt) * dt >= least
     changes = a.mode is FaultMode.INEFFICIENT and (b.start - a.stop) * dt <= _TOUCHES_S  # a loss that grows or fades
-    return not seen and (changes or _alike(a.epsilon, b.epsilon)) and _same_value(a, b)
+    return not seen and (changes or _alike(a.epsilon, b.epsilon)) and _same_value(a, b) and _as_late(a, b)
 
 
-def _healthy_steps(a: Finding, b: Finding, sides: Mapping[str, Assessment]) -> float:
+def _as_late(a: Finding, b: Finding) -> bool:
+    """Whether two findings are late by as much, or neither is late."""
+    late = sorted((_late_s(a), _late_s(b)))
+    return late[1] - late[0] <= _AS_LATE * late[1]
+
+
+def _late_s(f: Finding) -> float:
+    """Delay of which a finding is [s], 0 of any other."""
+    late = (float(text.parts[1]) for text in f.evidence if isinstance(text, Sentence) and is_about(text, About.LATE))
+    return 1e-3 * next(late, 0.0)
+
+
+def _healthy_steps(a: Finding, b: Finding, sides: Mapping[str, Assessment], dt: float) -> float:
     """Steps between two findings in which what they may be of is seen to be healthy, or gives no data.
 
     A side of which nothing healthy is ever said, as of a drive without effort, does not speak against a sensor that reads right. A
@@ -146,27 +165,42 @@ def _healthy_steps(a: Finding, b: Finding, sides: Mapping[str, Assessment]) -> f
     known = [sides[s.value] for s in a.side.sides if s.value in sides]
     telling = [one for one in known if np.any(one.states == CODE[State.HEALTHY])] or known
     counts = [
-        np.where(s == CODE[State.HEALTHY], _shows(a, b, one), s == CODE[State.NO_DATA])
+        np.where(s == CODE[State.HEALTHY], _shows(a, b, one, dt), s == CODE[State.NO_DATA])
         for one in telling
         for s in [one.states[a.stop : b.start]]
     ]
     return float(np.sum(np.minimum.reduce(counts)))
 
 
-def _shows(a: Finding, b: Finding, one: Assessment) -> NDArray[np.float64]:
-    """How far the lesser loss of a share would show at each step between two findings [1]: its square beside the threshold's, 1 at most.
+def _shows(a: Finding, b: Finding, one: Assessment, dt: float) -> NDArray[np.float64]:
+    """How far the lesser loss of a share, or delay, would show at each step between two findings [1]: its square beside the threshold's, 1 at most.
 
     All would of what loses no share, and where the evidence has no such series.
     """
     steps = np.arange(a.stop, b.start)
     expected, threshold = (one.columns.get(name) for name in ("expected", "threshold"))
     sizes = [f.epsilon.value for f in (a, b) if f.epsilon is not None]
-    if not a.mode.scaled or len(sizes) < 2 or expected is None or threshold is None:
+    late = min(_late_s(a), _late_s(b))
+    if not (late > 0.0 or (a.mode.scaled and len(sizes) == 2)) or expected is None or threshold is None:
         return np.ones(steps.size)
-    rows = np.minimum((steps / step_of(bucket_of(one.states.size))).astype(np.intp), len(expected) - 1)
+    step = step_of(bucket_of(one.states.size))
+    rows = np.minimum((steps / step).astype(np.intp), len(expected) - 1)
     with np.errstate(divide="ignore", invalid="ignore"):
-        share = (min(sizes) * np.asarray(expected, np.float64)[rows] / np.asarray(threshold, np.float64)[rows]) ** 2
+        known = np.asarray(expected, np.float64)
+        off = _lags(known, late, step * dt) if late > 0.0 else min(sizes) * known
+        share = (off[rows] / np.asarray(threshold, np.float64)[rows]) ** 2
     return np.minimum(np.nan_to_num(share, nan=1.0, posinf=1.0), 1.0)
+
+
+def _lags(x: NDArray[np.float64], late: float, dt: float) -> NDArray[np.float64]:
+    """By how much a channel that is so late [s] is off x, evened against its noise, shape (n,) in the unit of x."""
+    width = max(1, round(_EVEN_S / dt))
+    total = np.cumsum(np.r_[np.zeros(width), np.nan_to_num(x), np.full(width, np.nan_to_num(x[-1:])[0])])
+    ahead, behind = (
+        (total[2 * width :] - total[width:-width]) / width,
+        (total[width:-width] - total[: -2 * width]) / width,
+    )
+    return np.asarray(late * (ahead - behind) / (width * dt))
 
 
 def _alike(a: Epsilon | None, b: Epsilon | None) -> bool:
@@ -191,7 +225,12 @@ def _episode(group: Sequence[Finding], dt: float) -> Finding:
     one_size = all(_alike(a.epsilon, b.epsilon) for a, b in pairwise(group))
     spans = [f"{f.start * dt:.1f}–{f.stop * dt:.1f} s{'' if one_size else _lost(f)}" for f in group[:_NAMED]]
     more = f" and {len(group) - _NAMED} more" if len(group) > _NAMED else ""
-    course = f"It shows in {len(group)} stretches ({', '.join(spans)}{more}); between them nothing healthy was seen of this part: one fault."
+    between = (
+        "hardly anything changed, as would show it"
+        if _late_s(longest) > 0.0
+        else "nothing healthy was seen of this part"
+    )
+    course = f"It shows in {len(group)} stretches ({', '.join(spans)}{more}); between them {between}: one fault."
     known = [f.detected for f in group if f.detected is not None]
     return replace(
         longest,
@@ -220,4 +259,7 @@ def _pooled(sizes: Sequence[Epsilon | None], length: NDArray[np.float64]) -> Eps
     weight = np.array([n for _, n in known]) / half**2
     mean = float(weight @ value / weight.sum())
     spread = max(float(np.min(half)), float(np.sqrt(weight @ (value - mean) ** 2 / weight.sum())))
-    return Epsilon(mean, mean - spread, mean + spread)
+    low, high = mean - spread, mean + spread
+    if half.max() > _CHANGES:  # of what grows or fades: the most that it has been
+        high = max(high, *(e.high for e, _ in known))
+    return Epsilon(mean, low, high)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from diagnosis.estimation.lag import low_passed_at
 from diagnosis.results.result import Epsilon
+from diagnosis.results.sentence import About, Sentence
 from diagnosis.results.sizes import amount
 from replay.faults import FaultMode
 
@@ -148,7 +149,8 @@ def causes(y: Array, x: Array, at: NDArray[np.intp], measured: Measured) -> Iter
     words = f"It departs from {reference} by {amount(float(drift[1]), measured.unit, 2)} a second, whatever that is: a drift."
     yield leaves(off - line @ drift, Cause(FaultMode.OUTSIDE_TABLE, words, changes=True))
     seconds, rest = _least(_delayed(at, x, measured), y, measured)
-    yield leaves(rest, _late(f"It comes {1e3 * seconds:.0f} ms after {reference}: a delay.", seconds))
+    words = Sentence(About.LATE, "It comes ", f"{1e3 * seconds:.0f}", f" ms after {reference}: a delay.")
+    yield leaves(rest, _late(words, seconds))
     seconds, rest = _least(_lagged(at, x, measured), y, measured)
     yield leaves(rest, _late(f"It follows {reference} with a time constant of {seconds:.2g} s: a lag.", seconds))
 

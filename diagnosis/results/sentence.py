@@ -23,6 +23,8 @@ class About(StrEnum):
     ONSET = "onset"
     #: The next best explanation, and its probability.
     RIVAL = "rival"
+    #: By how many milliseconds a channel comes late; they are the part in the middle.
+    LATE = "late"
     #: The effort by which a drive was judged.
     EFFORT = "effort"
 

@@ -12,7 +12,7 @@ from diagnosis.decision.episodes import with_episodes
 from diagnosis.decision.intervals import intervals_of
 from diagnosis.results.assessment import CODE, Assessment, Finding
 from diagnosis.results.machine_words import HYDRAULIC
-from diagnosis.results.result import Hypothesis
+from diagnosis.results.result import Epsilon, Hypothesis
 from diagnosis.results.sentence import About, Sentence
 from diagnosis.results.vocabulary import Tier
 from replay.faults import FaultMode, Side, State
@@ -153,3 +153,33 @@ def test_healthy_time_in_which_a_loss_would_not_show_ends_none(expected: float, 
     columns = {"expected": np.full(N, expected, np.float32), "threshold": np.full(N, 0.03, np.float32)}
     found = with_episodes({part: replace(one, columns=columns)}, DT)
     assert len(found[part].findings) == faults
+
+
+def late(start: int, stop: int, ms: int = 300) -> Finding:
+    text = Sentence(About.LATE, "It comes ", f"{ms}", " ms after another: a delay.")
+    return replace(finding(Side.SENSOR, FaultMode.OUTSIDE_TABLE, start, stop), epsilon=None, evidence=(text,))
+
+
+@pytest.mark.parametrize(("second", "steady", "count"), [(300, True, 1), (300, False, 2), (120, True, 2)])
+def test_a_delay_that_shows_at_every_change_is_one_fault(second: int, count: int, *, steady: bool) -> None:
+    """While its reference stays, a channel that is late looks healthy; where it changes, it would not."""
+    found = parts(late(1000, 1500), late(6000, 6500, second), between=State.HEALTHY)
+    t = np.arange(N) / 1000.0
+    expected = np.full(N, 0.3) if steady else 0.3 + 0.2 * np.sin(4.0 * t)
+    columns = {"expected": expected.astype(np.float32), "threshold": np.full(N, 0.01, np.float32)}
+    found = {part: replace(a, columns=columns) for part, a in found.items()}
+    told = with_episodes(found, DT)["FR", "sensor"].findings
+    assert len(told) == count
+    if count == 1:
+        assert "between them hardly anything changed" in told[0].course[-1]
+
+
+def test_the_most_that_a_growing_loss_has_been_is_within_its_bounds() -> None:
+    first, last = (
+        replace(loss(a, a + n), epsilon=Epsilon(value, low, high))
+        for a, n, value, low, high in ((1000, 2500, 0.28, 0.1, 0.45), (3600, 1300, 0.47, 0.3, 0.64))
+    )
+    (one,) = joined(first, last)
+    assert one.epsilon is not None
+    assert one.epsilon.value < 0.47
+    assert one.epsilon.high == 0.64
