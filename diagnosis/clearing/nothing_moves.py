@@ -67,7 +67,7 @@ def _nothing_moves(cells: Cells) -> Flags:
     still |= _lasting(half & rests & stands, _cells_in(_LEAST_WITH_AXLE_S, cells))
     stopped = _until(_lasting(enough & rests, _cells_in(_BRIEF_S, cells)), ~rests)
     still |= _lasting(stopped & rests & stands, _cells_in(_LEAST_WITH_AXLE_S, cells))
-    told_to_stand = (np.abs(cells.reference[:, known]) <= rest).all(axis=1)  # and held on a slope
+    told_to_stand = np.asarray((np.abs(cells.reference[:, known]) <= rest).all(axis=1))  # and held on a slope
     still &= ~_mostly(still, told_to_stand, _NEARLY_ALL) & ~_mostly(still, _creeps(cells, second), _HALF)
     still |= _axles_alone(axles, rests, cells)
     drives = np.count_nonzero(enough & moves[:, known].all(axis=1))
