@@ -102,6 +102,8 @@ def _axles(cells: Cells) -> _Axles:
     if len(angle) < _EDGES or not angle.shape[1]:
         none = np.zeros(cells.size, np.bool_)
         return _Axles(none, none, np.zeros(cells.size, np.intp))
+    sound = np.column_stack([~cells.told(axle) for axle in cells.machine.axles])
+    angle = np.where(sound, angle, np.nan)  # an angle that shakes turns nothing
     turns = np.asarray(np.abs(np.nan_to_num(np.gradient(angle, cells.dt, axis=0))) > _TURNS)
     told = (command > _STEERED) & np.isfinite(angle)
     stands = np.asarray(told.any(axis=1) & ~(told & turns).any(axis=1))
