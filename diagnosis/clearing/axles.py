@@ -200,7 +200,7 @@ def _parted(tried: Sequence[Array]) -> list[float | None]:
     for a, b in pairwise(range(len(out))):
         between = [off[:, a] - off[:, b] for off in tried]
         if min(np.count_nonzero(np.isfinite(x)) for x in between) >= _LEAST_WINDOWS:
-            least = min(_clear_change(x) for x in between)
+            least = float(np.median([_clear_change(x) for x in between]))  # one dead band in three may blur it
             out[a], out[b] = max(out[a] or 0.0, least), max(out[b] or 0.0, least)
     return out
 

@@ -33,6 +33,7 @@ from diagnosis.steering.path_refinement import refine_path
 from diagnosis.steering.plant import SteeringPlant
 from diagnosis.steering.prior import plant_before
 from diagnosis.steering.reliability import commanded, lost_by_model, paired, weighed
+from diagnosis.steering.rests_together import not_resting_together
 from diagnosis.steering.states import REASONS, states_of
 from diagnosis.steering.together import less_sure_all_along, not_shaken_together, not_starved, not_together
 from replay.arrays.processors import each
@@ -136,6 +137,9 @@ def assess_steering(
     alone |= not_shaken_together({n: one.sides for n, one in told.items() if n not in once}, length, timeline.dt)
     alone |= not_scaled_together({n: alone[n] for n in told if n not in once}, axles, length, machine.limits.clear_at)
     alone |= not_starved({n: alone[n] for n in told if n in single}, {n: one.axle for n, one in told.items()})
+    alone = not_resting_together(
+        {n: alone.get(n, one.sides) for n, one in told.items()}, axles, {n: one.axle for n, one in told.items()}
+    )
     assessments: dict[Part, Assessment] = {}
     angles: list[Array] = []
     doubts: list[Flags] = []

@@ -10,6 +10,7 @@ from diagnosis.steering.filter_state import Array
 from diagnosis.steering.path import AxleFilter
 
 LEAST_ASKED_S = 0.35  # for how long a motion must be asked for, to see that it does not come
+_SURELY_ASKED_S = 1.0  # for longer no axle stands in its dead band or sticks
 _FEW_READINGS, _LAPSE_S = 3, 0.1  # readings that agree, seconds without any: no more may be chance, or a message lost
 _STEP = 0.01  # of the full angle: what a sensor that dies leaps by is more
 _TREMBLES = 5  # changes of a reading that lives
@@ -28,10 +29,12 @@ def at_rest(axle: AxleFilter, start: int, stop: int, *, command_logged: bool) ->
 
     Where the valve's command is not logged, nothing else tells a dead sensor from an axle that is told to stay; where it is, an angle
     of few digits may still repeat itself for about as long as it does elsewhere at rest, or always where it never changes there; one that
-    goes on trembling lives. Blocks [start, stop).
+    goes on trembling lives. So does one that reads on from where it stayed after a motion that was asked for briefly: its axle did not make
+    it. Blocks [start, stop).
     """
     blocks = axle.blocks
-    if asked(axle, start, stop)[2] >= LEAST_ASKED_S:
+    motion_s = asked(axle, start, stop)[2]
+    if motion_s >= _SURELY_ASKED_S:
         return False
     known = np.flatnonzero(blocks.count > 0)
     inside = known[(known >= start) & (known < stop)]
@@ -41,8 +44,8 @@ def at_rest(axle: AxleFilter, start: int, stop: int, *, command_logged: bool) ->
     beside = np.r_[before[-1:], after[:1]]
     level = float(np.median(blocks.mean[inside]))
     stays = bool(np.all(np.abs(blocks.mean[beside] - level) < _STEP * axle.model.stop))
-    if not (stays and command_logged):
-        return stays
+    if motion_s >= LEAST_ASKED_S or not (stays and command_logged):
+        return stays  # after a motion that was missed a sensor would read on from elsewhere
     means = blocks.mean[inside]
     if np.count_nonzero(np.diff(means)) >= _TREMBLES and _longest_alike(means) < 0.5 * means.size:
         return True

@@ -44,3 +44,14 @@ def test_an_angle_that_trembles_where_it_rests_lives_and_one_that_only_ever_move
     assert at_rest(axle(mean, command), 0, 900, command_logged=True)
     mean[:900] = 0.0
     assert at_rest(axle(mean, command), 0, 900, command_logged=True)
+
+
+@pytest.mark.parametrize(("asked_s", "after", "rests"), [(0.6, 0.0, True), (0.6, 0.03, False), (1.6, 0.0, False)])
+def test_an_angle_that_reads_on_from_where_it_stayed_missed_no_brief_motion(
+    asked_s: float, after: float, *, rests: bool
+) -> None:
+    """Its axle stood within its dead band; a sensor that was dead would read on from elsewhere, and longer motion is made."""
+    mean, command = np.zeros(N), np.zeros(N)
+    mean[:400:2], mean[600:] = 2e-4, after
+    command[500 : 500 + round(asked_s / 0.02)] = 0.1
+    assert at_rest(axle(mean, command), 400, 600, command_logged=True) is rests
