@@ -46,7 +46,7 @@ def test_an_angle_that_trembles_where_it_rests_lives_and_one_that_only_ever_move
     assert at_rest(axle(mean, command), 0, 900, command_logged=True)
 
 
-@pytest.mark.parametrize(("asked_s", "after", "rests"), [(0.6, 0.0, True), (0.6, 0.03, False), (1.6, 0.0, False)])
+@pytest.mark.parametrize(("asked_s", "after", "rests"), [(0.4, 0.0, True), (0.4, 0.03, False), (1.6, 0.0, False)])
 def test_an_angle_that_reads_on_from_where_it_stayed_missed_no_brief_motion(
     asked_s: float, after: float, *, rests: bool
 ) -> None:
