@@ -115,7 +115,7 @@ def as_followed(cells: Cells, openings: Array, commands: Array, floor: float) ->
     floor : float
         As of `compared`.
     """
-    return _behind(commands, cells.dt, _LAGS_S[_best_lag(cells, openings, commands, floor)])
+    return behind(commands, cells.dt, _LAGS_S[_best_lag(cells, openings, commands, floor)])
 
 
 def off_commands(cells: Cells, openings: Array, commands: Array, floor: float) -> Array:
@@ -127,7 +127,7 @@ def off_commands(cells: Cells, openings: Array, commands: Array, floor: float) -
     if not openings.shape[1]:
         return np.zeros((cells.frame.starts.size, 0))
     best = _best_lag(cells, openings, commands, floor)
-    tried = [_behind(commands, cells.dt, lag) for lag in _LAGS_S[max(0, best - 1) : best + 2]]
+    tried = [behind(commands, cells.dt, lag) for lag in _LAGS_S[max(0, best - 1) : best + 2]]
     off = np.column_stack(
         [np.minimum.reduce([compared(cells, y, x[:, j], floor).off for x in tried]) for j, y in enumerate(openings.T)]
     )
@@ -145,15 +145,15 @@ def _best_lag(cells: Cells, openings: Array, commands: Array, floor: float) -> i
         return 0
 
     def left(k: int) -> float:
-        usual = [compared(cells, y, _behind(x, cells.dt, _LAGS_S[k]), floor).off for y, x in pairs]
+        usual = [compared(cells, y, behind(x, cells.dt, _LAGS_S[k]), floor).off for y, x in pairs]
         known = [float(np.nanquantile(off, _FOLLOWED)) for off in usual if np.isfinite(off).any()]
         return float(np.median(known)) if known else float("inf")
 
     return min(range(len(_LAGS_S)), key=left)
 
 
-def _behind(x: Array, dt: float, lag: float) -> Array:
-    """Columns behind a lag of first order; what is unknown stays so."""
+def behind(x: Array, dt: float, lag: float) -> Array:
+    """Columns (cells, …) behind a lag of first order [s], in their unit; what is unknown stays so."""
     return np.where(np.isfinite(x), lowest_passed(x, dt, lag), np.nan) if lag else x
 
 

@@ -18,6 +18,7 @@ from diagnosis.clearing.pairs import FALLS, pairs_fall
 from diagnosis.clearing.plant_response import LIMIT, beside_plant
 from diagnosis.clearing.responses import OTHERS, USUAL_TOP, largest, others_at, responses_of
 from diagnosis.clearing.same_side import beside_its_side
+from diagnosis.clearing.seconds import off_second
 from diagnosis.clearing.wild import wild_readings
 from diagnosis.results.clearing import Check, Checked
 from diagnosis.results.vocabulary import Kind
@@ -83,14 +84,14 @@ def wheel_checks(cells: Cells, clear_at: float) -> Iterator[Checked]:
         [compared(cells, y, x, CREEPING * top).off for y, x in zip(speed.T, second.T, strict=True)]
     )
     slowly = [float(x) for x in largest(creeping)]
+    apart_from_second = off_second(cells, speed, second, FLOOR * top)
     for i, wheel in enumerate(cells.machine.wheels):
         about = (Kind.WHEEL, wheel)
         if not _known(speed[:, i]):
             continue
         if twice[i][1]:
             about_sensor = (*about, Side.SENSOR, Check.SECOND_MEASUREMENT)
-            off = compared(cells, speed[:, i], second[:, i], FLOOR * top).off
-            driven = worst(cells, about_sensor, off, clear_at, apart=True)
+            driven = worst(cells, about_sensor, apart_from_second[:, i], clear_at, apart=True)
             creeps = worst(cells, about_sensor, creeping[:, i], most_creeping(slowly, i, clear_at), apart=True)
             yield max(driven, creeps, key=times)
         if twice[i][0]:
