@@ -280,6 +280,8 @@ def _act(
         return words.fill(
             "look whether the {wheel} has a {valve} at all: one that has is without power, or its effort is not logged"
         )
+    if lack is Lack.ECHO:
+        return words.fill("record what the {wheels} measure (/joint_states, encoder counts) as wheel.{c}.v")
     if lack is Lack.ANSWER:
         return f"drive for a minute and longer with several speeds, turns and stops, and diagnose that log; or log {second}"
     if lack is Lack.UNIT:
