@@ -55,6 +55,7 @@ from diagnosis.response.sideways import crossed, goes_sideways
 from diagnosis.response.spells import until_back, where_asked
 from diagnosis.response.states import judge
 from diagnosis.response.turning import turning_of, turns_other_way, turns_with, unasked_turn, wrong_yaw_rate
+from diagnosis.response.unlike import unlike_in_motion
 from diagnosis.response.uphill import lower_by_a_load
 from diagnosis.response.witness import witness_of, witnessed
 from diagnosis.results.assessment import Assessment, Finding, Reason
@@ -237,7 +238,7 @@ def assess_response(
     remarks = (*astray, *left_notes, *((_TURNED,) if any(turned.values()) else ()))
     doubts = {w: Reason(j.odd) for w, j in judged.items() if j.odd and not any(side.findings for side in parts[w])}
     doubts |= {w: j.joint.unlike for w, j in judged.items() if j.joint is not None and j.joint.unlike}
-    doubts |= unlike(judged)
+    doubts |= unlike_in_motion(judged, mates, sideways=sideways) | unlike(judged)
     if exchanged or turns_other_way(judged, geometry, turning):
         doubts = dict.fromkeys(judged, Reason(_EXCHANGED)) | doubts
     for w, why in doubts.items():

@@ -14,6 +14,10 @@ from diagnosis.response.turning import Turning
 from diagnosis.results.assessment import Assessment
 
 _END_S = 1.0
+_UNTOLD = (
+    "No command says what the {wheels} should do, so that a factor on one side, or on all of them, from the start of the log to its end would not show, "
+    "and is not assessed: log the commands (cmd.v, cmd.omega)."
+)
 OTHERWISE = "it keeps to its command, but the gyro shows that one side of the machine goes otherwise than it reads"
 
 
@@ -44,7 +48,8 @@ def by_the_gyro(
     """
     one = judged[wheel]
     if not one.response.answered:
-        return sensor
+        untold = not np.isfinite(one.data.asked).any() and len(judged) > 1
+        return replace(sensor, hidden=_UNTOLD) if untold else sensor
     several = len(judged) > 1
     if several or one.view is None:
         sensor = replace(sensor, hidden=unseen(sought, several=several))
