@@ -29,7 +29,12 @@ def told(sought: Sought, turning: Turning | None, block_s: float) -> tuple[str, 
 
 
 def by_the_gyro(
-    wheel: str, sensor: Assessment, judged: Mapping[str, Judged], sought: Sought, turning: Turning | None
+    wheel: str,
+    sensor: Assessment,
+    judged: Mapping[str, Judged],
+    sought: Sought,
+    turning: Turning | None,
+    open_to: Sequence[slice] = (),
 ) -> Assessment:
     """A wheel's sensor with nothing healthy said of it while the gyro contradicts its side, and with what does not show.
 
@@ -45,6 +50,8 @@ def by_the_gyro(
         What was looked for.
     turning : Turning or None
         How the body is turned.
+    open_to : Sequence[slice]
+        Steps in which the gyro may be wrong, or either side.
     """
     one = judged[wheel]
     if not one.response.answered:
@@ -58,6 +65,8 @@ def by_the_gyro(
     for x in sought.found:
         if turning is not None and (not x.told or turning.sides[wheel] == x.side):
             where[x.start * width : x.stop * width] = True
+    for steps in open_to:
+        where[steps] = True
     return unproved(sensor, where, OTHERWISE)
 
 
