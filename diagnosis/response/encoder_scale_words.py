@@ -59,7 +59,9 @@ def by_the_gyro(
         return replace(sensor, hidden=_UNTOLD) if untold else sensor
     several = len(judged) > 1
     if several or one.view is None:
-        sensor = replace(sensor, hidden=unseen(sought, several=several))
+        sensor = replace(
+            sensor, hidden=unseen(sought, several=several and not (turning is None and one.yaw is not None))
+        )
     blocks = one.wheel.blocks.start
     width, where = int(blocks[1]) if blocks.size > 1 else 1, np.zeros(one.data.y.size, np.bool_)
     for x in sought.found:
@@ -108,7 +110,7 @@ def unseen(sought: Sought, *, several: bool) -> str:
     sought : Sought
         What was looked for.
     several : bool
-        Whether there are several drives, whose difference turns the machine.
+        Whether there are several drives, whose difference may turn the machine, without a yaw rate that says otherwise.
     """
     of = "A factor on an encoder that closes its own drive's speed loop"
     if np.isfinite(sought.smallest):

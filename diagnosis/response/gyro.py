@@ -125,7 +125,7 @@ def wrong_gyro(
             continue
         if what:
             constant = what.endswith(_MORE)
-            rests = np.count_nonzero((stands & off)[start:stop]) * block_s >= _RESTS_S
+            rests = bool(np.count_nonzero((stands & off)[start:stop]) * block_s >= _RESTS_S)
             text = f"From {start * block_s:.1f} to {stop * block_s:.1f} s the gyro (imu.yaw_rate) {what}, by what the rest of the mission shows of the two"
             text += "." if rests or not constant else _OR_SIDE
             out.append(Contradicted(text, start, stop, sure=rests or not constant))
