@@ -54,6 +54,8 @@ def repeats_its_command(y: Array, fresh: NDArray[np.bool_], asked: Array, limits
     if first.size <= _LEAST_CHANGES:
         return False
     own = np.unique(known[np.abs(known) > limits.driving_speed])
+    if not own.size:
+        return False
     if (
         own.size <= _FEW
         and np.count_nonzero(np.diff(np.abs(y[fresh & np.isfinite(y)]) > limits.driving_speed)) >= _LEAST_CHANGES

@@ -91,6 +91,11 @@ def test_a_coarse_reading_of_a_coarse_ramp_is_no_copy(lag: float) -> None:
     assert not echoes(np.round(followed(command, lag), 2), command)
 
 
+def test_a_command_that_asks_for_next_to_nothing_is_not_met() -> None:
+    assert not echoes(np.full(N, 3.0), 0.5 * LIMITS.driving_speed * (np.arange(N) % 2))
+    assert not echoes(np.full(N, np.nan), asked(1))
+
+
 def test_nothing_is_judged_of_a_copy() -> None:
     command = asked(1)
     sensor, drive = not_measured(command, command, LIMITS, "wheel.D.v")
