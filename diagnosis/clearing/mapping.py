@@ -47,6 +47,12 @@ _LOOK = (
 )
 
 
+_OTHERS, _ASKS_MORE = (
+    2,
+    0.22,
+)  # loops beside it; by how much more, or less, one asks than they do [ln]: what wheels usually differ by is .05
+_STILL = 0.1  # of the other's size: what is so small follows nothing
+
 _ALL, _ONE_FACTOR = 3, 0.15  # signals that differ by one factor, and by how much it may differ [ln]
 
 
@@ -82,7 +88,14 @@ def mapping_hints(cells: Cells) -> tuple[Hint, ...]:
         warnings.simplefilter("ignore", RuntimeWarning)
         speeds, angles = cells.wheels("v"), cells.axles("phi")
         return (
-            *_hints(cells, speeds, wanted, [f"wheel.{w}.v" for w in machine.wheels], "its commanded speed"),
+            *_hints(
+                cells,
+                speeds,
+                wanted,
+                [f"wheel.{w}.v" for w in machine.wheels],
+                "its commanded speed",
+                works=cells.wheels("u"),
+            ),
             *_openings(
                 cells, cells.wheels("u"), wanted, [f"wheel.{w}.u" for w in machine.wheels], "its commanded speed"
             ),
@@ -122,8 +135,12 @@ def _hints(
     *,
     sizes: bool = True,
     measured: bool = False,
+    works: Array | None = None,
 ) -> Iterator[Hint]:
-    """Hints for signals, each of which follows its own of `wanted`, both (cells, n); `measured`: whatever else is wrong."""
+    """Hints for signals, each of which follows its own of `wanted`, both (cells, n); `measured`: whatever else is wrong.
+
+    `works`, of that shape too, are the openings that their loops ask for: where one believes what it reads, the size is no matter of the file.
+    """
     if not signals.size or not np.isfinite(wanted).any():
         return
     follows = np.where(np.isfinite(wanted), lowest_passed(wanted, cells.dt, _LAG_S if sizes else cells.dt), np.nan)
@@ -144,8 +161,10 @@ def _hints(
         if _against(y, x):
             text = f"{names[i]} runs against {what} throughout: {_LOOK}"
             yield Hint(_part(names[i]), backwards=True, text=text)
-        elif sizes and (
-            words := _factor(ratios[i] - (usual if abs(usual) < _TRACKS else 0.0), cells.machine.gear_ratio)
+        elif (
+            sizes
+            and not (works is not None and _believed(works, follows, i, ratios[i]))
+            and (words := _factor(ratios[i] - (usual if abs(usual) < _TRACKS else 0.0), cells.machine.gear_ratio))
         ):
             # one factor of all of them is a unit's or a size's, and no part's fault
             own = (_part(names[i]),) if all_alike else ()
@@ -157,6 +176,28 @@ def _moving(y: Array, x: Array) -> tuple[Array, Array]:
     """Both where x is large."""
     use = np.isfinite(y) & np.isfinite(x) & (np.abs(x) > _MOVED * np.nanmax(np.abs(x), initial=0.0))
     return y[use], x[use]
+
+
+def _believed(works: Array, follows: Array, i: int, ratio: float) -> bool:
+    """Whether the loop of a signal asks for more where that is too small, or for less where it is too large, beside the others' loops.
+
+    A wheel whose drive is dead is dragged along at a share of its speed, with a loop that opens ever more; a channel that the file reads at half is
+    none that any loop sees. `works` and `follows` of shape (cells, n), `ratio` its size [ln].
+    """
+    asked = np.array([_asked(works[:, k], follows[:, k]) for k in range(works.shape[1])])
+    others = np.delete(asked, i)
+    if np.count_nonzero(np.isfinite(others)) < _OTHERS or not np.isfinite(asked[i]):
+        return False
+    more = asked[i] - float(np.nanmedian(others))
+    return bool(more * np.sign(-ratio) > _ASKS_MORE)
+
+
+def _asked(u: Array, x: Array) -> float:
+    """ln of an opening by the commanded speed; NaN where it is not known."""
+    opening, speed = _moving(np.abs(u), np.abs(x))
+    if not opening.size or not np.median(opening) > 0.0:
+        return np.nan
+    return float(np.log(np.median(opening / speed)))
 
 
 def _part(name: str) -> str:
@@ -204,6 +245,9 @@ def _swapped(measured: Array, wanted: Array, dt: float) -> bool:
     use = np.isfinite(measured).all(axis=1) & np.isfinite(wanted).all(axis=1)
     y, x = measured[use], wanted[use]
     if len(y) * dt < _LEAST_S or np.mean(np.abs(x[:, 0] - x[:, 1])) < _DIFFER * np.max(np.abs(x)):
+        return False
+    sizes = [_rms(z) for z in y.T]
+    if min(sizes) < _STILL * max(sizes):
         return False
     y = y * (np.abs(x).sum() / max(float(np.abs(y).sum()), 1e-9))  # loops stay behind their commands
     own, other = (np.mean(np.abs(y - z)) for z in (x, x[:, ::-1]))

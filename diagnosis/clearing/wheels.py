@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from diagnosis.channels.echo import repeats_its_command
 from diagnosis.clearing.cells import Array, Cells
 from diagnosis.clearing.limits import Limits, long_limit, measured_twice, response_limits
 from diagnosis.clearing.longer import around, longer
@@ -147,6 +148,8 @@ def wheel_checks(cells: Cells, clear_at: float) -> Iterator[Checked]:
                 yield lasts(cells, (*about, either, Check.TRACKING), stands, _STANDS_BEHIND)
             if delays[i] is not None:
                 yield lasts(cells, (*about, Side.SENSOR, Check.DELAY), delays[i], LATE_S)
+        if _echoes(cells, wheel):  # it measures nothing, and jumps as it is told
+            continue
         most_rough = alone(roughest, i, ROUGH, _LEAST_ROUGH, _ROUGH_ALONE)
         yield worst(cells, (*about, Side.SENSOR, Check.ROUGHNESS), rough[:, i], most_rough, apart=True)
 
@@ -191,6 +194,13 @@ def most_carried(clear_at: float) -> float:
     `clear_at` is the loss that counts [1].
     """
     return 1.0 + _LEAST_TOLD / (_ASKED_MORE * float(np.log1p(-clear_at)))
+
+
+def _echoes(cells: Cells, wheel: str) -> bool:
+    """Whether a wheel's reading repeats its command."""
+    timeline, name, at = cells.timeline, f"wheel.{wheel}.v", cells.machine.wheels.index(wheel)
+    asked = cells.replay.v_ref[:, at]
+    return repeats_its_command(timeline.signals[name], timeline.fresh[name], asked, cells.machine.limits, timeline.dt)
 
 
 def _known(x: Array) -> bool:

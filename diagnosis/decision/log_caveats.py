@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from diagnosis.decision.gyro_at_rest import offset_at_rest
 from replay.machine.config import Machine
 from replay.mission import Mission
 from replay.readers.tables.table_log import TEXT_LEFT_OUT
@@ -46,6 +47,8 @@ def more_caveats(mission: Mission, first_ns: int, machine: Machine) -> list[str]
         out.append(
             f"{TEXT_LEFT_OUT.capitalize()} that are called like signals: {', '.join(texts)}. Export them as numbers."
         )
+    if offset := offset_at_rest(mission.timeline, machine):
+        out.append(offset)
     if machine.questions:
         out.append(
             f"The machine file still asks: {' '.join(q[:1].upper() + q[1:] for q in machine.questions)} Answer there, and delete the lines marked QUESTION."

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 
 from diagnosis.decision.caveats import Reservations
 from diagnosis.decision.open_checks import open_words
+from diagnosis.decision.short import main_reason, main_state
 from diagnosis.decision.wording import fault_words, join_words
 from diagnosis.results.assessment import Assessment
 from diagnosis.results.clearing import Checked
@@ -17,11 +18,16 @@ from replay.faults import Side, State
 #: A component and its side.
 Part = tuple[str, str]
 
-_SOUND = "No speed sensor fault seen, drives not judged"
-_OPEN = "No speed sensor fault seen, but a check is open; drives not judged"
-_DOUBTED = "A sensor is in doubt, drives not judged"
+_SOUND = "No speed sensor fault seen"
+_OPEN = "No speed sensor fault seen, but a check is open"
+_DOUBTED = "A sensor is in doubt"
+_REST, _WITH_STEERING = "drives not judged", "drives and steering not judged"
 #: Titles of such a mission.
-TITLES = _SOUND, _OPEN, _DOUBTED
+TITLES = tuple(
+    f"{title}{';' if title is _OPEN else ','} {rest}"
+    for title in (_SOUND, _OPEN, _DOUBTED)
+    for rest in (_REST, _WITH_STEERING)
+)
 
 
 def sensors_alone(
@@ -54,14 +60,20 @@ def sensors_alone(
     drives: dict[str, list[str]] = {}
     for part in against.short:
         drives.setdefault(assessments[part].reasons.get(State.NOT_ASSESSED, ""), []).append(part[0])
-    unjudged = "; ".join(f"{_drives(who)} not judged, for {why}" for why, who in drives.items()) + "."
+    steering = [a for (c, _), a in assessments.items() if c in axles and a.tier is Tier.NONE]
+    said = [f"{_drives(who)} not judged, for {why}" for why, who in drives.items()]
+    if steering:
+        why = main_reason(steering[0], main_state(steering[0]))
+        said.append(f"the steering was not judged{f', for {why}' if why else ''}")
+    unjudged = "; ".join(said) + "."
+    rest_of_it = _WITH_STEERING if steering else _REST
     faults = [f for f in intervals if Side.SENSOR in f.side.sides]
     checks = [c for c in against.open if c.worst is not None and Side.SENSOR in c.side.sides]
     seen = against.words.fill(f"No fault was seen in the {{wheel.sensor}}s over at least {least:.0f} s of {{moving}}")
     if not faults and not checks:
-        return _SOUND, f"{seen}; {unjudged}"
+        return f"{_SOUND}, {rest_of_it}", f"{seen}; {unjudged}"
     if not faults and not any(c.component in axles for c in checks):  # a bump, or slip, may be all of it
-        return _OPEN, f"{seen}, but {open_words(checks)}; {unjudged}"
+        return f"{_OPEN}; {rest_of_it}", f"{seen}, but {open_words(checks)}; {unjudged}"
     doubt = join_words(
         [
             *(
@@ -73,7 +85,7 @@ def sensors_alone(
         ]
     )
     rest = f"{seen}; {unjudged}" if _all_of(axles, faults, checks) else unjudged[0].upper() + unjudged[1:]
-    return _DOUBTED, f"{doubt[0].upper()}{doubt[1:]}. {rest}"
+    return f"{_DOUBTED}, {rest_of_it}", f"{doubt[0].upper()}{doubt[1:]}. {rest}"
 
 
 def _drives(wheels: Sequence[str]) -> str:

@@ -144,11 +144,18 @@ def unjudged_axles(axles: Sequence[Part], assessments: Mapping[Part, Assessment]
     act = (
         _act_of_axle(axles[0][1], state, lack).replace("{c}", _components(axles))
         if lack is Lack.OPENING_UNIT
-        else "log steer.*.phi and steer.*.u, and steer from stop to stop twice while driving"
+        else f"log {_steering_signals(lack, words)}, and steer from stop to stop twice while driving"
         if lack in (Lack.SIGNALS, Lack.COMMAND)
         else "steer from stop to stop twice at standstill and several times while driving, with the log running"
     )
     return ToClear(f"Not judged: {who} ({reason}).", act, tuple(axles), why=reason)
+
+
+def _steering_signals(lack: Lack, words: MachineWords) -> str:
+    """What to log of a steering of which nothing is judged: where its angle is there, what turns it alone."""
+    if lack is not Lack.COMMAND:
+        return "steer.*.phi and steer.*.u"
+    return words.fill("steer.*.u (the command of its {valve}) or steer.*.u_applied")
 
 
 def exempt_axles(
@@ -280,6 +287,8 @@ def _act(
         return words.fill(
             "look whether the {wheel} has a {valve} at all: one that has is without power, or its effort is not logged"
         )
+    if lack is Lack.ECHO:
+        return words.fill("record what the {wheels} measure (/joint_states, encoder counts) as wheel.{c}.v")
     if lack is Lack.ANSWER:
         return f"drive for a minute and longer with several speeds, turns and stops, and diagnose that log; or log {second}"
     if lack is Lack.UNIT:

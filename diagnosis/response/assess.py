@@ -55,6 +55,7 @@ from diagnosis.response.sideways import crossed, goes_sideways
 from diagnosis.response.spells import until_back, where_asked
 from diagnosis.response.states import judge
 from diagnosis.response.turning import turning_of, turns_other_way, turns_with, unasked_turn, wrong_yaw_rate
+from diagnosis.response.unlike import unlike_in_motion
 from diagnosis.response.uphill import lower_by_a_load
 from diagnosis.response.witness import witness_of, witnessed
 from diagnosis.results.assessment import Assessment, Finding, Reason
@@ -237,7 +238,7 @@ def assess_response(
     remarks = (*astray, *left_notes, *((_TURNED,) if any(turned.values()) else ()))
     doubts = {w: Reason(j.odd) for w, j in judged.items() if j.odd and not any(side.findings for side in parts[w])}
     doubts |= {w: j.joint.unlike for w, j in judged.items() if j.joint is not None and j.joint.unlike}
-    doubts |= unlike(judged)
+    doubts |= unlike_in_motion(judged, mates, sideways=sideways) | unlike(judged)
     if exchanged or turns_other_way(judged, geometry, turning):
         doubts = dict.fromkeys(judged, Reason(_EXCHANGED)) | doubts
     for w, why in doubts.items():
@@ -257,7 +258,10 @@ def assess_response(
     unsettled = {w: [*kept[w], *(s for s in slips[w] if not wrong_yaw_rate(s, j))] for w, j in judged.items()}
     sought = scaled_sides(judged, unsettled, turning, width * dt)
     gyro = wrong_gyro(judged, unsettled, turning, width * dt, heading, [(x.start, x.stop) for x in sought.found])
-    parts = {w: (by_the_gyro(w, sensor, judged, sought, turning), drive) for w, (sensor, drive) in parts.items()}
+    open_to = [slice(x.start * width, x.stop * width) for x in gyro if not x.sure]
+    parts = {
+        w: (by_the_gyro(w, sensor, judged, sought, turning, open_to), drive) for w, (sensor, drive) in parts.items()
+    }
     ignored = () if any(j.response.answered for j in judged.values()) else unexplained(drives, limits, dt)
     stood = standstills(idle, dt) or (
         paused([f for side in parts.values() for f in side[0].findings], dt) if len(data) == 1 else ()
@@ -265,7 +269,8 @@ def assess_response(
     ignored, said = witnessed(ignored, witness, seen, drives, speeds, (width, limits, dt))
     scaled = told(sought, turning, width * dt)
     parts |= {w: told_gain(parts[w], data[w].name, gain) for w, gain in scales.items() if w in parts}
-    return Judgement(parts, (*stood, *(astray if lasts else ())), gyro, said, ignored, scaled)
+    told_of_it = tuple(x.text for x in gyro)
+    return Judgement(parts, (*stood, *(astray if lasts else ())), told_of_it, said, ignored, scaled)
 
 
 def _turned_by(wheel: str, found: Mapping[str, Judged]) -> bool:

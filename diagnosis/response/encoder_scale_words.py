@@ -14,6 +14,10 @@ from diagnosis.response.turning import Turning
 from diagnosis.results.assessment import Assessment
 
 _END_S = 1.0
+_UNTOLD = (
+    "No command says what the {wheels} should do, so that a factor on one side, or on all of them, from the start of the log to its end would not show, "
+    "and is not assessed: log the commands (cmd.v, cmd.omega)."
+)
 OTHERWISE = "it keeps to its command, but the gyro shows that one side of the machine goes otherwise than it reads"
 
 
@@ -25,7 +29,12 @@ def told(sought: Sought, turning: Turning | None, block_s: float) -> tuple[str, 
 
 
 def by_the_gyro(
-    wheel: str, sensor: Assessment, judged: Mapping[str, Judged], sought: Sought, turning: Turning | None
+    wheel: str,
+    sensor: Assessment,
+    judged: Mapping[str, Judged],
+    sought: Sought,
+    turning: Turning | None,
+    open_to: Sequence[slice] = (),
 ) -> Assessment:
     """A wheel's sensor with nothing healthy said of it while the gyro contradicts its side, and with what does not show.
 
@@ -41,18 +50,25 @@ def by_the_gyro(
         What was looked for.
     turning : Turning or None
         How the body is turned.
+    open_to : Sequence[slice]
+        Steps in which the gyro may be wrong, or either side.
     """
     one = judged[wheel]
     if not one.response.answered:
-        return sensor
+        untold = not np.isfinite(one.data.asked).any() and len(judged) > 1
+        return replace(sensor, hidden=_UNTOLD) if untold else sensor
     several = len(judged) > 1
     if several or one.view is None:
-        sensor = replace(sensor, hidden=unseen(sought, several=several))
+        sensor = replace(
+            sensor, hidden=unseen(sought, several=several and not (turning is None and one.yaw is not None))
+        )
     blocks = one.wheel.blocks.start
     width, where = int(blocks[1]) if blocks.size > 1 else 1, np.zeros(one.data.y.size, np.bool_)
     for x in sought.found:
         if turning is not None and (not x.told or turning.sides[wheel] == x.side):
             where[x.start * width : x.stop * width] = True
+    for steps in open_to:
+        where[steps] = True
     return unproved(sensor, where, OTHERWISE)
 
 
@@ -94,7 +110,7 @@ def unseen(sought: Sought, *, several: bool) -> str:
     sought : Sought
         What was looked for.
     several : bool
-        Whether there are several drives, whose difference turns the machine.
+        Whether there are several drives, whose difference may turn the machine, without a yaw rate that says otherwise.
     """
     of = "A factor on an encoder that closes its own drive's speed loop"
     if np.isfinite(sought.smallest):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from diagnosis.channels.echo import not_measured
 from diagnosis.channels.standstill import STILL, together_idle
 from diagnosis.evidence import ACTUATOR, SENSOR, Contribution, MissionView, Part
 from diagnosis.response.assess import assess_response
@@ -43,6 +44,8 @@ class ResponseEvidence:
         dt = mission.timeline.dt
         several = sum(mission.logged(f"wheel.{w}.v") for w in machine.wheels) > 1
         data = {w: d for w, d in followers(mission).items() if several or np.isfinite(d.asked).any()}
+        echoes = {w: d for w, d in data.items() if d.echo}
+        data = {w: d for w, d in data.items() if not d.echo}
         width = max(1, round(BLOCK_S / dt))
         speeds = body_speeds(mission.timeline, width) if data else ()
         heading = odometry_rate(mission.timeline, width) if yaw is not None and data else None
@@ -51,6 +54,9 @@ class ResponseEvidence:
         for wheel in mission.wheels:
             if wheel in judged.parts:
                 parts[wheel, SENSOR], parts[wheel, ACTUATOR] = judged.parts[wheel]
+            elif wheel in echoes:
+                d = echoes[wheel]
+                parts[wheel, SENSOR], parts[wheel, ACTUATOR] = not_measured(d.y, d.asked, machine.limits, d.name)
         turns: tuple[Contradiction, ...] = ()
         if yaw is not None and heading is not None and not several:
             asked = cells(mission.values("cmd.omega"), width) if mission.logged("cmd.omega") else None

@@ -30,9 +30,25 @@ _STILL = 0.05  # of the usual yaw rate: a spread below that is one value
 _NOTHING = 0.1  # of what the wheels make
 _SAME, _ASIDE = 0.2, 0.15  # of one: a gain that is as before; of the usual yaw rate: a constant that matters
 _SOUND = 0.55  # of the mission, in which the gyro is sound
+_STRAIGHT_S, _RESTS_S, _STANDS = (
+    6.0,
+    0.5,
+    0.02,
+)  # of a constant, nearly straight ahead; of rest in it; of the usual speed
+_MORE = "rad/s more than the {wheels} make"
+_OR_SIDE = "; or one side goes otherwise than it reads, as with an encoder that is scaled inside the speed loop that it closes."
 _HELD = ", unless something held it and the {wheels} slipped"
 _APART = 0.05  # of the speed: sides that differ by less turn nothing worth a word
 _NEVER, _TURNED_S = 0.2, 20.0  # of the wheels' yaw rate, over a mission that turns for so long
+
+
+class Contradicted(NamedTuple):
+    """Blocks [start, stop) in which the gyro alone contradicts the wheels, a sentence, and whether nothing but the gyro does that."""
+
+    text: str
+    start: int
+    stop: int
+    sure: bool
 
 
 class _Spread(NamedTuple):
@@ -51,8 +67,8 @@ def wrong_gyro(
     block_s: float,
     heading: Array | None = None,
     aside: Sequence[tuple[int, int]] = (),
-) -> tuple[str, ...]:
-    """A sentence for each time in which the gyro alone contradicts the wheels, and nothing else turns as it says.
+) -> tuple[Contradicted, ...]:
+    """Times in which the gyro alone contradicts the wheels, and nothing else turns as it says.
 
     Parameters
     ----------
@@ -84,25 +100,51 @@ def wrong_gyro(
     found = fitted(apart, turning.yaw, sound, _SOUND)
     if found is None:
         speed = np.max([np.abs(j.wheel.blocks.mean) for j in judged.values()], axis=0)[sound]
-        return _never(apart, turning.yaw, sound, block_s) if _turns(apart[sound], speed) else ()
+        texts = _never(apart, turning.yaw, sound, block_s) if _turns(apart[sound], speed) else ()
+        return tuple(Contradicted(text, 0, apart.size, sure=True) for text in texts)
     gain, offset, noise = found
     usual = float(np.quantile(np.abs(gain * apart[sound]), 0.9))
     about = _Spread(gain * apart, turning.yaw - offset, usual, noise)
     off = sound & (np.abs(about.measured - about.made) > np.maximum(_OFF * noise, _SHARE * np.abs(about.made)))
     off &= np.abs(about.measured - about.made) > _LEAST * usual
     shows = sound & (off | (np.abs(about.made) > _TURNS * usual))
-    out = []
+    fastest = float(np.quantile([np.abs(j.wheel.blocks.mean[sound]) for j in judged.values()], 0.9))
+    stands = sound & (np.max([np.abs(j.wheel.blocks.mean) for j in judged.values()], axis=0) <= _STANDS * fastest)
+    straight = sound & (np.abs(about.made) < _TURNS * usual)  # there a constant is no share of the turn
+    found_in: dict[tuple[int, int], str] = {}
     for start, stop in _spans(off, shows):
         long = (stop - start) * block_s >= _LEAST_S
         if long and np.mean(off[start:stop][shows[start:stop]]) >= _MOST_OF:
-            what = _kind(about, slice(start, stop), sound[start:stop], block_s)
-            if heading is not None and agree(turning.yaw - offset, heading, about.made, slice(start, stop)):
-                continue
-            if what:
-                out.append(
-                    f"From {start * block_s:.1f} to {stop * block_s:.1f} s the gyro (imu.yaw_rate) {what}, by what the rest of the mission shows of the two."
-                )
+            found_in[start, stop] = _kind(about, slice(start, stop), sound[start:stop], block_s)
+    for start, stop in _spans(off & straight, straight):
+        if not any(start < last and first < stop for (first, last), what in found_in.items() if what):
+            found_in[start, stop] = _constant(about, slice(start, stop), straight, sound, block_s)
+    out = []
+    for (start, stop), what in sorted(found_in.items()):
+        if heading is not None and agree(turning.yaw - offset, heading, about.made, slice(start, stop)):
+            continue
+        if what:
+            constant = what.endswith(_MORE)
+            rests = bool(np.count_nonzero((stands & off)[start:stop]) * block_s >= _RESTS_S)
+            text = f"From {start * block_s:.1f} to {stop * block_s:.1f} s the gyro (imu.yaw_rate) {what}, by what the rest of the mission shows of the two"
+            text += "." if rests or not constant else _OR_SIDE
+            out.append(Contradicted(text, start, stop, sure=rests or not constant))
     return tuple(out)
+
+
+def _constant(about: _Spread, part: slice, straight: Flags, sound: Flags, block_s: float) -> str:
+    """The constant that the yaw rate has beside what the wheels make, by the times in which these hardly turn the machine; empty where none."""
+    use, all_of = straight[part], sound[part]
+    apart = about.measured[part] - about.made[part]
+    if np.count_nonzero(use) * block_s < _STRAIGHT_S:
+        return ""
+    constant = float(np.median(apart[use]))
+    left = float(np.std(apart[use] - constant))
+    turns = all_of & ~use
+    helps = not turns.any() or float(np.mean((apart[turns] - constant) ** 2)) < float(np.mean(apart[turns] ** 2))
+    if abs(constant) <= max(_ASIDE * about.usual, _OFF * about.noise) or left > _FITS * abs(constant) or not helps:
+        return ""
+    return f"reads {constant:+.2g} {_MORE}"
 
 
 def _spans(off: Flags, shows: Flags) -> list[tuple[int, int]]:
@@ -133,7 +175,7 @@ def _kind(about: _Spread, part: slice, sound: Flags, block_s: float) -> str:
         return ""
     if by_constant < by_gain:
         aside = abs(constant) > _ASIDE * about.usual
-        return f"reads {constant:+.2g} rad/s more than the {{wheels}} make" if aside else ""
+        return f"reads {constant:+.2g} {_MORE}" if aside else ""
     if not turns or abs(gain - 1.0) < _SAME:
         return ""
     if abs(gain) < _NOTHING:

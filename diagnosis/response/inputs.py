@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from diagnosis.channels.echo import repeats_its_command
 from diagnosis.channels.liveness import alive
 from diagnosis.evidence import SENSOR, MissionView
 from diagnosis.response.direction import directed, without_direction
@@ -48,6 +49,8 @@ class FollowerData:
         How much faster than the body it rolls [1], where it is the only drive and steers.
     undirected : bool
         Whether its channel tells no direction, so that `y` has that of its command.
+    echo : bool
+        Whether its channel repeats the command and measures nothing.
     """
 
     y: Array
@@ -60,6 +63,7 @@ class FollowerData:
     lost: tuple[tuple[int, int], ...] = ()
     stretch: Array | None = None
     undirected: bool = False
+    echo: bool = False
 
 
 def cell_of(dt: float) -> int:
@@ -103,6 +107,7 @@ def followers(mission: MissionView) -> dict[str, FollowerData]:
         if taken or not mission.logged(name):
             continue
         stretch, y = stretch_of(mission, w), mission.values(name)
+        echo = repeats_its_command(y, timeline.fresh[name], asked, machine.limits, timeline.dt)
         asked = stretched(y, asked, stretch, machine.limits.driving_speed, timeline.dt)
         undirected = not rollers and without_direction(y, asked, machine.limits.driving_speed, timeline.dt)
         y = directed(y, asked, timeline.dt) if undirected else y
@@ -122,6 +127,7 @@ def followers(mission: MissionView) -> dict[str, FollowerData]:
             _lost(mission, name),
             stretch,
             undirected,
+            echo,
         )
     return out
 

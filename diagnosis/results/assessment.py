@@ -88,6 +88,8 @@ class Lack(StrEnum):
     SECOND = "second"
     #: Neither is.
     BESIDE = "beside"
+    #: What is read repeats what is asked for: nothing is measured.
+    ECHO = "echo"
 
 
 class Reason(NamedTuple):

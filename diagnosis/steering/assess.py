@@ -263,7 +263,7 @@ def _assessment(side: Side, inputs: AxleInputs, judged: _Judged | None) -> Asses
         return judged.sides[side]
     if inputs.blocks is None or not {"u", "u_applied"} & inputs.logged:
         why = "neither the command of its {valve} nor the {position} is in the log"
-        return unassessed(size, State.NOT_ASSESSED, why, Lack.SIGNALS)
+        return unassessed(size, State.NOT_ASSESSED, why, Lack.COMMAND)
     why = "the axle was steered too little to identify what its {valve} does"
     return unassessed(size, State.NOT_ASSESSED, why)
 

@@ -23,6 +23,7 @@ _LEAST_S = 10.0  # of motion
 _MOVES = 0.2  # of the largest speed
 _TRIMMED = 0.2  # of the moments are left out that fit worst, twice: slip, faults, jumps of a position
 _SOUND = 0.95  # share of the rest that the fit must explain
+_SHORT_S, _EXACT = 3.0, 0.998  # of less motion, which only odometry made of the wheels explains so well
 _SPEEDS = (("odom.v", "odometry"), ("gnss.speed", "the speed over ground"))
 
 
@@ -159,7 +160,8 @@ def gain_of(x: Array, y: Array, step_s: float = _STEP_S) -> float | None:
         known = np.isfinite(a) & np.isfinite(b)
         a, b = a[known], b[known]
         moving = np.abs(a) > _MOVES * float(np.quantile(np.abs(a), 0.95)) if a.size else np.zeros(0, np.bool_)
-        if np.count_nonzero(moving) * step_s < _LEAST_S:
+        seconds = np.count_nonzero(moving) * step_s
+        if seconds < _SHORT_S:
             continue
         a, b = a[moving], b[moving]
         kept = np.ones(a.size, np.bool_)
@@ -170,6 +172,6 @@ def gain_of(x: Array, y: Array, step_s: float = _STEP_S) -> float | None:
             kept = off <= np.quantile(off, 1.0 - _TRIMMED)
         spread = float(b[kept] @ b[kept])
         sound = 1.0 - float(off[kept] @ off[kept]) / spread if spread > 0.0 else 0.0
-        if best is None or sound > best[0]:
+        if sound >= (_SOUND if seconds >= _LEAST_S else _EXACT) and (best is None or sound > best[0]):
             best = sound, gain
-    return best[1] if best is not None and best[0] >= _SOUND else None
+    return None if best is None else best[1]

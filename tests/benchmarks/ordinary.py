@@ -29,7 +29,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
-from ordinary_robots.faults import BODY, EVENTS, FAULTS, Fault, fault_of
+from ordinary_robots.faults import FAULTS, Fault, fault_of
 from ordinary_robots.habits import HABITS, Habits
 from ordinary_robots.log import write_log
 from ordinary_robots.machines import KINDS, H, Robot, course_of, robot_of
@@ -126,7 +126,7 @@ def fault_score(c: Case) -> Counter[str]:
     assert f is not None
     hits = [i for i in c.told if c.meets(i)]
     wrong = [i for i in c.told if not c.right(i)]
-    event = f.kind in (*EVENTS, *BODY)
+    event = f.side == "machine"
     out = Counter(
         missions=1,
         found=bool(hits) and not event,

@@ -15,7 +15,10 @@ DRIVES = ("motor_dead", "motor_weak", "motor_on", "jammed")
 EVENTS = ("ignored", "estop")
 #: Of the inertial unit and of odometry: no wheel may be named for them.
 BODY = ("gyro_dead", "gyro_frozen", "gyro_scaled", "gyro_offset", "odometry_frozen", "odometry_scaled")
-FAULTS = (*SENSORS, *DRIVES, *EVENTS, *BODY)
+#: All through the log, and shorter than the others; behind the others, since the place in the list is part of the seed.
+ALL_THROUGH = ("encoder_off", "gyro_off", "motor_gone")
+SHORT = ("encoder_dropped",)
+FAULTS = (*SENSORS, *DRIVES, *EVENTS, *BODY, *ALL_THROUGH, *SHORT)
 
 
 @dataclass(frozen=True)
@@ -44,7 +47,8 @@ class Fault:
     @property
     def side(self) -> str:
         """Side of the wheel, or ``machine`` where no wheel has a fault."""
-        return "sensor" if self.kind in SENSORS else "actuator" if self.kind in DRIVES else "machine"
+        sensors, drives = (*SENSORS, "encoder_off", "encoder_dropped"), (*DRIVES, "motor_gone")
+        return "sensor" if self.kind in sensors else "actuator" if self.kind in drives else "machine"
 
 
 def fault_of(kind: str, wheels: int, moving: NDArray[np.bool_], step: float, rng: np.random.Generator) -> Fault:
@@ -68,6 +72,10 @@ def fault_of(kind: str, wheels: int, moving: NDArray[np.bool_], step: float, rng
     places = places[places > 0.2 * n]
     first = int(rng.choice(places))
     last = n if rng.random() < 0.25 else min(n, first + round(rng.uniform(6.0, 20.0) / step))
+    if kind in ALL_THROUGH:
+        first, last = 0, n
+    if kind in SHORT:
+        last = min(n, first + round(1.5 / step))
     size = {
         "encoder_scaled": float(rng.choice([rng.uniform(0.35, 0.7), rng.uniform(1.45, 2.2)])),
         "encoder_noisy": float(rng.uniform(0.5, 3.0)),
@@ -80,6 +88,10 @@ def fault_of(kind: str, wheels: int, moving: NDArray[np.bool_], step: float, rng
         "odometry_scaled": float(rng.choice([rng.uniform(0.3, 0.7), rng.uniform(1.4, 2.2)])),
         "gyro_offset": float(rng.choice([-1, 1]) * rng.uniform(0.1, 0.5)),
     }.get(kind, 1.0)
+    if kind == "encoder_off":
+        size = float(rng.choice([0.8, 1.3]))
+    elif kind == "gyro_off":
+        size = float(rng.choice([-0.05, 0.05]))
     return Fault(kind, int(rng.integers(wheels)), first, last, size, bool(rng.random() < 0.5))
 
 
@@ -89,11 +101,11 @@ def published(t: Array, speed: Array, fault: Fault, step: float, rng: np.random.
     inside = np.flatnonzero((t >= fault.first * step) & (t < fault.last * step))
     if inside.size == 0:
         return out
-    if fault.kind == "encoder_dead":
+    if fault.kind in ("encoder_dead", "encoder_dropped"):
         out[inside] = 0.0
     elif fault.kind == "encoder_frozen":
         out[inside] = out[inside[0]]
-    elif fault.kind == "encoder_scaled" and not fault.counted:
+    elif fault.kind in ("encoder_scaled", "encoder_off") and not fault.counted:
         out[inside] *= fault.size
     elif fault.kind == "encoder_noisy":
         out[inside] += rng.normal(0.0, fault.size, inside.size)
@@ -117,5 +129,6 @@ def of_the_body(t: Array, x: Array, fault: Fault | None, sensor: str, step: floa
             "frozen": np.full(inside.size, x[inside[0]]),
             "scaled": fault.size * x[inside],
             "offset": x[inside] + fault.size,
+            "off": x[inside] + fault.size,
         }[fault.kind.rpartition("_")[2]]
     return out

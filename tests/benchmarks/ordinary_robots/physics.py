@@ -60,11 +60,11 @@ def drive(robot: Robot, course: Course, fault: Fault | None, rng: np.random.Gene
     if fault is not None:
         if fault.kind == "estop":
             stop[fault.first : fault.last] = True
-        codes = {"motor_dead": 1, "motor_weak": 2, "motor_on": 3, "jammed": 4}
+        codes = {"motor_dead": 1, "motor_gone": 1, "motor_weak": 2, "motor_on": 3, "jammed": 4}
         if fault.kind in codes:
             effect[fault.first : fault.last, fault.wheel] = codes[fault.kind]
             scale[fault.first : fault.last, fault.wheel] = fault.size
-        if fault.kind in ("encoder_dead", "encoder_scaled") and fault.counted:
+        if fault.kind in ("encoder_dead", "encoder_scaled", "encoder_off") and fault.counted:
             scale[fault.first : fault.last, fault.wheel] = 0.0 if fault.kind == "encoder_dead" else fault.size
             effect[fault.first : fault.last, fault.wheel] = 5
     bias = 1.0 + rng.normal(0.0, 0.01, m)

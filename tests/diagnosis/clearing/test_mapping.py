@@ -126,6 +126,28 @@ def test_one_factor_of_all_wheels_is_no_fault_of_any() -> None:
     assert [h.exchanged for h in alone if h.component == "FR"] == [()]
 
 
+def test_a_wheel_that_is_dragged_along_while_its_loop_opens_is_no_matter_of_the_file() -> None:
+    """A dead motor of six-wheeled machines was "half its commanded speed": correct [signals]."""
+    mission = simulated()
+    half = {"wheel.FR.v": 0.5 * mission.columns["wheel.FR.v"]}
+    asks = {"wheel.FR.u": 1.5 * mission.columns["wheel.FR.u"]}
+    (told,) = mapping_hints(in_cells(replace(mission, columns={**mission.columns, **half}), base=True))
+    assert told.text.startswith("wheel.FR.v is half its commanded speed throughout")
+    assert mapping_hints(in_cells(replace(mission, columns={**mission.columns, **half, **asks}), base=True)) == ()
+
+
+def test_an_opening_that_stays_at_zero_is_exchanged_with_none() -> None:
+    mission = simulated()
+    asked = mission.columns["wheel.FR.u"]
+    columns = {
+        **mission.columns,
+        "wheel.FR.u": np.sign(asked) * np.minimum(1.0, 3.0 * np.abs(asked)),
+        "wheel.FR.u_applied": 0.001 * asked,
+    }
+    hints = mapping_hints(in_cells(replace(mission, columns=columns), base=False))
+    assert not [h for h in hints if "follows" in h.text]
+
+
 def test_two_rows_tell_no_place() -> None:
     """A log of 20 ms was told to have its valves exchanged."""
     mission = _swapped("wheel.FR.v", "wheel.RL.v")(simulated())

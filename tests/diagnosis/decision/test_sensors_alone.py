@@ -5,22 +5,33 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
+import numpy as np
+
 from diagnosis.decision.caveats import Reservations
 from diagnosis.decision.intervals import intervals_of
-from diagnosis.decision.sensors_alone import sensors_alone
-from diagnosis.results.assessment import Finding
+from diagnosis.decision.sensors_alone import TITLES, sensors_alone
+from diagnosis.results.assessment import CODE, Finding
 from diagnosis.results.clearing import Check, Checked
 from diagnosis.results.machine_words import HYDRAULIC
 from diagnosis.results.vocabulary import Kind, Tier
-from replay.faults import FaultMode, Side
+from replay.faults import FaultMode, Side, State
 from tests.diagnosis.decision.findings import AXLES, MACHINE, STEP, WHEELS, assessed, finding, machine
 
 _SHORT = tuple((w, "actuator") for w in WHEELS)
 
 
-def said(found: Sequence[Finding] = (), part: str = "front_sensor", checks: Sequence[Checked] = ()) -> tuple[str, str]:
+def said(
+    found: Sequence[Finding] = (),
+    part: str = "front_sensor",
+    checks: Sequence[Checked] = (),
+    without: Sequence[str] = (),
+) -> tuple[str, str]:
     parts = machine(**{part: assessed(*found)}) if found else machine()
-    parts = {p: replace(a, tier=Tier.RESPONSE) for p, a in parts.items()}
+    parts = {p: replace(a, tier=Tier.NONE if p[0] in without else Tier.RESPONSE) for p, a in parts.items()}
+    for p, a in parts.items():
+        if p[0] in without:
+            states = np.full_like(a.states, CODE[State.NOT_ASSESSED])
+            parts[p] = replace(a, states=states, reasons={State.NOT_ASSESSED: "no command is in the log"})
     intervals = intervals_of(parts, MACHINE, HYDRAULIC, 0, STEP)
     got = sensors_alone(
         parts,
@@ -37,6 +48,13 @@ def test_the_title_says_which_sensors() -> None:
     title, text = said()
     assert title == "No speed sensor fault seen, drives not judged"
     assert text.startswith("No fault was seen in the speed sensors over at least 20 s")
+
+
+def test_a_steering_that_nothing_judged_has_its_own_words() -> None:
+    title, text = said(without=AXLES)
+    assert title == "No speed sensor fault seen, drives and steering not judged"
+    assert title in TITLES
+    assert "; the steering was not judged, for no command is in the log." in text
 
 
 def test_a_steering_sensor_that_may_be_stuck_is_named_first() -> None:

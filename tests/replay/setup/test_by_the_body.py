@@ -61,6 +61,18 @@ def test_radius_and_track_are_measured(speed: str, by: str) -> None:
     assert track.length == pytest.approx(TRACK, rel=0.03)
 
 
+@pytest.mark.parametrize(("noise", "told"), [(0.0, True), (0.1, False)])
+def test_a_few_seconds_tell_the_radius_where_odometry_is_made_of_the_wheels(noise: float, told: bool) -> None:
+    t = np.arange(0.0, 6.0, 0.1)
+    turns = np.where(t > 1.0, 3.0 + np.sin(t), 0.0)
+    body = RADIUS * turns + noise * np.random.default_rng(1).normal(size=t.size)
+    items = [signal("wheel.L.v", 0.1, turns), signal("wheel.R.v", 0.1, turns), signal("odom.v", 0.1, body)]
+    found = radius_by_body(Signals({s.name: s for s in items}, {}, ()), ("R", "L"), ("R", "L"), {})
+    assert (found is not None) == told
+    if found is not None:
+        assert found.length == pytest.approx(RADIUS)
+
+
 def test_wheels_that_count_backwards_are_turned_round() -> None:
     found = robot(np.random.default_rng(4))
     left = found.items["wheel.L.v"]
