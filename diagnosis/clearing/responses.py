@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.clearing.cells import Array, Cells
+from diagnosis.clearing.dead_openings import beyond, dead_opening
 from diagnosis.clearing.measure import lowest_passed
 
 LAG_S = 0.15  #: Of a valve and its drive [s].
@@ -68,12 +69,20 @@ class Responses(NamedTuple):
 
 
 def responses_of(
-    cells: Cells, speed: Array, opening: Array, reference: Array, moving: float = MOVING, *, over_time: bool = True
+    cells: Cells,
+    speed: Array,
+    opening: Array,
+    reference: Array,
+    moving: float = MOVING,
+    *,
+    over_time: bool = True,
+    beyond_dead: bool = False,
 ) -> Responses:
     """Speed per opening beside the other wheels', arrays (cells, wheels).
 
     Only where a command (without one: the wheel) has settled beyond `moving` [m/s, for a machine of `USUAL_TOP`]; forward and reverse
     have usual ones of their own. Without `over_time` it is not asked how they change in the mission: `changes` and `grown` are None.
+    With `beyond_dead` openings count beyond what moves no drive of the machine, where its wheels agree better so.
     """
     frame = cells.frame
     scale = cells.machine.max_speed / USUAL_TOP
@@ -86,12 +95,16 @@ def responses_of(
     settled &= np.isfinite(speed) & np.isfinite(opening)
     passed = lowest_passed(opening, cells.dt, LAG_S)
     moved, opened = (frame.sums(np.where(settled, np.abs(x), 0.0)) for x in (speed, passed))
-    enough = frame.sums(settled.astype(np.float64)) >= _LEAST_CELLS * min(frame.length, frame.cells)
+    count = frame.sums(settled.astype(np.float64))
+    enough = count >= _LEAST_CELLS * min(frame.length, frame.cells)
+    ahead = frame.mean(np.sign(np.nan_to_num(motion))) >= 0.0
+    if beyond_dead:
+        some = np.where(enough, moved, np.nan), np.where(enough, opened, np.nan)
+        opened = beyond(opened, count, dead_opening(cells, *some, count, ahead))
     ratio = np.where(enough, moved / np.maximum(opened, 1e-3 * frame.length), np.nan)
     with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
         log = np.log(np.maximum(ratio, 1e-3) / others_at(ratio))
         alone = np.log(np.maximum(ratio, 1e-3))
-    ahead = frame.mean(np.sign(np.nan_to_num(motion))) >= 0.0
     off = np.full(log.shape, np.nan)
     lasting: list[Usual] = []
     changes: list[float | None] = []
