@@ -82,8 +82,34 @@ def responses_of(
 
     Only where a command (without one: the wheel) has settled beyond `moving` [m/s, for a machine of `USUAL_TOP`]; forward and reverse
     have usual ones of their own. Without `over_time` it is not asked how they change in the mission: `changes` and `grown` are None.
-    With `beyond_dead` openings count beyond what moves no drive of the machine, where its wheels agree better so.
+    With `beyond_dead` openings count in `windows` beyond what moves no drive of the machine, where its wheels agree better so.
     """
+    sums = _sums(cells, speed, opening, reference, moving)
+    found = _beside(cells, sums, sums.opened, over_time=over_time)
+    if beyond_dead:
+        some = np.where(sums.enough, sums.moved, np.nan), np.where(sums.enough, sums.opened, np.nan)
+        dead = dead_opening(cells, *some, sums.count, sums.ahead)
+        if dead > 0.0:
+            windows = _beside(cells, sums, beyond(sums.opened, sums.count, dead), over_time=False).windows
+            found = found._replace(windows=windows)
+    return found
+
+
+class _Sums(NamedTuple):
+    """What wheels do in windows, shape (windows, wheels), but for `weight`, of which a window has the sums: (cells, wheels).
+
+    Speed [m/s] and opening [1] over settled cells, how many these are and whether they are enough, and whether it drives forward.
+    """
+
+    weight: Array
+    moved: Array
+    opened: Array
+    count: Array
+    enough: NDArray[np.bool_]
+    ahead: NDArray[np.bool_]
+
+
+def _sums(cells: Cells, speed: Array, opening: Array, reference: Array, moving: float) -> _Sums:
     frame = cells.frame
     scale = cells.machine.max_speed / USUAL_TOP
     known = np.isfinite(reference)
@@ -94,14 +120,17 @@ def responses_of(
         settled = (np.abs(motion) > moving * scale) & (np.abs(motion - before) < SETTLED * scale)
     settled &= np.isfinite(speed) & np.isfinite(opening)
     passed = lowest_passed(opening, cells.dt, LAG_S)
-    moved, opened = (frame.sums(np.where(settled, np.abs(x), 0.0)) for x in (speed, passed))
+    weight = np.where(settled, np.abs(speed), 0.0)
+    moved, opened = frame.sums(weight), frame.sums(np.where(settled, np.abs(passed), 0.0))
     count = frame.sums(settled.astype(np.float64))
     enough = count >= _LEAST_CELLS * min(frame.length, frame.cells)
-    ahead = frame.mean(np.sign(np.nan_to_num(motion))) >= 0.0
-    if beyond_dead:
-        some = np.where(enough, moved, np.nan), np.where(enough, opened, np.nan)
-        opened = beyond(opened, count, dead_opening(cells, *some, count, ahead))
-    ratio = np.where(enough, moved / np.maximum(opened, 1e-3 * frame.length), np.nan)
+    return _Sums(weight, moved, opened, count, enough, frame.mean(np.sign(np.nan_to_num(motion))) >= 0.0)
+
+
+def _beside(cells: Cells, sums: _Sums, opened: Array, *, over_time: bool) -> Responses:
+    """Of sums of openings (windows, wheels), of which some may be left out."""
+    frame, ahead = cells.frame, sums.ahead
+    ratio = np.where(sums.enough, sums.moved / np.maximum(opened, 1e-3 * frame.length), np.nan)
     with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
         log = np.log(np.maximum(ratio, 1e-3) / others_at(ratio))
         alone = np.log(np.maximum(ratio, 1e-3))
@@ -135,7 +164,7 @@ def responses_of(
             if usual
             else Usual()
         )
-    return Responses(off, log, lasting, np.where(settled, np.abs(speed), 0.0), ahead, changes, grown, alone)
+    return Responses(off, log, lasting, sums.weight, ahead, changes, grown, alone)
 
 
 def largest_change(log: Array, ways: Sequence[NDArray[np.bool_]]) -> float:

@@ -115,10 +115,10 @@ def test_where_all_others_tremble_by_more_than_a_step_one_value_is_a_sensor_that
 
 def test_beside_counts_that_go_to_and_fro_one_value_is_a_steady_speed() -> None:
     """Teeth in a window, in finer digits: what the others change by is a tooth."""
-    y = speeds() + 0.02 * np.random.default_rng(2).standard_normal((N, 4))
-    y[2000:2400] = 1.0 + 0.02 * np.random.default_rng(3).standard_normal((400, 4))
-    y = 0.0469 * np.round(y / 0.0469)
-    y[2000:2400, 0] = 0.0469 * 21
+    y = speeds() + 0.012 * np.random.default_rng(2).standard_normal((N, 4))
+    y[2000:2400] = 1.0 + 0.012 * np.random.default_rng(3).standard_normal((400, 4))
+    y = 0.0234 * np.round(y / 0.0234)
+    y[2000:2400, 0] = 0.0234 * 43
     assert found(np.asarray(np.round(y, 2))) == []
 
 
