@@ -82,7 +82,7 @@ def responses_of(
 
     Only where a command (without one: the wheel) has settled beyond `moving` [m/s, for a machine of `USUAL_TOP`]; forward and reverse
     have usual ones of their own. Without `over_time` it is not asked how they change in the mission: `changes` and `grown` are None.
-    With `beyond_dead` openings count in `windows` beyond what moves no drive of the machine, where its wheels agree better so.
+    With `beyond_dead` `windows` are no further off than beyond what of an opening moves no drive of the machine, where its wheels agree better so.
     """
     sums = _sums(cells, speed, opening, reference, moving)
     found = _beside(cells, sums, sums.opened, over_time=over_time)
@@ -91,8 +91,13 @@ def responses_of(
         dead = dead_opening(cells, *some, sums.count, sums.ahead)
         if dead > 0.0:
             windows = _beside(cells, sums, beyond(sums.opened, sums.count, dead), over_time=False).windows
-            found = found._replace(windows=windows)
+            found = found._replace(windows=_nearer(found.windows, windows))
     return found
+
+
+def _nearer(a: Array, b: Array) -> Array:
+    """Whichever of two deviations is smaller, 0 where they do not agree on its sign: how much of an opening is dead is not known well."""
+    return np.asarray(np.where(np.sign(a) * np.sign(b) < 0.0, 0.0, np.where(np.abs(a) < np.abs(b), a, b)))
 
 
 class _Sums(NamedTuple):

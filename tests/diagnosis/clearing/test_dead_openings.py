@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from diagnosis.clearing.dead_openings import beyond, dead_opening
+from diagnosis.clearing.responses import _nearer
 
 WINDOWS, CELLS = 80, 30.0
 
@@ -91,3 +92,8 @@ def test_a_part_of_an_opening_below_what_moves_counts_all_the_same() -> None:
     opened = CELLS * np.array([[0.2, 0.6]])
     assert beyond(opened, count, 0.3) == pytest.approx(CELLS * np.array([[0.2 / 3.0, 0.3]]))
     assert beyond(opened, count, 0.0) is opened
+
+
+def test_what_either_way_of_counting_explains_is_no_deviation() -> None:
+    plain, further = np.array([0.3, 0.1, -0.2, np.nan]), np.array([0.1, 0.4, 0.1, np.nan])
+    assert _nearer(plain, further) == pytest.approx([0.1, 0.1, 0.0, np.nan], nan_ok=True)
