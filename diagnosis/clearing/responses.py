@@ -88,9 +88,9 @@ def responses_of(
     found = _beside(cells, sums, sums.opened, over_time=over_time)
     if beyond_dead:
         some = np.where(sums.enough, sums.moved, np.nan), np.where(sums.enough, sums.opened, np.nan)
-        dead = dead_opening(cells, *some, sums.count, sums.ahead)
+        dead = dead_opening(cells, *some, sums.settled, sums.ahead)
         if dead > 0.0:
-            windows = _beside(cells, sums, beyond(sums.opened, sums.count, dead), over_time=False).windows
+            windows = _beside(cells, sums, beyond(sums.opened, sums.settled, dead), over_time=False).windows
             found = found._replace(windows=_nearer(found.windows, windows))
     return found
 
@@ -109,7 +109,7 @@ class _Sums(NamedTuple):
     weight: Array
     moved: Array
     opened: Array
-    count: Array
+    settled: Array
     enough: NDArray[np.bool_]
     ahead: NDArray[np.bool_]
 
