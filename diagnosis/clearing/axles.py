@@ -188,12 +188,17 @@ def rates_of(cells: Cells, rate: Array, opening: Array) -> Rates:
             between = float(abs(whole[a] - whole[b]))
             apart[a], apart[b] = max(apart[a] or 0.0, between), max(apart[b] or 0.0, between)
     changes = [_changes(cells, frame, off, j) for j in range(len(whole))]
-    return Rates(frame, off, whole, apart, ahead, changes, _parted(tried))
+    ways = [
+        np.where(enough, _off(frame, cells.dt, rate, opening, use, band, by_way=True), np.nan)
+        for band in (dead - unsure, dead, most)
+    ]
+    return Rates(frame, off, whole, apart, ahead, changes, _parted([*tried, *ways]))
 
 
 def _parted(tried: Sequence[Array]) -> list[float | None]:
-    """By how much what lies between neighbouring axles changes [ln], for `Rates`; `tried` of shape (windows, axles), by dead bands.
+    """By how much what lies between neighbouring axles changes at least [ln], for `Rates`.
 
+    `tried` of shape (windows, axles): by dead bands, and where what an axle is slower to one side is evened.
     Axles of one supply lose their oil together, so that a drift of one alone shows between them that its own rates hide.
     """
     out: list[float | None] = [None] * tried[0].shape[1]
@@ -229,13 +234,33 @@ def _changes(cells: Cells, frame: Frame, off: Array, j: int) -> float | None:
     )
 
 
-def _off(frame: Frame, dt: float, rate: Array, opening: Array, use: Flags, dead: Array) -> Array:
-    """ln of the steering rate per opening beyond such dead bands against its usual one, (windows, axles)."""
+def _off(
+    frame: Frame, dt: float, rate: Array, opening: Array, use: Flags, dead: Array, *, by_way: bool = False
+) -> Array:
+    """ln of the steering rate per opening beyond such dead bands against its usual one, `by_way`: of that side, (windows, axles)."""
     steered, ahead, opened = beyond(rate, opening, use, dead)
+    if by_way:
+        opened = _evened(ahead, opened, opening, dt)
     time = frame.sums(steered.astype(np.float64)) * dt
     with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
         log = np.where(time >= _LEAST_S, np.log(np.maximum(frame.sums(ahead) / frame.sums(opened), 1e-3)), np.nan)
     return np.asarray(log - np.array([float(np.nanmedian(x)) if np.isfinite(x).any() else np.nan for x in log.T]))
+
+
+def _evened(ahead: Array, opened: Array, opening: Array, dt: float) -> Array:
+    """Openings that turn an axle to either side as quickly as it usually turns, of its openings beyond dead bands; all (cells, axles).
+
+    A cylinder is slower to the side of its rod, so that an axle that is steered to one side first and to the other later seems to change.
+    """
+    out = opened.copy()
+    for j in range(opened.shape[1]):
+        sides = [(opened[:, j] > 0.0) & (sign * opening[:, j] > 0.0) for sign in (1.0, -1.0)]
+        moved = [float(ahead[some, j].sum()) for some in sides]
+        if min(np.count_nonzero(some) for some in sides) * dt >= _FEW_S and min(moved) > 0.0:
+            usual = sum(moved) / float(opened[:, j].sum())
+            for some, way in zip(sides, moved, strict=True):
+                out[some, j] *= way / (float(opened[some, j].sum()) * usual)
+    return out
 
 
 def _nearest(off: Sequence[Array]) -> Array:

@@ -133,7 +133,7 @@ def _wheels(cells: Cells) -> Iterator[Gauges]:
     clear_at, top = cells.machine.limits.clear_at, cells.machine.max_speed
     used = np.where(np.isfinite(opening), opening, command)
     followed = as_followed(cells, opening, command, wheels.OPENING)
-    responses = resp.responses_of(cells, speed, used, cells.reference)
+    responses = resp.responses_of(cells, speed, used, cells.reference, beyond_dead=True)
     limits = response_limits(responses, measured_twice(cells), clear_at, cells.carried_shares, cells.ahead)
     tells = openings_tell(cells, responses)
     delays, rough = late(speed, cells.reference, cells.dt), wheels.roughness_of(cells, speed)

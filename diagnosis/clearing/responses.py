@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.clearing.cells import Array, Cells
+from diagnosis.clearing.dead_openings import beyond, dead_opening
 from diagnosis.clearing.measure import lowest_passed
 
 LAG_S = 0.15  #: Of a valve and its drive [s].
@@ -68,13 +69,52 @@ class Responses(NamedTuple):
 
 
 def responses_of(
-    cells: Cells, speed: Array, opening: Array, reference: Array, moving: float = MOVING, *, over_time: bool = True
+    cells: Cells,
+    speed: Array,
+    opening: Array,
+    reference: Array,
+    moving: float = MOVING,
+    *,
+    over_time: bool = True,
+    beyond_dead: bool = False,
 ) -> Responses:
     """Speed per opening beside the other wheels', arrays (cells, wheels).
 
     Only where a command (without one: the wheel) has settled beyond `moving` [m/s, for a machine of `USUAL_TOP`]; forward and reverse
     have usual ones of their own. Without `over_time` it is not asked how they change in the mission: `changes` and `grown` are None.
+    With `beyond_dead` `windows` are no further off than beyond what of an opening moves no drive of the machine, where its wheels agree better so.
     """
+    sums = _sums(cells, speed, opening, reference, moving)
+    found = _beside(cells, sums, sums.opened, over_time=over_time)
+    if beyond_dead:
+        some = np.where(sums.enough, sums.moved, np.nan), np.where(sums.enough, sums.opened, np.nan)
+        dead = dead_opening(cells, *some, sums.settled, sums.ahead)
+        if dead > 0.0:
+            windows = _beside(cells, sums, beyond(sums.opened, sums.settled, dead), over_time=False).windows
+            found = found._replace(windows=_nearer(found.windows, windows))
+    return found
+
+
+def _nearer(a: Array, b: Array) -> Array:
+    """Whichever of two deviations is smaller, 0 where they do not agree on its sign: how much of an opening is dead is not known well."""
+    return np.asarray(np.where(np.sign(a) * np.sign(b) < 0.0, 0.0, np.where(np.abs(a) < np.abs(b), a, b)))
+
+
+class _Sums(NamedTuple):
+    """What wheels do in windows, shape (windows, wheels), but for `weight`, of which a window has the sums: (cells, wheels).
+
+    Speed [m/s] and opening [1] over settled cells, how many these are and whether they are enough, and whether it drives forward.
+    """
+
+    weight: Array
+    moved: Array
+    opened: Array
+    settled: Array
+    enough: NDArray[np.bool_]
+    ahead: NDArray[np.bool_]
+
+
+def _sums(cells: Cells, speed: Array, opening: Array, reference: Array, moving: float) -> _Sums:
     frame = cells.frame
     scale = cells.machine.max_speed / USUAL_TOP
     known = np.isfinite(reference)
@@ -85,13 +125,20 @@ def responses_of(
         settled = (np.abs(motion) > moving * scale) & (np.abs(motion - before) < SETTLED * scale)
     settled &= np.isfinite(speed) & np.isfinite(opening)
     passed = lowest_passed(opening, cells.dt, LAG_S)
-    moved, opened = (frame.sums(np.where(settled, np.abs(x), 0.0)) for x in (speed, passed))
-    enough = frame.sums(settled.astype(np.float64)) >= _LEAST_CELLS * min(frame.length, frame.cells)
-    ratio = np.where(enough, moved / np.maximum(opened, 1e-3 * frame.length), np.nan)
+    weight = np.where(settled, np.abs(speed), 0.0)
+    moved, opened = frame.sums(weight), frame.sums(np.where(settled, np.abs(passed), 0.0))
+    count = frame.sums(settled.astype(np.float64))
+    enough = count >= _LEAST_CELLS * min(frame.length, frame.cells)
+    return _Sums(weight, moved, opened, count, enough, frame.mean(np.sign(np.nan_to_num(motion))) >= 0.0)
+
+
+def _beside(cells: Cells, sums: _Sums, opened: Array, *, over_time: bool) -> Responses:
+    """Of sums of openings (windows, wheels), of which some may be left out."""
+    frame, ahead = cells.frame, sums.ahead
+    ratio = np.where(sums.enough, sums.moved / np.maximum(opened, 1e-3 * frame.length), np.nan)
     with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
         log = np.log(np.maximum(ratio, 1e-3) / others_at(ratio))
         alone = np.log(np.maximum(ratio, 1e-3))
-    ahead = frame.mean(np.sign(np.nan_to_num(motion))) >= 0.0
     off = np.full(log.shape, np.nan)
     lasting: list[Usual] = []
     changes: list[float | None] = []
@@ -122,7 +169,7 @@ def responses_of(
             if usual
             else Usual()
         )
-    return Responses(off, log, lasting, np.where(settled, np.abs(speed), 0.0), ahead, changes, grown, alone)
+    return Responses(off, log, lasting, sums.weight, ahead, changes, grown, alone)
 
 
 def largest_change(log: Array, ways: Sequence[NDArray[np.bool_]]) -> float:

@@ -57,7 +57,7 @@ class _Shown:
 
 
 def fault_of_wheel(check: Checked, cells: Cells, *, alone: bool) -> Finding | None:
-    """The fault of a wheel whose speed per opening is not that of the others; None where no window shows by how much.
+    """The fault of a wheel whose speed per opening is not that of the others; None where no window of driving shows it.
 
     Parameters
     ----------
@@ -76,8 +76,8 @@ def fault_of_wheel(check: Checked, cells: Cells, *, alone: bool) -> Finding | No
     lost, gained = (float(np.nansum(np.maximum(x - check.limit, 0.0))) for x in (-beside, beside))
     below = lost >= gained
     shown = _Shown(cells.frame, -beside if below else beside)
-    if not np.any(shown.size > 0.0):
-        return None
+    if not np.any(shown.size > check.limit):
+        return None  # it was off where it crept alone: dead bands differ
     start, stop, size, spread = _where(shown, cells)
     half = max(check.limit, 2.0 * spread)
     low, middle, high = (-np.expm1(-x if below else x) for x in (size - half, size, size + half))

@@ -63,10 +63,10 @@ def wheel_checks(cells: Cells, clear_at: float) -> Iterator[Checked]:
     speed, second, opening = (np.where(apart, x, np.nan) for x in (speed, second, opening))
     behind = off_commands(cells, opening, command, OPENING)
     slowest = [float(x) for x in largest(behind)]
-    responses = responses_of(cells, speed, used, reference)
+    responses = responses_of(cells, speed, used, reference, beyond_dead=True)
     tells = openings_tell(cells, responses)
     windows, lasting = responses.windows, responses.usual
-    slow = responses_of(cells, speed, used, reference, CREEPING * USUAL_TOP, over_time=False).windows
+    slow = responses_of(cells, speed, used, reference, CREEPING * USUAL_TOP, over_time=False, beyond_dead=True).windows
     slow[np.isfinite(windows)] = np.nan
     limits = response_limits(responses, twice, clear_at, cells.carried_shares, cells.ahead)
     long = longer(cells, -windows)

@@ -32,7 +32,7 @@ from diagnosis.steering.path import AxleFilter, allowed_models, most_probable
 from diagnosis.steering.path_refinement import refine_path
 from diagnosis.steering.plant import SteeringPlant
 from diagnosis.steering.prior import plant_before
-from diagnosis.steering.reliability import commanded, lost_by_model, paired, weighed
+from diagnosis.steering.reliability import commanded, lost_by_model, paired, told_from_none, weighed
 from diagnosis.steering.rests_together import not_resting_together
 from diagnosis.steering.states import REASONS, states_of
 from diagnosis.steering.together import less_sure_all_along, not_shaken_together, not_starved, not_together
@@ -212,6 +212,7 @@ def _found(inputs: AxleInputs, axle: AxleFilter, machine: Machine, *, otherwise:
     found = without_agreed(not_denied(found, inputs, blocks, machine.max_steer), inputs)
     found = {side: acquitted(side, found[side], inputs, blocks, believed=not otherwise) for side in _SIDES}
     found = {side: of_one_cause(side, found[side], inputs, machine.limits.min_opening) for side in _SIDES}
+    found = told_from_none(found)
     return _Found(axle, path, found, _valve_judged(inputs, axle.model.plant))
 
 

@@ -24,6 +24,7 @@ _OTHERS, _CHANGES, _AS_OFTEN = (
     40,
     0.5,
 )  # wheels; changes that each other speed makes meanwhile, and as often as this one elsewhere
+_SMALL = 0.1  # quantile of changes: those of noise are mostly several of its steps, those of a count are one
 _P, _VALVE = 0.96, 0.02  # that the sensor is frozen, and that its valve is; set by hand, not calibrated
 _FAR, _P_NEAR = (
     8.0,
@@ -75,13 +76,21 @@ def _others_tremble(data: WheelsData, i: int, r: Frozen) -> bool:
     if usual is None or len(others) < _OTHERS or any(t is None for t in others):
         return False
     known = [t for t in others if t is not None]
-    step = rounding_step(elsewhere[np.r_[True, np.diff(elsewhere) != 0.0]])
+    step = _step_of(elsewhere[np.r_[True, np.diff(elsewhere) != 0.0]])
     rates = min(share for share, _ in known) / data.dt
     return bool(
         rates * seconds >= _CHANGES
         and min(share for share, _ in known) >= _AS_OFTEN * usual[0]
         and min(size for _, size in known) >= max(step, 1e-12)
     )
+
+
+def _step_of(values: np.ndarray) -> float:
+    """Step of readings, each of which is not the one before, shape (n,) [m/s]: teeth in a window are some, and its digits are finer."""
+    changes = np.abs(np.diff(values))
+    changes = changes[changes > 0.0]  # NaN are none
+    few = float(np.quantile(changes, _SMALL)) if changes.size else 0.0
+    return max(rounding_step(values), few)
 
 
 def _all_held(held: Mapping[int, list[Frozen]], i: int, r: Frozen) -> bool:

@@ -36,6 +36,7 @@ import electrohydraulic
 import flow_sharing
 import forwarder
 import geared_circuit
+import harvester
 import hydrostatic
 import loader
 import numpy as np
@@ -80,6 +81,7 @@ OTHERS = {
         tug,
         loader,
         transporter,
+        harvester,
     )
 }
 _DRIVEN, _STEERED = 0.06, 0.02  # m/s, rad/s

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from diagnosis.clearing import yaw
-from diagnosis.clearing.axles import _parted
+from diagnosis.clearing.axles import _evened, _parted
 from diagnosis.clearing.cells import Frame
 from diagnosis.clearing.checks import checks_of
 from diagnosis.clearing.limits import usual_limits
@@ -248,6 +248,14 @@ def test_a_drift_between_axles_shows_that_their_common_supply_hides(scatter: flo
     bands = [np.column_stack([supply + grows, supply]) + rng.normal(0.0, scatter, (n, 2)) for _ in range(3)]
     assert _parted(bands) == pytest.approx([expected, expected], abs=0.02)
     assert _parted([b[:10] for b in bands]) == [None, None]
+
+
+def test_an_axle_that_is_slower_to_one_side_is_evened_where_it_was_steered_to_both() -> None:
+    opening = np.where(np.arange(400) < 200, 0.5, -0.5)[:, np.newaxis]
+    opened, ahead = np.abs(opening), np.where(opening > 0.0, 0.15, 0.10)
+    evened = _evened(ahead, opened, opening, 0.1)
+    assert ahead / evened == pytest.approx(np.full((400, 1), 0.25))
+    assert np.array_equal(_evened(ahead[:210], opened[:210], opening[:210], 0.1), opened[:210])  # hardly steered to one
 
 
 def test_a_valve_that_is_slow_beside_the_others_is_not_cleared() -> None:

@@ -166,6 +166,13 @@ def test_a_wheel_whose_speed_per_opening_no_window_shows_has_no_fault_of_a_size(
     assert fault_of_wheel(check, deaf, alone=False) is None
 
 
+def test_a_wheel_that_is_off_where_it_creeps_alone_is_not_told() -> None:
+    """Dead bands differ: where it drives, it does as the others do."""
+    cells = in_cells(simulated(), base=True)
+    check = Checked(Kind.WHEEL, "FR", Side.SENSOR_OR_ACTUATOR, Check.RESPONSE, 0.8, 0.2)
+    assert fault_of_wheel(check, cells, alone=True) is None
+
+
 def test_a_wheel_beside_others_that_all_stand_has_no_share_of_their_speed() -> None:
     """Their speed per opening is 0, and nothing is a multiple of that."""
     cells = in_cells(simulated(), base=True)

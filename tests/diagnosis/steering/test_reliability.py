@@ -9,10 +9,10 @@ import pytest
 from numpy.testing import assert_allclose
 
 from diagnosis.results.assessment import Finding
-from diagnosis.results.result import Hypothesis
+from diagnosis.results.result import Epsilon, Hypothesis
 from diagnosis.results.vocabulary import Tier
 from diagnosis.steering.findings import SideFindings
-from diagnosis.steering.reliability import features_of, lost_by_model, paired, weighed
+from diagnosis.steering.reliability import features_of, lost_by_model, paired, told_from_none, weighed
 from replay.faults import FaultMode, Side
 
 DT, LENGTH = 0.01, 5
@@ -118,3 +118,14 @@ def test_a_brief_loss_of_an_angle_that_is_measured_once_stays_open_however_well_
     ]
     assert sensor.unexplained == ((brief.start // LENGTH, brief.stop // LENGTH),)
     assert sensor.findings[0] == dead
+
+
+@pytest.mark.parametrize(("low", "probability"), [(0.0, 0.6), (0.06, 0.6), (0.2, 0.98)])
+def test_a_loss_that_its_own_bounds_do_not_tell_from_none_is_not_sure(low: float, probability: float) -> None:
+    loss = replace(finding(10.0, 22.0, FaultMode.INEFFICIENT), epsilon=Epsilon(0.3, low, 0.7))
+    stuck = replace(finding(30.0, 40.0), epsilon=Epsilon(1.0, low, 1.0))
+    both = {Side.SENSOR: SideFindings((), ()), Side.ACTUATOR: SideFindings((loss, stuck), ((0, 3),))}
+    told = told_from_none(both)[Side.ACTUATOR]
+    assert [f.probability for f in told.findings] == [probability, 0.98]
+    assert told.unexplained == ((0, 3),)
+    assert told_from_none({Side.ACTUATOR: SideFindings((finding(1.0, 2.0, FaultMode.INEFFICIENT),), ())})

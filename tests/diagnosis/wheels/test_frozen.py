@@ -113,6 +113,15 @@ def test_where_all_others_tremble_by_more_than_a_step_one_value_is_a_sensor_that
     assert (told.start, told.stop, told.side, told.probability) == (2000, 2400, Side.SENSOR, 0.96)
 
 
+def test_beside_counts_that_go_to_and_fro_one_value_is_a_steady_speed() -> None:
+    """Teeth in a window, in finer digits: what the others change by is a tooth."""
+    y = speeds() + 0.012 * np.random.default_rng(2).standard_normal((N, 4))
+    y[2000:2400] = 1.0 + 0.012 * np.random.default_rng(3).standard_normal((400, 4))
+    y = 0.0234 * np.round(y / 0.0234)
+    y[2000:2400, 0] = 0.0234 * 43
+    assert found(np.asarray(np.round(y, 2))) == []
+
+
 def test_a_sensor_that_is_frozen_for_the_whole_mission() -> None:
     y = speeds()
     y[:, 0] = 0.7
