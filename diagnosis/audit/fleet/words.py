@@ -105,7 +105,8 @@ def standing(m: Machine) -> str:
             words += ", not cleared"
         elif lasting and m.cleared and not m.unjudged:
             words = "Ready, with faults to watch"
-    return words + (", and what may be later was not judged" if m.unjudged else "")
+    later = "its newest mission did not clear the machine" if m.uncleared else "what may be later was not judged"
+    return words + (f", and {later}" if m.unjudged else "")
 
 
 def _standing_now(m: Machine, trends: Sequence[PartTrend]) -> str:

@@ -98,11 +98,11 @@ def test_a_log_whose_clock_runs_ahead_makes_no_other_one_older(tmp_path: Path) -
 @pytest.mark.parametrize(
     ("verdict", "severity", "standing"),
     [
-        ("stop", "high", "Stop and repair, and what may be later was not judged"),
-        ("watch", "low", "Faults to watch, and what may be later was not judged"),
+        ("stop", "high", "Stop and repair, and its newest mission did not clear the machine"),
+        ("watch", "low", "Faults to watch, and its newest mission did not clear the machine"),
     ],
 )
-def test_a_finding_stays_though_later_missions_were_not_judged(
+def test_a_finding_stays_though_later_missions_gave_no_verdict(
     tmp_path: Path, verdict: str, severity: str, standing: str
 ) -> None:
     d = document(tmp_path, Sample("d0", verdict=verdict, faults=[Fault(severity=severity)]), BLIND)
