@@ -231,6 +231,17 @@ def test_every_reason_against_a_leave_is_in_the_list_once() -> None:
     ]
 
 
+def test_why_it_is_not_cleared_names_a_part_once() -> None:
+    """With the most that it may have lost; the list of what clears the machine has every fault."""
+    losses = [
+        finding(Side.ACTUATOR, FaultMode.INEFFICIENT, start, stop, epsilon=e)
+        for start, stop, e in ((1000, 2000, 0.55), (5000, 6000, 0.65))
+    ]
+    got = verdict(machine(FR_actuator=assessed(*losses)))
+    assert got.not_cleared == "the FR drive valve may have lost up to 66 %"
+    assert [x.fault for x in got.to_clear] == ["F1", "F2"]
+
+
 def test_only_ready_and_watch_are_ever_cleared() -> None:
     assert verdict(machine()).cleared
     assert not verdict(machine(), 0.0).cleared
