@@ -10,6 +10,7 @@ import pytest
 
 from diagnosis.decision.decide import Decision, decide
 from diagnosis.decision.intervals import intervals_of
+from diagnosis.decision.severity import advised
 from diagnosis.results.assessment import CODE, Assessment, Finding, unassessed
 from diagnosis.results.detectability import Detectable, Deviation, Power, Powers
 from diagnosis.results.machine_event import not_following
@@ -205,6 +206,20 @@ def test_faults_to_watch_are_cleared_only_where_all_else_is_ready() -> None:
     ]
     odd = parts | {("FL", "sensor"): replace(parts["FL", "sensor"], unexplained_s=6.0)}
     assert verdict(odd).not_cleared == "a residual is not explained by any fault"
+
+
+def test_one_wording_where_a_mission_gives_no_leave_for_other_reasons() -> None:
+    """*No reason to stop* and *check* stood below *it must be checked first*."""
+    parts = machine(FR_actuator=assessed(WATCHED))
+    faults = intervals_of(parts, MACHINE, HYDRAULIC, 0, STEP)
+    free, odd = verdict(parts), verdict(parts | {("FL", "sensor"): replace(parts["FL", "sensor"], unexplained_s=6.0)})
+    for got, lead, says in (
+        (free, "Check the FR", "no reason to stop"),
+        (odd, "Before the machine goes out, check the FR", "before the machine goes out"),
+    ):
+        assert str(got.actions[0]["lead"]).startswith(lead)
+        (fault,) = advised(faults, got.status, cleared=got.cleared)
+        assert says in fault.advice
 
 
 def test_a_valve_that_may_not_answer_is_not_cleared() -> None:
