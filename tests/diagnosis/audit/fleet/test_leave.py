@@ -325,7 +325,7 @@ def test_the_course_of_a_part_that_is_silent_says_what_it_leaves_out(tmp_path: P
         for k in range(6)
     ]  # fmt: skip
     page = build_fleet_page(fleet_json(load_fleet(samples.write_store(tmp_path / "fleet.sqlite", missions))))
-    assert "not counting the time found as no signal, so the part is worse than this" in page
+    assert "not counting the time found as no signal, in which nothing was left of it: the dots are of the rest" in page
 
 
 def test_the_report_of_a_mission_before_the_repair_is_said_to_be_so(tmp_path: Path) -> None:
