@@ -73,7 +73,8 @@ def to_clear(
     out += [ToClear(event.text, event.act) for event in against.events]
     out += [ToClear(text, "correct [signals] in a machine file, and diagnose again") for text in against.hints]
     blamed_parts = {(f.component, s.value) for f in faults if f.severity is not Severity.INFO for s in f.side.sides}
-    short = [p for p in against.short if p not in blamed_parts]  # of these the fault is what is to be checked
+    # of a faulty part the fault is what is to be checked, unless it was judged too briefly alone
+    short = [p for p in against.short if p not in blamed_parts] or against.short
     out += short_parts(short, assessments, decided_s, driven, limits, words, open_state=against.open_state)
     if against.unexplained:
         for kind, second in (

@@ -211,3 +211,5 @@ def test_a_faulty_part_is_not_listed_as_judged_too_briefly() -> None:
     for found, named in ((faults, {("FL", "sensor")}), ((), {("FR", "sensor"), ("FL", "sensor")})):
         rows = to_clear(about, PARTS, {}, {}, [], Limits(), found)
         assert {part for row in rows for part in row.parts} == named
+    (row,) = to_clear(Reservations(short=(("FR", "sensor"),)), PARTS, {}, {}, [], Limits(), faults)
+    assert row.parts == (("FR", "sensor"),)  # else nobody would be told what clears the machine
