@@ -19,6 +19,7 @@ from diagnosis.decision.intervals import intervals_of, spans_of
 from diagnosis.decision.log_caveats import more_caveats, without_speed
 from diagnosis.decision.missing import is_commanded
 from diagnosis.decision.scale import Scale, scale_of
+from diagnosis.decision.severity import advised
 from diagnosis.decision.wording import join_words
 from diagnosis.recording_rows import log_row
 from diagnosis.results.assessed import Cut, CutKind
@@ -136,16 +137,15 @@ def report_of_mission(judged: Judged, identity: MachineRow) -> ReportDocument:
     timeline = mission.timeline
     moving = metrics.driving(replay, timeline, machine)
     coverage, decided_s = metrics.coverage(found.assessments, moving, machine, timeline.dt)
+    decision = _decision(judged, coverage, decided_s, metrics.open_states(found.assessments, moving, machine))
     report: ReportDocument = {
         "schema": SCHEMA,
         "tool": {"name": "mfhca-replay", "version": __version__},
         "log": log_row(mission, moving, machine),
         "machine": identity,
         "readings": to_json(replay.readings),
-        "verdict": _decision(judged, coverage, decided_s, metrics.open_states(found.assessments, moving, machine)).row(
-            [*more_caveats(mission, judged.recorded.first_ns, machine), *_told_scale(judged)]
-        ),
-        "intervals": to_json(judged.intervals),
+        "verdict": decision.row([*more_caveats(mission, judged.recorded.first_ns, machine), *_told_scale(judged)]),
+        "intervals": to_json(advised(judged.intervals, decision.status, cleared=decision.cleared)),
         "states": to_json(spans_of(found.assessments, timeline.step_ns)),
         "phases": metrics.phases(timeline, replay, machine),
         "coverage": coverage,

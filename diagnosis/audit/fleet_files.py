@@ -17,6 +17,7 @@ from diagnosis.audit.fleet.first_seen import first_seen_times, newest_result_ns,
 from diagnosis.audit.fleet.fleet_types import FleetDocument
 from diagnosis.audit.fleet.gather import machines_of
 from diagnosis.audit.fleet.news import first_runs
+from diagnosis.audit.fleet.open_points import open_points
 from diagnosis.audit.fleet.read import Mission, content_mark, fleet_repairs, read_missions, read_notes, read_run
 from diagnosis.audit.fleet.runs import Limits
 from diagnosis.audit.fleet.table import fleet_csv
@@ -202,6 +203,7 @@ def _limits(path: Path) -> Limits:
             axles=tuple(map(str, machine["axles"])),
             cleared=report["verdict"]["cleared"],
             not_cleared=str(report["verdict"].get("not_cleared", "")),
+            open_points=open_points(report),
             holds_open=bool(report.get("previous", {}).get("open_faults")),
             found={
                 (r["component"], r["side"], r["deviation"]): float(r["share"])

@@ -145,8 +145,12 @@ def _from_size(name: str, sizes: Sequence[float | None]) -> str:
 
 def doubt_of(watch: Sequence[FaultInterval], against: Reservations) -> str:
     """Why a mission with faults to watch is not cleared; empty where it is."""
-    out = [doubt for _, doubt in sorted(doubts_of(watch, against.words), key=lambda d: not unanswered(d[0]))]
-    out = list(dict.fromkeys(out))
+    by_part: dict[tuple[str, str], tuple[FaultInterval, str]] = {}
+    for fault, doubt in sorted(doubts_of(watch, against.words), key=lambda d: not unanswered(d[0])):
+        part = fault.component, fault.side
+        if part not in by_part or _most(fault) > _most(by_part[part][0]):
+            by_part[part] = fault, doubt
+    out = list(dict.fromkeys(doubt for _, doubt in by_part.values()))
     if against.damage:
         out.append("part of the log was left out" if is_left_out(against.damage[0]) else "the log is damaged")
     silent = len(against.silent)
@@ -168,6 +172,11 @@ def doubt_of(watch: Sequence[FaultInterval], against: Reservations) -> str:
         others = join_words(list(dict.fromkeys(c.component for c in against.open)))
         out.append(f"beside a fault nothing shows whether {others} {'are' if ' and ' in others else 'is'} healthy")
     return join_words(out[:_REASONS]) + (MORE if len(out) > _REASONS else "")
+
+
+def _most(fault: FaultInterval) -> float:
+    """What a part may have lost at most [1]; all of what may not answer."""
+    return 1.0 if unanswered(fault) or fault.epsilon is None else fault.epsilon.high
 
 
 def doubts_of(faults: Sequence[FaultInterval], words: MachineWords) -> list[tuple[FaultInterval, str]]:

@@ -19,6 +19,7 @@ from diagnosis.decision.caveats import (
 from diagnosis.decision.endings import endings_of
 from diagnosis.decision.open_checks import open_words, stands_out
 from diagnosis.decision.sensors_alone import TITLES, sensors_alone
+from diagnosis.decision.severity import advised
 from diagnosis.decision.short import SAID_S, ToClear, beside_nothing, exempt_axles
 from diagnosis.decision.to_clear import to_clear
 from diagnosis.decision.wording import actions_of, count_faults, join_words, misplaced_words, sentence_of
@@ -208,7 +209,7 @@ def decide(
     else:
         caveats += hidden
     caveats = tuple(c for c in caveats if c != found.text)
-    actions = actions_of(intervals, words)
+    actions = actions_of(advised(intervals, found.status, cleared=found.cleared), words)
     return replace(
         found,
         scope=tuple(scope),

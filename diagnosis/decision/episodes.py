@@ -2,7 +2,9 @@
 
 A constant loss that shows only while the wheel is driven hard is found in pieces. Between them nothing can be judged; where the part
 was seen to be healthy for longer, the pieces are faults of their own. A share lost of little is little: what is called healthy while the
-reference hardly moves counts by how far the loss would show there, and so by how far a delay would, while it hardly changes. Losses that touch are one that grows or fades. A shorter piece
+reference hardly moves counts by how far the loss would show there, and so by how far a delay would, while it hardly changes, and not at
+all where it fits the loss far better than none. Nothing between the pieces of one fault stays called healthy. Losses that touch are one
+that grows or fades. A shorter piece
 beside a fault, of which no row is probable enough to give it a name and that may be of the row of that fault, is the end or the
 beginning of it.
 """
@@ -16,7 +18,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnosis.results.assessment import CODE, Assessment, Finding
+from diagnosis.results.assessment import CODE, Assessment, Finding, Reason
 from diagnosis.results.candidates import candidates
 from diagnosis.results.result import Epsilon
 from diagnosis.results.sentence import About, Sentence, is_about, stated_anew
@@ -36,6 +38,8 @@ _AS_LATE, _EVEN_S = (
 )  # of a delay, by which two may differ; over which a reference is evened before it is asked how it changes
 _SEEN_LATE_S = 2.0  # likewise of a delay: the changes at both ends of the gap, evened, are such seconds
 _CHANGES = 0.1  # of ε̂: a bound that is wider than this to either side has the course of a loss in it
+_FITS = 0.5  # of what is off by no loss: what is left of it by the loss, where the loss goes on
+_HIDDEN = Reason("a fault before and after it would hardly show")
 _SPARE = 0.1  # of ε̂: by which two bounds may miss each other
 _NAMED = 6
 _TOUCHES_S = 0.1
@@ -57,8 +61,27 @@ def with_episodes(assessments: Mapping[Part, Assessment], dt: float) -> dict[Par
         both = {side: b for (component, side), b in assessments.items() if component == part[0]}
         findings = a.findings if len(a.findings) < 2 else joined(a.findings, both, dt)
         told = tuple(_with_its_chance(f) for f in findings)
-        out[part] = a if told == a.findings else replace(a, findings=told)
+        out[part] = a if told == a.findings else _without_healthy(replace(a, findings=told), a.findings)
     return out
+
+
+def _without_healthy(joined: Assessment, pieces: Sequence[Finding]) -> Assessment:
+    """The same with nothing called healthy between the pieces of one fault: of the fault where it goes on, else it does not show there."""
+    states, healthy = joined.states.copy(), CODE[State.HEALTHY]
+    open_state = State.NOT_EXCITED if State.NOT_EXCITED in joined.reasons else State.NOT_ASSESSED
+    hidden = False
+    for a, b in pairwise(sorted(pieces, key=lambda f: f.start)):
+        gap = slice(a.stop, b.start)
+        if b.start <= a.stop or not any(f.start <= a.start and b.stop <= f.stop for f in joined.findings):
+            continue
+        seen = joined.states[gap] == healthy
+        on = State(a.mode.value) if a.mode.scaled and _goes_on(a, b, joined) else open_state
+        states[gap][seen] = CODE[on]
+        hidden |= on is open_state and bool(seen.any())
+    if np.array_equal(states, joined.states):
+        return joined
+    out = replace(joined, states=states)
+    return out.reasoned(open_state, _HIDDEN) if hidden and open_state not in joined.reasons else out
 
 
 def _with_its_chance(finding: Finding) -> Finding:
@@ -140,6 +163,7 @@ def _continues(a: Finding, b: Finding, sides: Mapping[str, Assessment], dt: floa
     usual = _SEEN_HEALTHY_S.get(a.tier, _SEEN_BY_MODELS_S)
     least = _SEEN_LATE_S if _late_s(a) > 0.0 else max(usual, _SEEN_SCALED_S) if a.mode.scaled else usual
     seen = _healthy_steps(a, b, sides, dt) * dt >= least
+    seen = seen and not any(a.mode.scaled and _goes_on(a, b, sides[s.value]) for s in a.side.sides if s.value in sides)
     changes = a.mode is FaultMode.INEFFICIENT and (b.start - a.stop) * dt <= _TOUCHES_S  # a loss that grows or fades
     return not seen and (changes or _alike(a.epsilon, b.epsilon)) and _same_value(a, b) and _as_late(a, b)
 
@@ -201,6 +225,20 @@ def _lags(x: NDArray[np.float64], late: float, dt: float) -> NDArray[np.float64]
         (total[width:-width] - total[: -2 * width]) / width,
     )
     return np.asarray(late * (ahead - behind) / (width * dt))
+
+
+def _goes_on(a: Finding, b: Finding, one: Assessment) -> bool:
+    """Whether what is called healthy between two losses of a share fits their loss far better than none; not where nothing is known of it."""
+    healthy = np.flatnonzero(one.states[a.stop : b.start] == CODE[State.HEALTHY]) + a.stop
+    sizes = [f.epsilon.value for f in (a, b) if f.epsilon is not None]
+    expected, residual = (one.columns.get(name) for name in ("expected", "residual"))
+    if not healthy.size or len(sizes) < 2 or expected is None or residual is None:
+        return False
+    rows = np.minimum((healthy / step_of(bucket_of(one.states.size))).astype(np.intp), len(expected) - 1)
+    off, x = np.asarray(residual, np.float64)[rows], np.asarray(expected, np.float64)[rows]
+    known = np.isfinite(off) & np.isfinite(x)
+    lost = np.sum((off[known] + 0.5 * sum(sizes) * x[known]) ** 2)
+    return bool(known.any() and lost < _FITS * np.sum(off[known] ** 2))
 
 
 def _alike(a: Epsilon | None, b: Epsilon | None) -> bool:

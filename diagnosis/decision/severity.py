@@ -13,12 +13,13 @@ hardly anything is left (ε̂ ≥ .9) is as good as without signal, whatever its
 
 from __future__ import annotations
 
-from collections.abc import Container
+from collections.abc import Container, Sequence
+from dataclasses import replace
 
 from diagnosis.results.assessment import Finding
 from diagnosis.results.machine_words import MachineWords
 from diagnosis.results.result import Epsilon, FaultInterval
-from diagnosis.results.vocabulary import Kind, Severity, Tier
+from diagnosis.results.vocabulary import Kind, Severity, Tier, Verdict
 from replay.faults import TOTAL, FaultMode, Side
 from replay.machine.config import Limits
 
@@ -32,6 +33,11 @@ _EVEN = 0.5  # that a part delivers nothing usable, from which on that is what i
 _PROBABLY_TOTAL = 0.75  # that the named side is stuck or without signal, from which on the machine is stopped, ...
 _MAY_BE_TOTAL = 0.25  # ... and from which on it is looked at before the machine goes out
 HALF = 0.5  # of ε: a part that may have lost so much is no fault to drive on with
+_ALONE = "This alone is no reason to stop; check it before it grows."
+#: The same in a mission that gives no leave for other reasons.
+HELD = (
+    "Alone it would keep no machine in, but this mission does not clear it: check it before the machine goes out again."
+)
 _PARTIAL = (FaultMode.INEFFICIENT, FaultMode.OUTSIDE_TABLE)  # rows of which ε̂ says how much is left
 
 
@@ -74,7 +80,7 @@ def severity_of(
     severity = Severity.MEDIUM if marked else Severity.LOW
     if halved:
         return severity, f"It {halved}: check it before the machine goes out again."
-    return severity, "This alone is no reason to stop; check it before it grows."
+    return severity, _ALONE
 
 
 def _severity_of_total(
@@ -113,6 +119,13 @@ def _severity_of_total(
     return Severity.HIGH, (
         f"Stop and repair the sensor: it delivered nothing usable for more than {limits.brief:g} s (the paper’s Assumption 1)."
     )
+
+
+def advised(intervals: Sequence[FaultInterval], status: Verdict, *, cleared: bool) -> tuple[FaultInterval, ...]:
+    """Faults with the advice that fits their mission's verdict: what alone is no reason to stop is looked at where the mission gives no leave."""
+    if status is not Verdict.WATCH or cleared:
+        return tuple(intervals)
+    return tuple(replace(f, advice=HELD) if f.advice == _ALONE else f for f in intervals)
 
 
 def halved_words(side: Side, mode: FaultMode, epsilon: Epsilon | None) -> str:

@@ -16,7 +16,7 @@ from diagnosis.results.clearing import Check, Checked
 from diagnosis.results.left_out import by_its_clock, is_left_out
 from diagnosis.results.machine_words import MachineWords
 from diagnosis.results.result import FaultInterval
-from diagnosis.results.vocabulary import Kind, Tier
+from diagnosis.results.vocabulary import Kind, Severity, Tier
 from replay.faults import Side, State
 from replay.machine.config import Limits
 
@@ -72,7 +72,10 @@ def to_clear(
         )
     out += [ToClear(event.text, event.act) for event in against.events]
     out += [ToClear(text, "correct [signals] in a machine file, and diagnose again") for text in against.hints]
-    out += short_parts(against.short, assessments, decided_s, driven, limits, words, open_state=against.open_state)
+    blamed_parts = {(f.component, s.value) for f in faults if f.severity is not Severity.INFO for s in f.side.sides}
+    # of a faulty part the fault is what is to be checked, unless it was judged too briefly alone
+    short = [p for p in against.short if p not in blamed_parts] or against.short
+    out += short_parts(short, assessments, decided_s, driven, limits, words, open_state=against.open_state)
     if against.unexplained:
         for kind, second in (
             (Kind.WHEEL, "wheel.*.v_true (a second speed)"),
@@ -90,7 +93,9 @@ def to_clear(
             out.append(
                 ToClear(
                     f"{who}: no single fault explains the residual.",
-                    f"inspect these parts, and log {second}{other}",
+                    f"log {second}{other}: parts fail one at a time, so that what several {_several(kind, words)} leave unexplained is rather the model's"
+                    if len(parts) > 1
+                    else f"inspect these parts, and log {second}{other}",
                     sides_of((c, Side.SENSOR_OR_ACTUATOR) for c in sorted(parts)),
                 )
             )
@@ -158,6 +163,11 @@ def to_clear(
         out
         + short_parts(rested, assessments, decided_s, driven, limits, words, Kind.STEER, open_state=against.open_state)
     )
+
+
+def _several(kind: Kind, words: MachineWords) -> str:
+    """What is moved, of several."""
+    return "axles" if kind is Kind.STEER else words.parts
 
 
 def _waits_for_unit(check: Checked, assessments: Mapping[Part, Assessment]) -> bool:

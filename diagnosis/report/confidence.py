@@ -173,12 +173,19 @@ def headline(report: ReportDocument) -> tuple[str, str]:
     if holds_open(report) and may_go_out(verdict):
         return alone, "but one of an earlier mission is open: the fleet page says whether it may go out"
     if (held := held_by_fleet(report)) is not None:
-        return alone if may_go_out(verdict) else status.label, f"{held}: the fleet page says why"
+        return alone if may_go_out(verdict) else _label(report), f"{held}: the fleet page says why"
     if status is not Verdict.WATCH:
-        return status.label, _ANSWERS[status]
+        return _label(report), _ANSWERS[status]
     if not verdict["cleared"]:
         return status.label, f"{Leave.CHECK}: {verdict['not_cleared']}"
     return "Ready, with faults to watch", Leave.MAY.value
+
+
+def _label(report: ReportDocument) -> str:
+    """Words of a verdict: where every part of a wheel was judged, it is not that which is missing."""
+    status, wheels = Verdict(report["verdict"]["status"]), _wheel_sides(report)
+    judged_all = bool(wheels) and all(s.long_enough for s in wheels)
+    return "Not cleared" if status is Verdict.NOT_ASSESSED and judged_all else status.label
 
 
 def going_out(report: ReportDocument) -> tuple[str, str]:

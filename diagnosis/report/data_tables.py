@@ -69,6 +69,14 @@ def _meanwhile(report: ReportDocument, check: ClearingRow) -> str:
     return "".join(f", {w} {', '.join(n)}" for w, n in (("at the time of", during), ("just after", after)) if n)
 
 
+def _but_for(report: ReportDocument, check: ClearingRow) -> str:
+    """The component's own faults, whose time a check that passes does not ask about, to follow its time."""
+    own = [
+        f["id"] for f in report["intervals"] if f["component"] == check["component"] and f["severity"] != Severity.INFO
+    ]
+    return f", but for the time of {', '.join(own)}" if check["passed"] and own else ""
+
+
 def _unseen(faults: Sequence[IntervalRow], part: tuple[str, str], seen_s: float) -> list[str]:
     """How long the faults of a part last, where that is longer than it was seen to be faulty: between its traces it may not be judged."""
     mine = sorted(
@@ -94,9 +102,13 @@ def check_rows(report: ReportDocument) -> list[Context]:
                 "asked": c["asked"],
                 "worst": "not shown" if c["worst"] is None else size_words(c["check"], c["worst"]),
                 "limit": size_words(c["check"], c["limit"]),
-                "when": "over the mission"
-                if start is None or stop is None
-                else f"{start:.1f}–{stop:.1f} s{_meanwhile(report, c)}",
+                "when": (
+                    "over the mission"
+                    if start is None or stop is None
+                    else f"{start:.1f}–{stop:.1f} s{_meanwhile(report, c)}"
+                )
+                + _but_for(report, c),
+                "seldom": c["shows"] is not None and c["shows"] > report["limits"]["clear_at"] + 0.005,
                 "shows": "–" if c["shows"] is None else f"from {100 * c['shows']:.0f} %",
             }
         )

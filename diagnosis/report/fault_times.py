@@ -31,7 +31,7 @@ def when_words(fault: IntervalRow, report: ReportDocument) -> str:
     until, rest = clock(stop, _DIGITS), span(whole - stop)
     if ending is Ending.ENDED:
         return f"{fault['id']} {began} and ended at {until}, {rest} before the log does"
-    return f"{fault['id']} {began} and was last seen at {until}, {rest} before the log ends; its part was not seen healthy since"
+    return f"{fault['id']} {began} and was last seen at {until}, {rest} before the log ends; its part was not seen healthy for a second since"
 
 
 def times_words(faults: Sequence[IntervalRow], report: ReportDocument) -> str:

@@ -202,8 +202,9 @@ def clearing_sentences(verdict: VerdictRow) -> list[tuple[str, str]]:
 
 def _said(row: ToClearRow, text: str) -> bool:
     """Whether the verdict's sentences give a reason, or why parts were not judged together with what would clear them."""
-    why = row.get("why", "")
-    return row["reason"] in text or (bool(why) and why in text and row["act"] in text)
+    why, reason = row.get("why", ""), row["reason"].rstrip(".")
+    told = reason in text or (f"{reason[:1].lower()}{reason[1:]}" in text and row["act"] in text)
+    return told or (bool(why) and why in text and row["act"] in text)
 
 
 def _begun(text: str) -> str:

@@ -80,6 +80,8 @@ def _replayed(timeline: Timeline, replay: Replay, machine: Machine, step: Steps)
         out |= {f"replay.{wheel}.{leaf}": _single(x) for leaf, x in found.items()}
     for j, axle in enumerate(machine.axles):
         out[f"replay.{axle}.phi_ref"] = _single(replay.phi_ref[step, j])
+        if control.law == "none":  # as in the columns
+            continue
         out[f"replay.{axle}.u"] = _single(replay.steer_u[step, j])
         recorded = timeline.get(f"steer.{axle}.u")
         if recorded is not None and not timeline.open_loop:

@@ -17,8 +17,10 @@ from diagnosis.results.alike import hardly_moves, is_held, or_shifted
 from diagnosis.results.assessment import Finding
 from diagnosis.results.limited import limited
 from diagnosis.results.result import Hypothesis
+from diagnosis.results.sentence import About, is_about
 from diagnosis.wheels.findings import WheelFindings
 from diagnosis.wheels.isolation import NOT_PREFERRED
+from diagnosis.wheels.onset import only_a_sensor
 from replay.faults import FaultMode, Side, State
 
 Array = NDArray[np.float64]
@@ -46,8 +48,12 @@ _LESS_SURE = (
 )
 _MOST_EITHER = 0.7  # of a loss of either side: right were 47 of 57 that were told as surer, on tuning machines, 19 of 31 before the checks grew
 _EITHER = (
-    "By command and speed alone, in a third of such cases the {valve} of the same {wheel} was weak instead, and in another third the {valve} "
-    "was stuck or the sensor off by an offset: the {valve}'s position would tell."
+    "By command and speed alone, a {wheel.sensor} that shows less and a {wheel.actuator} that gives less look alike here; on machines of other "
+    "build it was as often the one as the other, and one of both in seven of ten cases. The {position} would tell."
+)
+_JUMPED = (
+    "Such a jump at the onset is the sensor's, not the {valve}'s. That it reads a share is no surer than 70 %: by command and speed alone an offset, or "
+    "another {wheel}, looked like it on machines of other build."
 )
 _MOST_UNPREFERRED = (
     0.6  # of a stuck or silent sensor: all of 58 right claims from 0.85 on were preferred by it (tuning, 15 machines)
@@ -120,9 +126,12 @@ def _claimed(f: Finding, clear_at: float, *, measured: bool) -> Finding:
     if small and f.side is not Side.ACTUATOR and f.probability < _SURE:
         return limited(f, _MOST_SMALL, _SMALL)
     lost = f.side is Side.SENSOR and f.mode is FaultMode.INEFFICIENT
-    if lost and not measured and f.probability < _LOSS_SURE:
-        return _of_either(f)
-    return _or_behind(f) if lost else f
+    if not lost:
+        return f
+    jumped = only_a_sensor(f.evidence)
+    if measured or f.probability >= _LOSS_SURE:
+        return f if jumped else _or_behind(f)
+    return _of_sensor(f) if jumped else _of_either(f)
 
 
 def _or_behind(f: Finding) -> Finding:
@@ -137,6 +146,21 @@ def _or_behind(f: Finding) -> Finding:
     return replace(f, probability=most, hypotheses=tuple(named), evidence=(*f.evidence, _BEHIND))
 
 
+def _of_sensor(f: Finding) -> Finding:
+    """A loss that begins with what no wheel can do: the valve has no share in it, an offset of the sensor has."""
+    own, valves = (f.side.value, f.mode.value), {(Side.ACTUATOR.value, f.mode.value)}
+    off = (f.side.value, FaultMode.OUTSIDE_TABLE.value)
+    p = {(h.side, h.mode): h.p for h in f.hypotheses}
+    lost = p[own] + sum(p.pop(row, 0.0) for row in valves)
+    kept = min(lost, _MOST_EITHER)
+    p[own] = kept
+    if lost > kept:
+        p[off] = p.get(off, 0.0) + lost - kept
+    hypotheses = tuple(sorted((Hypothesis(side, mode, x) for (side, mode), x in p.items()), key=lambda h: -h.p))
+    said = tuple(t for t in f.evidence if not is_about(t, About.CASES, About.RIVAL))
+    return replace(f, probability=kept, hypotheses=hypotheses, evidence=(*said, _JUMPED))
+
+
 def _of_either(f: Finding) -> Finding:
     """A sensor's loss as one of its wheel: of the sensor, or of the valve."""
     rows = {(side.value, f.mode.value) for side in f.side.sides} | {(Side.ACTUATOR.value, f.mode.value)}
@@ -149,9 +173,8 @@ def _of_either(f: Finding) -> Finding:
         others = [h for h in others if (h.side, h.mode) != about]
         others += [Hypothesis(*about, had + (claimed - both) / 2)] if had or claimed > both else []
     hypotheses = tuple(sorted([*halves, *others], key=lambda h: -h.p))
-    return replace(
-        f, side=Side.SENSOR_OR_ACTUATOR, probability=both, hypotheses=hypotheses, evidence=(*f.evidence, _EITHER)
-    )
+    said = tuple(t for t in f.evidence if not is_about(t, About.CASES, About.RIVAL))
+    return replace(f, side=Side.SENSOR_OR_ACTUATOR, probability=both, hypotheses=hypotheses, evidence=(_EITHER, *said))
 
 
 def _untold(f: Finding) -> Finding:

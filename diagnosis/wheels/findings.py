@@ -218,7 +218,5 @@ def _detected(path: WheelPath, segment: Segment, finding: Finding) -> Finding:
     hold = path.width * path.dt
     causal = first_lasting(path.raised, segment.start, segment.stop, 2, max(1, round(_HOLD_S / hold)))
     seen = None if causal is None else max(finding.start, min(causal * path.width, finding.stop - 1))
-    shape = Sentence(
-        About.ONSET, onset_sentence(finding.start, path.y, path.model, path.dt, path.names[0], finding.side)
-    )
+    shape = onset_sentence(finding.start, path.y, path.model, path.dt, path.names[0], finding.side)
     return replace(finding, detected=seen, evidence=(*finding.evidence, shape))

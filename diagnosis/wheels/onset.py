@@ -2,22 +2,39 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 from numpy.typing import NDArray
 
+from diagnosis.results.sentence import About, Sentence, is_about
 from diagnosis.wheels.models import S_OU_LARGE, S_STUCK, TOTAL_SENSOR, WheelFilterModel
 from replay.faults import Side
 
 Array = NDArray[np.float64]
 
 _SILENT = 10  # readings after an onset that are looked at for silence
+_BEYOND = 2.0  # times what a wheel can by its model, whose lag is off by so much on machines of other build
+_CANNOT = "A sensor can do this, a {wheel} cannot."
 
 
-def onset_sentence(start: int, y: Array, model: WheelFilterModel, dt: float, name: str, side: Side) -> str:
+def onset_sentence(start: int, y: Array, model: WheelFilterModel, dt: float, name: str, side: Side) -> Sentence:
     """What the shape of the onset says: a sensor's fault may jump by more than a wheel can, a valve's bends.
 
-    `y` of shape (n,); `dt` in s.
+    `y` of shape (n,); `dt` in s. What decides the side is the part in the middle.
     """
+    text = _onset_words(start, y, model, dt, name, side)
+    return Sentence(About.ONSET, text.removesuffix(_CANNOT), _CANNOT if text.endswith(_CANNOT) else "")
+
+
+def only_a_sensor(texts: Iterable[str]) -> bool:
+    """Whether evidence says that no wheel can do what a reading did at its onset."""
+    return any(
+        isinstance(text, Sentence) and is_about(text, About.ONSET) and text.parts[1] == _CANNOT for text in texts
+    )
+
+
+def _onset_words(start: int, y: Array, model: WheelFilterModel, dt: float, name: str, side: Side) -> str:
     low, high = max(1, start - 2), min(y.size, start + 3)
     if side is Side.SENSOR and start and not np.isfinite(y[start + _SILENT : start + 2 * _SILENT]).any():
         return f"At its onset {name} falls silent."
@@ -26,9 +43,10 @@ def onset_sentence(start: int, y: Array, model: WheelFilterModel, dt: float, nam
     steps = np.abs(np.nan_to_num(y[low:high] - y[low - 1 : high - 1]))
     largest = float(steps.max())
     fastest = float(np.nan_to_num(np.abs(y[low - 1 : high])).max())
-    able = (model.K + fastest) * min(1.0, dt / model.tau)  # by a wheel whose valve opens wholly the other way
+    within = dt * _waited(y, low + int(np.argmax(steps)))
+    able = (model.K + fastest) * min(1.0, within / model.tau)  # by a wheel whose valve opens wholly the other way
     jump = f"At its onset {name} jumps by {largest:.2g} {{speed_unit}} within one sample ({largest / model.noise:.0f} times its noise)"
-    beyond = largest > max(8 * model.noise, able)
+    beyond = largest > max(8 * model.noise, _BEYOND * able)
     if side is Side.ACTUATOR:
         if beyond:
             return f"{jump}: a fault of the {{valve}} alone does not explain this."
@@ -37,12 +55,20 @@ def onset_sentence(start: int, y: Array, model: WheelFilterModel, dt: float, nam
             "reacts when its {valve} fails."
         )
     if beyond:
-        return f"{jump}. A sensor can do this, a {{wheel}} cannot."
+        return f"{jump}. {_CANNOT}"
     return (
         f"{jump}."
         if largest > 8 * model.noise
         else f"At its onset no step of {name} exceeds {largest:.2g} {{speed_unit}}."
     )
+
+
+def _waited(y: Array, at: int) -> int:
+    """Samples since a reading last changed before sample `at`: what comes seldom, or is late, moves on meanwhile."""
+    before = at - 1
+    while before > 0 and y[before] == y[before - 1]:
+        before -= 1
+    return at - before
 
 
 def refined(start: int, y: Array, reach: int, m: int, noise: float) -> int:

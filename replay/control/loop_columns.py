@@ -84,13 +84,15 @@ def replay_columns(timeline: Timeline, replay: Replay, machine: Machine, *, deta
     -------
     dict[str, NDArray[np.float64]], each of the rows of `replay.arrays.envelope` for the replay's bucket
         ``t`` [s], then signals under their canonical names, then ``replay.<part>.<quantity>``; SI, NaN where there
-        is no sample. A replayed quantity that is nowhere defined has no column.
+        is no sample. A replayed quantity that is nowhere defined has no column, nor has the steering command of a law that the machine does
+        not have (law ``none``).
     """
     bucket = replay.bucket
     columns = {"t": np.arange(rows_of(timeline.size, bucket)) * (timeline.dt * step_of(bucket))}
     names = (*machine.canonical_signals(), *timeline.signals)
     columns |= {n: envelope(timeline.signals[n], bucket) for n in dict.fromkeys(names) if n in timeline.signals}
-    for parts, quantities in ((machine.wheels, _WHEEL + (_WHEEL_DETAIL if detail else ())), (machine.axles, _AXLE)):
+    steering = tuple(q for q in _AXLE if machine.control.law != "none" or q.leaf == "phi_ref")
+    for parts, quantities in ((machine.wheels, _WHEEL + (_WHEEL_DETAIL if detail else ())), (machine.axles, steering)):
         for i, part in enumerate(parts):
             for quantity in quantities:
                 values = getattr(replay, quantity.field)[:, i]

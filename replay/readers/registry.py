@@ -17,6 +17,8 @@ from replay.readers.common.border import Bordered
 from replay.readers.common.mistaken import lfs_pointer, mistaken
 from replay.readers.common.protocol import Reader
 
+_BLOCK, _FEW = 1 << 20, 16  # bytes that are looked at together, and fewer than which tell nothing
+
 
 @cache
 def reader_of(row: LogFormatRow) -> Reader:
@@ -60,6 +62,8 @@ def open_log(path: Path) -> Reader:
         for reader in readers():
             if reader.matches(path):
                 return reader
+        if zeros := _zeros(path):
+            raise LogError(zeros)
         if other := mistaken(path):
             raise LogError(other)
         raise LogError(f"{path} is not a log that can be read: found {_found(path)}; expected {_expected()}")
@@ -70,6 +74,23 @@ def open_log(path: Path) -> Reader:
 def _expected() -> str:
     *words, last = (row.words for row in LOG_FORMATS)
     return f"{', '.join(words)} or {last}"
+
+
+def _zeros(path: Path) -> str:
+    """What is wrong with a file that begins with zeros, as none that was written does; empty for any other."""
+    if not path.is_file():
+        return ""
+    found, size = 0, path.stat().st_size
+    with path.open("rb") as file:
+        while block := file.read(_BLOCK):
+            lead = len(block) - len(block.lstrip(b"\0"))
+            found += lead
+            if lead < len(block):
+                break
+    if found < _FEW:
+        return ""
+    much = "holds nothing but zeros" if found >= size else f"begins with {found} zeros in place of a log's header"
+    return f"{path} {much} ({size} bytes): it was never written out, or overwritten, so copy it from the recorder once more, or leave it out"
 
 
 def _found(path: Path) -> str:

@@ -82,3 +82,16 @@ def test_marks_stand_out_from_the_card(open_page: OPEN, theme: str) -> None:
         ".concat(getComputedStyle(document.querySelector('.card.evidence')).backgroundColor)"
     )
     assert len(set(colours)) == 3
+
+
+def test_what_is_not_identifiable_is_no_faults_band(open_page: OPEN) -> None:
+    """Both were grey bands as high as the panel beside a fault without signal."""
+    page = open_page("five_faults")
+    page.evaluate("Data.later()")
+    heights = page.evaluate(
+        """() => { const layout = { shapes: [], annotations: [] }, row = { component: "FR", unknown: [[1, 2]], small: [[3, 4]] };
+          const figure = Object.assign(Object.create(Figure.prototype), { rows: [row], shades: [], curves: [] });
+          figure.perRow = () => []; figure.shade(layout);
+          return layout.shapes.map((s) => s.y1); }"""
+    )
+    assert heights == [0.09, 1]

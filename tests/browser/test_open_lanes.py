@@ -42,3 +42,30 @@ def test_an_open_lane_says_how_near_each_check_came(open_page: OPEN) -> None:
     expect(lane.locator(".part")).to_contain_text("against its second measurement")
     expect(lane.locator(".part")).to_contain_text("15 %, limit 25 %; largest at 1:07.5")
     expect(lane.locator(".part")).to_contain_text(re.compile(r"Loss for 2\ss\s*30\s%"))
+
+
+@pytest.mark.parametrize("width", [1440, 400])
+def test_an_open_lane_reads_in_lines(open_page: OPEN, width: int) -> None:
+    """The values stood one letter a line in a lane of 7000 px."""
+    page = open_page("healthy_evidence")
+    page.set_viewport_size({"width": width, "height": 900})
+    page.locator(".more").first.locator("summary").click()
+    values = page.locator(".more[open] .part .kv dd")
+    long = "speed per opening beside the other wheels', from one part of the mission to the next, or growing"
+    page.locator(".more[open] .part .kv dt").first.evaluate("(e, long) => { e.textContent = long; }", long)
+    assert min(values.evaluate_all("es => es.map((e) => e.offsetWidth)")) > 150
+    assert max(values.evaluate_all("es => es.map((e) => e.offsetHeight)")) < 90
+
+
+def test_a_threshold_that_is_huge_for_a_moment_does_not_flatten_the_residual(open_page: OPEN) -> None:
+    page = open_page("healthy_evidence")
+    page.evaluate("Data.later()")
+    spans = page.evaluate(
+        """async () => { const row = Lanes.rows("FR", "sensor").find((r) => r.threshold !== undefined), real = Data.samples, found = [];
+          for (const huge of [0, 100]) {
+            Data.samples = async (c, ...more) => { const d = await real.call(Data, c, ...more), y = Float64Array.from(d.y); if (c === row.threshold && huge) y[0] = huge; return { ...d, y }; };
+            found.push((await Lanes.nearest(row)).span);
+          }
+          Data.samples = real; return found; }"""
+    )
+    assert spans[1] == pytest.approx(spans[0], rel=0.2)

@@ -69,15 +69,15 @@ def test_sliders_change_residual_and_evidence(open_page: OPEN) -> None:
     page.keyboard.press("w")
     words = page.locator("#whatif-words")
     expect(words).to_contain_text(
-        re.compile(r"What if: residual [\d.]+ times its threshold, beyond it from [\d.]+ s on, ")
+        re.compile(r"What if: residual r\.m\.s\. [\d.]+ times its threshold, beyond it .*, first at [\d.]+ s, ")
     )
     page.locator("#whatif-figure .main-svg").first.wait_for()
-    times = re.compile(r"What if: residual ([\d.]+) times its threshold.* Log: ([\d.]+) times")
+    times = re.compile(r"What if: residual r\.m\.s\. ([\d.]+) times its threshold.* Log: r\.m\.s\. ([\d.]+) times")
     found = times.search(words.inner_text())
     assert found
     # the log's residual passes its threshold at one time, whoever says so
     page.get_by_role("button", name="Play").click()
-    at = re.search(r"Log: .* beyond it from ([\d.]+) s on", words.inner_text())
+    at = re.search(r"Log: .*, first at ([\d.]+) s, ", words.inner_text())
     assert at
     expect(page.locator("#events")).to_contain_text(f"{at[1]} s · FR speed sensor: the residual, ")
     page.get_by_role("button", name="Pause").click()
@@ -118,3 +118,32 @@ def test_a_residual_that_is_drawn_is_not_denied_and_the_onset_is_the_faults_own(
         "What a changed opening does to the residual of this part (°, drawn above) is not computed here"
     )
     assert words[1] == "No residual of this part was recorded in which the change could be seen."
+
+
+def test_readings_of_a_slow_channel_are_beyond_a_threshold_on_end(open_page: OPEN) -> None:
+    """A residual that is known in one of five rows passed its threshold fifteen times over and was *never beyond it*."""
+    page = open_page("five_faults")
+    page.evaluate("Data.later()")
+    found = page.evaluate(
+        """() => { const y = Float64Array.from({ length: 100 }, (_, i) => (i % 5 ? NaN : i >= 20 && i < 60 ? 15 : 0.1));
+          const d = { y, t: 1, dt: 0.01, stride: 1 }, of = (v) => Replay.stretches({ ...d, y: v }, (i) => Replay.over(Math.abs(v[i]), 1)).map((s) => [s.start, s.stop]);
+          return [of(y), of(y.map((v, i) => (i === 40 ? v : Math.min(v, 0.1)))), of(Float64Array.from(y, () => NaN))]; }"""
+    )
+    assert np.allclose(found[0], [[1.2, 1.55]])
+    assert found[1:] == [[], []]
+
+
+def test_a_residual_that_passes_its_threshold_now_and_then_is_said_to_be_so(open_page: OPEN) -> None:
+    """A mean below the threshold and a time beyond it are no contradiction where it says how long."""
+    page = open_page("five_faults", "#fault=F1")
+    page.keyboard.press("w")
+    expect(page.locator("#whatif-words")).to_contain_text("What if")
+    words = page.evaluate(
+        """() => { const residual = Float64Array.from({ length: 100 }, (_, i) => (i >= 40 && i < 50 ? 1.2 : 0.1));
+          const d = { f: { start: 0, stop: 1, detected: null }, n: 100, t: 0, dt: 0.01, stride: 1, residual, threshold: new Float64Array(100).fill(1), passes: { start: 0.4, stop: 0.49 }, channel: { name: "" } };
+          return WhatIf.words(d, { ratio: residual, spec: { start: 0, stop: 1 } }); }"""
+    )
+    assert (
+        "Log: r.m.s. 0.391 times its threshold, beyond it in 10 % of the fault, first at 0.400 s, 400 ms after the onset."
+        in words
+    )

@@ -200,6 +200,7 @@ def _machine(m: Machine, at: Mapping[str, int]) -> MachineRow:
         "last_judged_ns": m.last_judged.result.start_ns if m.last_judged else None,
         "cleared": m.cleared,
         "not_cleared": m.not_cleared,
+        "open_points": list(m.limits.open_points),
         "outdated": m.outdated,
         "unjudged": m.unjudged,
         "note": m.note,

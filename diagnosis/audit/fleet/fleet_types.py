@@ -121,6 +121,8 @@ class MachineRow(Worded):
         Whether that mission's report lets it go out, and that of each which may be later; null: not said.
     not_cleared : str
         Why that report does not let it go out; empty where it does, or is not of faults to watch.
+    open_points : list[str]
+        What its newest report leaves open without naming a fault, each with its parts.
     outdated : bool
         Whether the last report says that a fault of an earlier mission is open which is not any more: it was repaired since.
     unjudged : int
@@ -150,6 +152,7 @@ class MachineRow(Worded):
     last_judged_ns: int | None
     cleared: bool | None
     not_cleared: NotRequired[str]
+    open_points: NotRequired[list[str]]
     outdated: NotRequired[bool]
     unjudged: int
     note: str

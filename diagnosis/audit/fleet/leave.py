@@ -213,11 +213,21 @@ def _why(
             more = f"; {count(m['unjudged'] - 1, 'other mission')} of it not judged either" if m["unjudged"] > 1 else ""
             lost = _lost(missions[place]) if place in m["failed"] and missions[place]["gone"] else ""
             return place, f"{named + '; ' if named else ''}{_said(missions[place])}{lost}{more}"
+    said = _left_open(m, missions)
     if last is not None and m["verdict"] == missions[last]["verdict"] == Verdict.NOT_ASSESSED:
-        return last, _said(missions[last])
+        return last, f"{_said(missions[last])}{said and f' – {said}'}"
     why = m.get("not_cleared", "").removesuffix(MORE)
     stands = m["standing"] + (f", because {why}{_halved(faults)}" if why else "")
-    return last, f"{named}: {stands[0].lower()}{stands[1:]}" if named else stands
+    reason = f"{named}: {stands[0].lower()}{stands[1:]}" if named else stands
+    return last, f"{reason} – {said}" if said else reason
+
+
+def _left_open(m: MachineRow, missions: Sequence[MissionRow]) -> str:
+    """What the machine's newest mission leaves open without naming a fault, where that one says nothing else; may be empty."""
+    points = m.get("open_points", [])
+    if not points or not m["missions"] or missions[m["missions"][-1]]["verdict"] != Verdict.NOT_ASSESSED:
+        return ""
+    return points[0] + (f"; and {count(len(points) - 1, 'more point')}" if len(points) > 1 else "")
 
 
 def _halved(faults: Sequence[FleetFaultRow]) -> str:

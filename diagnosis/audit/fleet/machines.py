@@ -224,15 +224,29 @@ class Machine:
         return Verdict.NOT_ASSESSED if self.last_verdict is Verdict.READY and held else self.last_verdict
 
     @property
+    def _trailing(self) -> int:
+        """How many of its last missions gave no verdict."""
+        return len(list(itertools.takewhile(lambda r: r.result.verdict is Verdict.NOT_ASSESSED, reversed(self.dated))))
+
+    @property
+    def _trailing_seen(self) -> bool:
+        """Whether these judged any part long enough."""
+        last = range(len(self.dated) - self._trailing, len(self.dated))
+        return any(column[k] for column in self._assessed.values() for k in last)
+
+    @property
+    def uncleared(self) -> bool:
+        """Whether all that may be later than its last verdict was judged, and showed no fault, but did not clear the machine."""
+        return self.unjudged > 0 and self.unjudged == self._trailing and self._trailing_seen
+
+    @property
     def note(self) -> str:
         """What limits that; may be empty."""
         out = []
-        trailing = list(itertools.takewhile(lambda r: r.result.verdict is Verdict.NOT_ASSESSED, reversed(self.dated)))
-        if trailing and len(trailing) < len(self.dated):
-            last = range(len(self.dated) - len(trailing), len(self.dated))
-            seen = any(column[k] for column in self._assessed.values() for k in last)
-            how = "showed no fault, but did not clear the machine" if seen else "could not be judged"
-            missions = "mission" if len(trailing) == 1 else f"{len(trailing)} missions"
+        trailing = self._trailing
+        if trailing and trailing < len(self.dated):
+            how = "showed no fault, but did not clear the machine" if self._trailing_seen else "could not be judged"
+            missions = "mission" if trailing == 1 else f"{trailing} missions"
             out.append(f"its last {missions} {how}")
         if self.undated:
             out.append(f"{_count(len(self.undated), 'mission')} of unknown order")

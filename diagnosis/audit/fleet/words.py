@@ -45,6 +45,8 @@ def fault_words(f: FleetFault, words: MachineWords) -> str:
 
 def found_in(missions: int, assessed: int) -> str:
     """In how many missions a fault was found: ``in 3 of the 14 missions that judged the part``."""
+    if missions == assessed:
+        return f"in {'the one mission' if missions == 1 else f'all {missions} missions'} that judged the part"
     return f"in {missions} of the {count(assessed, 'mission')} that judged the part"
 
 
@@ -105,7 +107,8 @@ def standing(m: Machine) -> str:
             words += ", not cleared"
         elif lasting and m.cleared and not m.unjudged:
             words = "Ready, with faults to watch"
-    return words + (", and what may be later was not judged" if m.unjudged else "")
+    later = "its newest mission did not clear the machine" if m.uncleared else "what may be later was not judged"
+    return words + (f", and {later}" if m.unjudged else "")
 
 
 def _standing_now(m: Machine, trends: Sequence[PartTrend]) -> str:
@@ -253,10 +256,10 @@ def new_words(missions: int, faults: Sequence[tuple[Machine, FleetFault]]) -> li
         return []
     named = [f"{m.label} {fault_words(f, m.limits.words)} ({f.severity}{_often(f)})" for m, f in faults[:_NAMED]]
     more = f" and {len(faults) - len(named)} more" if len(faults) > len(named) else ""
-    known = "without a fault that was not known"
+    known = "and no new fault"
     first = "found" if any(f.repaired_ns is not None for _, f in faults) else "first seen"
     said = f"{first} in {'it' if missions == 1 else 'them'}: {'; '.join(named) + more}" if named else known
-    return [f"The last audit run brought {count(missions, 'mission')}{';' if named else ','} {said}."]
+    return [f"The last audit run brought {count(missions, 'mission')} with a report{';' if named else ','} {said}."]
 
 
 def as_sentence(note: str) -> str:

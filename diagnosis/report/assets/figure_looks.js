@@ -133,7 +133,7 @@ class FigureLooks {
     const peers = row.traces.filter((t) => t.role === "peer").map((t) => t.name);
     if (peers.length) entries.unshift([Figure.style("peer"), peers.join(", ")]);
     if (row.threshold !== undefined) entries.push([Figure.style("threshold"), "± threshold"]);
-    if (row.unknown) entries.push([{ colour: "muted", sign: "▒▒" }, "not identifiable"]);
+    if (row.unknown) entries.push([{ colour: "muted", sign: "▂▂" }, "not identifiable"]);
     if (row.small) entries.push([{ colour: "healthy", sign: "▒▒" }, "healthy: less than counts as a fault"]);
     if (row.untold) entries.push([{ colour: "stuck", sign: "▒▒" }, "most probably stuck or silent, though no fault is stated"]);
     if (row.level !== undefined) entries.push([Figure.style("threshold"), `limit ${row.level}`]);
@@ -199,7 +199,8 @@ class FigureLooks {
   // Intervals of faults behind the panels that show their component, named in the first.
   shade(layout) {
     this.rows.forEach((row, i) => {
-      for (const [stretches, colour] of [[row.unknown, "muted"], [row.small, "healthy"], [row.untold, "stuck"]]) for (const [x0, x1] of stretches || []) layout.shapes.push({ type: "rect", xref: "x", yref: `y${i ? i + 1 : ""} domain`, x0, x1, y0: 0, y1: 1, fillcolor: Figure.colour(colour), opacity: 0.22, line: { width: 0 }, layer: "below" });
+      // What is not known is a strip at the foot: a band as high as a panel is a fault's, some of which are as grey.
+      for (const [stretches, colour, y1, opacity] of [[row.unknown, "muted", 0.09, 0.6], [row.small, "healthy", 1, 0.22], [row.untold, "stuck", 1, 0.22]]) for (const [x0, x1] of stretches || []) layout.shapes.push({ type: "rect", xref: "x", yref: `y${i ? i + 1 : ""} domain`, x0, x1, y0: 0, y1, fillcolor: Figure.colour(colour), opacity, line: { width: 0 }, layer: "below" });
     });
     const stored = this.perRow(this.curves).map(Figure.stored), { t0, dt } = Data.view;
     for (const s of this.shades) {

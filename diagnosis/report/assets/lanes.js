@@ -20,10 +20,12 @@ const Lanes = {
   // The largest multiple of its threshold that a residual reached, and when.
   async nearest(row) {
     const { duration, t0 } = Data.view, [r, h] = await Promise.all([Data.samples(row.traces[0].c, t0, duration, 1), Data.samples(row.threshold, t0, duration)]);
-    let best = { part: -1 };
+    // A threshold that is huge for a moment, as at the first sample, does not flatten what is drawn.
+    const sizes = Float64Array.from(h.y).filter(Number.isFinite).map(Math.abs).sort(), most = r.y.reduce((m, v) => Math.max(m, Number.isFinite(v) ? Math.abs(v) : 0), 0);
+    let best = { part: -1, span: 1.1 * row.bandScale * Math.max(most, sizes[Math.floor(0.99 * (sizes.length - 1))] || 0) };
     for (let i = 0; i < r.y.length; i++) {
       const limit = h.y[Math.min(h.y.length - 1, Math.max(0, Math.round((r.t + i * r.dt - h.t) / h.dt)))], part = Math.abs(r.y[i]) / limit;
-      if (limit > 0 && part > best.part) best = { part, time: r.t + i * r.dt, residual: r.y[i] * row.traces[0].k, limit: limit * row.bandScale };
+      if (limit > 0 && part > best.part) best = { ...best, part, time: r.t + i * r.dt, residual: r.y[i] * row.traces[0].k, limit: limit * row.bandScale };
     }
     return best;
   },
@@ -33,7 +35,8 @@ const Lanes = {
     if (!rows.length) { words.textContent = "No residual of this part was recorded."; figure.element.hidden = true; return; }
     const row = rows.find((r) => r.threshold !== undefined);
     if (row) {
-      const { part, time, residual, limit } = await Lanes.nearest(row), unit = row.unit === "1" ? "" : ` ${row.unit}`;
+      const { part, time, residual, limit, span } = await Lanes.nearest(row), unit = row.unit === "1" ? "" : ` ${row.unit}`;
+      if (span > 0) row.limits = [-span, span];
       words.textContent = part < 0 ? "Its residual was never held against a threshold." : part < 1 ? `Nearest to its threshold at ${time.toFixed(3)} s: residual ${Now.number(residual)}${unit}, ${Now.number(100 * part)} % of the threshold of ${Now.number(limit)}${unit}.` : `Furthest beyond its threshold at ${time.toFixed(3)} s: residual ${Now.number(residual)}${unit}, ${Now.number(+part.toPrecision(2))} times the threshold of ${Now.number(limit)}${unit}. That alone is no fault: one lasts for longer.`;
     }
     await figure.draw(rows, Data.view.faults.filter((f) => f.component === component).slice(0, 40).map((f) => ({ ...f, main: false })), [0, Data.view.duration]);

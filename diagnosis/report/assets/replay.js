@@ -84,18 +84,27 @@ class Replay {
     return this.show();
   }
 
-  // Stretches in which values are beyond a limit for some samples on end, those that are close to each other as one.
+  // Stretches in which values are beyond a limit for some readings on end, those that are close to each other as one. What is not known
+  // (null), as between the readings of a slower channel, breaks no run unless it lasts.
   static stretches(d, beyond) {
     const list = [], least = d.stride > 1 ? 1 : 5;
-    for (let i = 0, run = 0; i < d.y.length; i++) {
-      run = beyond(i) ? run + 1 : 0;
+    for (let i = 0, run = 0, first = 0, known = 0; i < d.y.length; i++) {
+      const is = beyond(i);
+      if (is === null) continue;
+      if ((i - known) * d.dt > Replay.APART) run = 0;
+      known = i;
+      run = is ? run + 1 : 0;
+      if (run === 1) first = i;
       if (run < least) continue;
-      const stop = d.t + i * d.dt, start = d.t + (i - run + 1) * d.dt, last = list.at(-1);
+      const stop = d.t + i * d.dt, start = d.t + first * d.dt, last = list.at(-1);
       if (last && start - last.stop < Replay.APART) last.stop = stop;
       else list.push({ start, stop });
     }
     return list;
   }
+
+  // Whether a size is beyond a limit; null where one of them is not known.
+  static over(size, limit) { return Number.isNaN(size) || Number.isNaN(limit) ? null : size > limit; }
 
   // Stretches of the mission in which a channel's size is beyond a limit, or another channel: by every sample where these are stored,
   // else by blocks that are beyond it in whole.
@@ -104,7 +113,7 @@ class Replay {
     for (const { from, to, every } of Data.parts(c)) {
       const inside = every ? [from + 2 * dt, to - 2 * dt] : [from, to], [d, e] = await Promise.all([Data.samples(c, ...inside, -1), other === undefined ? null : Data.samples(other, ...inside)]);
       const least = (i) => (e ? e.y[Math.min(e.y.length - 1, Math.max(0, Math.round((d.t + i * d.dt - e.t) / e.dt)))] : limit);
-      for (const s of Replay.stretches(d, (i) => Math.abs(d.y[i]) > least(i))) {
+      for (const s of Replay.stretches(d, (i) => Replay.over(Math.abs(d.y[i]), least(i)))) {
         const last = list.at(-1);
         if (last && s.start - last.stop < Replay.APART) last.stop = s.stop;
         else if (list.length < Replay.MOST) list.push({ ...s, dt: d.dt });

@@ -10,6 +10,7 @@ import pytest
 
 from diagnosis.decision.decide import Decision, decide
 from diagnosis.decision.intervals import intervals_of
+from diagnosis.decision.severity import advised
 from diagnosis.results.assessment import CODE, Assessment, Finding, unassessed
 from diagnosis.results.detectability import Detectable, Deviation, Power, Powers
 from diagnosis.results.machine_event import not_following
@@ -207,6 +208,20 @@ def test_faults_to_watch_are_cleared_only_where_all_else_is_ready() -> None:
     assert verdict(odd).not_cleared == "a residual is not explained by any fault"
 
 
+def test_one_wording_where_a_mission_gives_no_leave_for_other_reasons() -> None:
+    """*No reason to stop* and *check* stood below *it must be checked first*."""
+    parts = machine(FR_actuator=assessed(WATCHED))
+    faults = intervals_of(parts, MACHINE, HYDRAULIC, 0, STEP)
+    free, odd = verdict(parts), verdict(parts | {("FL", "sensor"): replace(parts["FL", "sensor"], unexplained_s=6.0)})
+    for got, lead, says in (
+        (free, "Check the FR", "no reason to stop"),
+        (odd, "Before the machine goes out, check the FR", "before the machine goes out"),
+    ):
+        assert str(got.actions[0]["lead"]).startswith(lead)
+        (fault,) = advised(faults, got.status, cleared=got.cleared)
+        assert says in fault.advice
+
+
 def test_a_valve_that_may_not_answer_is_not_cleared() -> None:
     got = verdict(machine(FR_actuator=assessed(finding(Side.ACTUATOR, FaultMode.STUCK, p=0.7))))
     assert (got.status, got.cleared, got.not_cleared) == ("watch", False, "the FR drive valve may not answer")
@@ -229,6 +244,17 @@ def test_every_reason_against_a_leave_is_in_the_list_once() -> None:
         "the FL speed sensor may have lost up to 61 %.",
         "the FR drive valve may not answer.",
     ]
+
+
+def test_why_it_is_not_cleared_names_a_part_once() -> None:
+    """With the most that it may have lost; the list of what clears the machine has every fault."""
+    losses = [
+        finding(Side.ACTUATOR, FaultMode.INEFFICIENT, start, stop, epsilon=e)
+        for start, stop, e in ((1000, 2000, 0.55), (5000, 6000, 0.65))
+    ]
+    got = verdict(machine(FR_actuator=assessed(*losses)))
+    assert got.not_cleared == "the FR drive valve may have lost up to 66 %"
+    assert [x.fault for x in got.to_clear] == ["F1", "F2"]
 
 
 def test_only_ready_and_watch_are_ever_cleared() -> None:

@@ -183,3 +183,31 @@ def test_the_most_that_a_growing_loss_has_been_is_within_its_bounds() -> None:
     assert one.epsilon is not None
     assert one.epsilon.value < 0.47
     assert one.epsilon.high == 0.64
+
+
+def measured(gain: float) -> dict[tuple[str, str], Assessment]:
+    """Two pieces of a loss of .4 with what is called healthy between them, in which the part gives `gain` of what is expected."""
+    found = parts(loss(1000, 3000, 0.4), loss(4000, 6000, 0.4), between=State.HEALTHY)
+    x = 0.3 * np.sin(0.01 * np.arange(N))
+    y = 0.6 * x
+    y[3000:4000] = gain * x[3000:4000]
+    columns = {"expected": x, "residual": y - x, "threshold": np.full(N, 0.01)}
+    return {part: replace(a, columns=columns) for part, a in found.items()}
+
+
+@pytest.mark.parametrize(("gain", "faults"), [(0.65, 1), (0.97, 2)])
+def test_what_fits_the_loss_between_its_pieces_is_not_healthy(gain: float, faults: int) -> None:
+    """One constant loss was told as two, with the widest bounds of either, for nine tenths of a second that were called healthy."""
+    out = with_episodes(measured(gain), DT)["FR", "actuator"]
+    assert len(out.findings) == faults
+    assert set(out.states[3000:4000]) == {CODE[State.INEFFICIENT if faults == 1 else State.HEALTHY]}
+    assert set(out.states[:1000]) == {CODE[State.HEALTHY]}
+
+
+def test_nothing_stays_called_healthy_between_the_pieces_of_one_fault() -> None:
+    """Where the loss would hardly show, it is not known whether the part was healthy: the timeline said so beside *nothing healthy was seen*."""
+    found = parts(loss(1000, 3000, 0.4), loss(3200, 6000, 0.4), between=State.HEALTHY)
+    out = with_episodes(found, DT)["FR", "actuator"]
+    assert len(out.findings) == 1
+    assert set(out.states[3000:3200]) == {CODE[State.NOT_ASSESSED]}
+    assert out.reasons[State.NOT_ASSESSED] == "a fault before and after it would hardly show"

@@ -190,3 +190,26 @@ def test_an_axle_that_was_hardly_steered_has_one_reason_and_one_remedy() -> None
     assert one.endswith("twice at standstill and several times while driving, with the log running")
     deviates = replace(still, worst=0.5)
     assert len(told(Reservations(open=(deviates,)), parts)) == 2, "what deviates has a reason of its own"
+
+
+def test_what_several_wheels_leave_unexplained_sends_nobody_to_healthy_parts() -> None:
+    for wheels, act in (
+        (("FR",), "inspect these parts, and log "),
+        (("FR", "FL"), "log wheel.*.v_true (a second speed)"),
+    ):
+        rows = to_clear(Reservations(unexplained=tuple((w, "sensor") for w in wheels)), PARTS, {}, {}, [], Limits())
+        (row,) = (r for r in rows if "no single fault explains" in r.reason)
+        assert row.act.startswith(act)
+        assert ("parts fail one at a time" in row.act) is (len(wheels) > 1)
+
+
+def test_a_faulty_part_is_not_listed_as_judged_too_briefly() -> None:
+    """The fault is what is to be checked of it."""
+    parts = {("FR", "sensor"): assessed(finding(Side.SENSOR, FaultMode.INEFFICIENT, 1000, 3000, epsilon=0.3))}
+    faults = intervals_of(parts, haulotte(), HYDRAULIC, 0, 1_000_000)
+    about = Reservations(short=(("FR", "sensor"), ("FL", "sensor")))
+    for found, named in ((faults, {("FL", "sensor")}), ((), {("FR", "sensor"), ("FL", "sensor")})):
+        rows = to_clear(about, PARTS, {}, {}, [], Limits(), found)
+        assert {part for row in rows for part in row.parts} == named
+    (row,) = to_clear(Reservations(short=(("FR", "sensor"),)), PARTS, {}, {}, [], Limits(), faults)
+    assert row.parts == (("FR", "sensor"),)  # else nobody would be told what clears the machine

@@ -7,6 +7,7 @@ from typing import Any
 import pytest
 
 from diagnosis.report.confidence import going_out, headline, judged, judged_means, percent, sure_of, sure_of_verdict
+from diagnosis.report.tables import clearing_sentences
 from diagnosis.results.document import IntervalRow, ReportDocument
 from tests import report_samples as samples
 
@@ -121,6 +122,23 @@ def test_leave_to_go_out_is_given_only_where_nothing_stands_against_it() -> None
     assert headline(with_verdict("stop")) == ("Stop and repair", "must not go out before repair")
     assert headline(with_verdict("ready")) == ("Ready for the next mission", "")
     assert headline(with_verdict("not_assessed")) == ("Not assessed", "check before it goes out")
+
+
+def test_a_mission_that_judged_every_wheel_part_is_not_called_unassessed() -> None:
+    """*Not assessed* stood above *all 8 wheel parts were judged*; the status in report.json stays."""
+    for share, words in ((90.0, "Not cleared"), (10.0, "Not assessed")):
+        rows = [row("sensor", 98.0), row("actuator", share)]
+        report = samples.report_with(coverage=rows, verdict={"status": "not_assessed"})
+        assert headline(report) == (words, "check before it goes out")
+
+
+def test_what_the_verdict_says_with_its_remedy_stands_once() -> None:
+    point = {"reason": "The speed of FR is low.", "act": "lift the machine", "parts": [], "fault": "", "why": ""}
+    said = "This mission does not exclude one: the speed of FR is low. To clear it: lift the machine."
+    verdict = {"text": said, "to_clear": [point], "actions": []}
+    assert clearing_sentences(verdict) == []  # type: ignore[arg-type]
+    other = {**verdict, "text": "No fault was identified."}
+    assert clearing_sentences(other) == [("The speed of FR is low.", "lift the machine")]  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(

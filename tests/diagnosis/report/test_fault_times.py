@@ -23,7 +23,9 @@ def test_onset_clock_time_and_end(start: float, stop: float, words: str) -> None
     assert when_words(fault, report) == f"{fault['id']} {words}"
     report["states"] = []
     if stop < 99.0:
-        assert when_words(fault, report).endswith("before the log ends; its part was not seen healthy since")
+        assert when_words(fault, report).endswith(
+            "before the log ends; its part was not seen healthy for a second since"
+        )
 
 
 def test_of_several_faults_of_a_part_the_most_urgent_and_the_last_are_told() -> None:

@@ -10,10 +10,13 @@ import pytest
 from diagnosis.results.assessment import Finding
 from diagnosis.results.candidates import candidates
 from diagnosis.results.result import Epsilon, Hypothesis
+from diagnosis.results.sentence import About, Sentence
 from diagnosis.results.vocabulary import Tier
 from diagnosis.wheels.claims import as_claimed
 from diagnosis.wheels.findings import WheelFindings
 from diagnosis.wheels.isolation import NOT_PREFERRED
+from diagnosis.wheels.models import WheelFilterModel
+from diagnosis.wheels.onset import only_a_sensor, onset_sentence
 from replay.faults import FaultMode, Side
 
 CLEAR_AT = 0.25
@@ -103,3 +106,67 @@ def test_a_sensor_that_gives_one_value_by_the_trees_alone_is_less_sure(mode: Fau
     f = finding(Side.SENSOR, mode, 0.9)
     assert claimed(f) is f
     assert claimed(replace(f, evidence=(*f.evidence, NOT_PREFERRED))).probability == pytest.approx(p)
+
+
+def with_rows(*texts: str) -> Finding:
+    """A loss of a sensor, hardly one of its valve, with some evidence."""
+    rows = (
+        Hypothesis("sensor", "inefficient", 0.65),
+        Hypothesis("actuator", "inefficient", 0.05),
+        Hypothesis("none", "healthy", 0.3),
+    )
+    said = (
+        Sentence(About.CASES, "v and u fit “speed sensor inefficient”: it was this in ", "65", " of 100 cases."),
+        Sentence(About.RIVAL, "Next best: drive valve inefficient with 5 %."),
+        "So it looks.",
+        *texts,
+    )
+    return Finding(
+        1000, 2000, Side.SENSOR, FaultMode.INEFFICIENT, 0.65, rows, Epsilon(0.5, 0.4, 0.6), None, said, Tier.MODEL
+    )
+
+
+def unsure(f: Finding) -> Finding:
+    """The same by command and speed alone."""
+    (got,) = as_claimed(WheelFindings([f]), CLEAR_AT, measured=False).findings
+    assert sum(h.p for h in got.hypotheses) == pytest.approx(1.0)
+    return got
+
+
+def test_a_jump_that_no_wheel_can_do_is_the_sensors() -> None:
+    """What the sentence says reaches side and probabilities, and what was said of either is said no more."""
+    y = np.full(3000, 2.0) + 0.001 * np.arange(3000)
+    y[1000:] -= 1.0
+    model = WheelFilterModel(2.4, 0.25, 0.004, 0.0005, 0.0003, 0.014, 0.8, 0.15)
+    got = unsure(with_rows(onset_sentence(1000, y, model, 0.001, "v", Side.SENSOR)))
+    assert (got.side, got.mode, got.probability) == (Side.SENSOR, FaultMode.INEFFICIENT, pytest.approx(0.7))
+    told = {(h.side, h.mode): h.p for h in got.hypotheses}
+    assert ("actuator", "inefficient") not in told
+    assert told["none", "healthy"] == pytest.approx(0.3)
+    either = unsure(with_rows(onset_sentence(1000, y, model, 0.1, "v", Side.SENSOR)))  # within 0.1 s a wheel can
+    assert either.side is Side.SENSOR_OR_ACTUATOR
+    for f in (got, either):
+        words = " ".join(f.evidence)
+        assert "of 100 cases" not in words
+        assert "Next best" not in words
+
+
+def test_what_a_quick_wheel_may_do_is_no_jump() -> None:
+    """A wheel of another build may be twice as quick as its model: a motor that lost half stopped its wheel within 30 ms."""
+    y = np.full(3000, 1.2) + 0.001 * np.arange(3000)
+    y[1000:] -= 0.5
+    model = WheelFilterModel(2.4, 0.25, 0.004, 0.0005, 0.0003, 0.014, 0.8, 0.15)
+    assert [only_a_sensor([onset_sentence(1000, y, model, dt, "v", Side.SENSOR)]) for dt in (0.01, 0.02)] == [
+        True,
+        False,
+    ]
+
+
+def test_a_reading_that_came_late_may_have_moved_on() -> None:
+    """A value that stood for half a second before its step is one that came seldom: what a wheel does meanwhile is no jump."""
+    y = np.full(3000, 2.0) + 0.001 * np.arange(3000)
+    y[1000:] -= 1.0
+    model = WheelFilterModel(2.4, 0.25, 0.004, 0.0005, 0.0003, 0.014, 0.8, 0.15)
+    assert only_a_sensor([onset_sentence(1000, y, model, 0.001, "v", Side.SENSOR)])
+    y[500:1000] = y[500]
+    assert not only_a_sensor([onset_sentence(1000, y, model, 0.001, "v", Side.SENSOR)])

@@ -10,6 +10,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from replay.control.kinematics import wheel_commands
 from replay.control.loop import Replay, replay_loop, stack
+from replay.control.loop_columns import replay_columns
 from replay.machine.config import Control, Machine, haulotte
 from replay.signals.timeline import Timeline
 from replay.simulation.options import SimulatedMission, SimulationOptions
@@ -140,6 +141,9 @@ def test_another_controller_has_no_law(mission: SimulatedMission) -> None:
         assert np.isnan(x).all()
     assert np.isfinite(replay.e).all()
     assert reading(replay, "control law").startswith("none")
+    shown = replay_columns(timeline(dict(mission.columns)), replay, with_control(law="none"))
+    assert "replay.front.phi_ref" in shown  # what is asked of it is known, with which opening is not
+    assert not [name for name in shown if name in ("replay.front.u", "replay.front.u_difference")]
 
 
 def test_given_psi0_decays_as_printed(mission: SimulatedMission) -> None:

@@ -30,6 +30,24 @@ def test_unknown_content_names_what_was_found_and_what_is_read(tmp_path: Path, c
     assert "expected MCAP, ROS 1 bag, rosbag2" in str(caught.value)
 
 
+@pytest.mark.parametrize(
+    ("size", "rest", "says"),
+    [
+        (5000, b"", "holds nothing but zeros (5000 bytes)"),
+        (3_000_000, b"", "holds nothing but zeros (3000000 bytes)"),
+        (4096, b"rest of a log", "begins with 4096 zeros in place of a log's header (4109 bytes)"),
+    ],
+)
+def test_a_file_of_zeros_is_said_to_be_one_and_what_to_do(tmp_path: Path, size: int, rest: bytes, says: str) -> None:
+    path = tmp_path / "log.mcap"
+    path.write_bytes(bytes(size) + rest)
+    with pytest.raises(LogError) as caught:
+        open_log(path)
+    assert f"{path} {says}: it was never written out, or overwritten, so copy it from the recorder once more" in str(
+        caught.value
+    )
+
+
 def test_a_folder_without_a_log_names_its_files(tmp_path: Path) -> None:
     (tmp_path / "notes.txt").write_text("x")
     with pytest.raises(LogError, match=r"a folder with notes\.txt"):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import PurePosixPath
 
 from diagnosis.audit.discovery.identity import telling_folder
@@ -16,7 +16,9 @@ from diagnosis.results.machine_words import words_of
 from diagnosis.results.vocabulary import Verdict
 
 _FOLDERS = 4  # that are named
-_STATUSES = {"new": "new", "recurring": "recurring", "once": "found once", "past": "past", "repaired": "repaired"}
+_MACHINES = 3  # that are named
+_STANDING = {"new": "new", "recurring": "recurring", "once": "found once"}
+_GONE = {"past": "past", "repaired": "repaired"}
 
 
 def hours(seconds: float) -> str:
@@ -62,8 +64,7 @@ def kpis(document: ShownDocument) -> list[tuple[str, str, str]]:
         (
             labels.grouped(f["new"] + f["recurring"] + f["once"]),
             "faults that stand",
-            ", ".join(f"{labels.grouped(f[k])} {said}" for k, said in _STATUSES.items() if f[k])
-            or "none was ever found",
+            of_faults(f),
         ),
         (
             "–" if c["decided"] is None else f"{100 * c['decided']:.1f} %",
@@ -73,18 +74,32 @@ def kpis(document: ShownDocument) -> list[tuple[str, str, str]]:
     ]
 
 
+def of_faults(found: Mapping[str, int]) -> str:
+    """How the faults that stand were found, and apart from them those that do not."""
+    standing, gone = (
+        [f"{labels.grouped(found[k])} {said}" for k, said in words.items() if found[k]] for words in (_STANDING, _GONE)
+    )
+    apart = f"{'beside them' if standing else 'none'}{',' if not standing else ''} {' and '.join(gone)}" if gone else ""
+    return (
+        "; ".join([*([", ".join(standing)] if standing else []), *([apart] if apart else [])]) or "none was ever found"
+    )
+
+
 def _coverage(machines: Sequence[MachineRow]) -> str:
     """What the machines' last missions assessed; not known where the last one may be one without a date or a report."""
     blind = sum(len(unassessed(m)) for m in machines)
-    dark = sum(
-        not m["parts"] or m["unjudged"] > 0 or any(p["assessed_last"] is None for p in m["parts"]) for m in machines
-    )
+    dark = [
+        m["label"]
+        for m in machines
+        if not m["parts"] or m["unjudged"] > 0 or any(p["assessed_last"] is None for p in m["parts"])
+    ]
     words = (
         [f"{count(blind, 'part')} not judged long enough in the last mission{'s' if len(machines) > 1 else ''}"]
         if blind
         else []
     )
-    words += [f"not known of {count(dark, 'machine')}"] if dark else []
+    who = join_words(dark) if len(dark) <= _MACHINES else count(len(dark), "machine")
+    words += [f"not known of {who}, whose newest mission gave no verdict"] if dark else []
     return "; ".join(words) or "every part judged long enough in the last mission"
 
 

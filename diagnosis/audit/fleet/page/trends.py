@@ -100,8 +100,12 @@ def course(t: TrendRow, machines: Sequence[MachineRow], unit: str, standing: Seq
         words = (
             f"above the limit of {round_to(t['limit'])}: ε̂ {t['points'][-1][2]:.2f} over the whole of its last mission"
         )
+    if t.get("halving") and t["forecast"]["state"] == "not_known":
+        notes.insert(
+            0, "if it goes on growing as in the last three, half may be lost before two more missions are over"
+        )
     if dead := dead_words(t, standing):
-        words = f"{words}; {dead}, so the part is worse than this"
+        words = f"{words}; {dead}, in which nothing was left of it: the dots are of the rest"
     state = "above" if beyond or dead or t["forecast"]["state"] == "above" else "near" if t["approaching"] else "calm"
     return {
         "title": title,

@@ -325,7 +325,7 @@ def test_the_course_of_a_part_that_is_silent_says_what_it_leaves_out(tmp_path: P
         for k in range(6)
     ]  # fmt: skip
     page = build_fleet_page(fleet_json(load_fleet(samples.write_store(tmp_path / "fleet.sqlite", missions))))
-    assert "not counting the time found as no signal, so the part is worse than this" in page
+    assert "not counting the time found as no signal, in which nothing was left of it: the dots are of the rest" in page
 
 
 def test_the_report_of_a_mission_before_the_repair_is_said_to_be_so(tmp_path: Path) -> None:
@@ -341,3 +341,50 @@ def test_the_report_of_a_mission_before_the_repair_is_said_to_be_so(tmp_path: Pa
     assert one.note == row.note
     assert one.note.startswith("this report is of a mission before the repair")
     assert f"({one.note})" in build_fleet_page(document)
+
+
+def test_what_the_newest_mission_leaves_open_is_named_with_its_part(tmp_path: Path) -> None:
+    """A machine with an older fault to watch is held by what its newest report does not clear, which is another part's."""
+    loss = Fault("RR", "sensor", epsilon=(0.25, 0.24, 0.26))
+    missions = [
+        Sample("a"),
+        Sample("b", day=1.0, verdict="watch", faults=[loss]),
+        Sample("c", day=2.0, verdict="not_assessed"),
+    ]
+    store = samples.write_store(tmp_path / "fleet.sqlite", missions)
+    for mission in missions:
+        samples.write_report(tmp_path, mission.name, cleared=mission.name != "c")
+    fault, brief = {"component": "RL", "side": "sensor"}, {"component": "front", "side": "actuator"}
+    sides = [{"component": "FR", "side": side} for side in ("sensor", "actuator")]
+    points = [
+        {
+            "reason": "F1: the RL speed sensor may have lost half.",
+            "act": "",
+            "parts": [fault],
+            "fault": "F1",
+            "why": "",
+        },
+        {
+            "reason": "The speed of FR per opening is 38 % below the other wheels'.",
+            "act": "",
+            "parts": sides,
+            "fault": "",
+            "why": "",
+        },
+        {
+            "reason": "front steering valve: judged for 9 s of driving.",
+            "act": "",
+            "parts": [brief],
+            "fault": "",
+            "why": "not steered",
+        },
+    ]
+    said_by(tmp_path, "c", verdict={"to_clear": points})
+    document = fleet_json(load_fleet(store))
+    (one,) = lists_of(document)
+    assert (one.leave, one.name) == (Leave.CHECK, "c")
+    assert one.reason.endswith(
+        "and its newest mission did not clear the machine – FR speed sensor and drive valve: the speed of FR per opening is 38 % below the "
+        "other wheels'"
+    )
+    assert "FR speed sensor and drive valve: the speed of FR" in build_fleet_page(document)

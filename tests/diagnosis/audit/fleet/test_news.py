@@ -20,7 +20,7 @@ from tests.fleet_samples import Fault, Sample
 
 OLD = [Sample("d0", verdict="watch", faults=[Fault()]), Sample("d1", day=1.0)]
 STUCK = Sample("d2", day=2.0, verdict="stop", faults=[Fault("FR", "sensor", "stuck", "high"), Fault()])
-SAID = "The last audit run brought 1 mission; first seen in it: HX-1 FR speed sensor stuck (high)."
+SAID = "The last audit run brought 1 mission with a report; first seen in it: HX-1 FR speed sensor stuck (high)."
 
 
 def written(tmp_path: Path, run: int, missions: Sequence[Sample]) -> dict[str, Any]:
@@ -67,7 +67,7 @@ def test_a_mission_is_new_in_the_run_that_judged_it(tmp_path: Path) -> None:
 def test_new_missions_without_a_new_fault_say_so(tmp_path: Path) -> None:
     written(tmp_path, 1, OLD)
     d = written(tmp_path, 2, [*OLD, Sample("d2", day=2.0)])
-    assert d["verdict"]["text"][0] == "The last audit run brought 1 mission, without a fault that was not known."
+    assert d["verdict"]["text"][0] == "The last audit run brought 1 mission with a report, and no new fault."
 
 
 def test_nothing_is_called_new_where_the_run_before_is_not_known(tmp_path: Path) -> None:
@@ -110,6 +110,6 @@ def test_a_fault_that_is_back_since_its_repair_is_news() -> None:
     count, found = news([machine], runs, 3)
     assert count == 1
     assert new_words(count, found) == [
-        "The last audit run brought 1 mission; found in it: HX-1 RL speed sensor no signal (high, back since its repair on 1970-01-05 00:00 UTC)."
+        "The last audit run brought 1 mission with a report; found in it: HX-1 RL speed sensor no signal (high, back since its repair on 1970-01-05 00:00 UTC)."
     ]
     assert news([machine], runs | {"m3": 2, "m4": 3}, 3)[1] == []

@@ -10,8 +10,10 @@ from typing import Any
 import pytest
 
 from diagnosis.audit.fleet.listed import listed_machines
+from diagnosis.audit.fleet.page.figures import of_faults
 from diagnosis.audit.fleet.page.matrix import matrix
 from diagnosis.audit.fleet.page.page import build_fleet_page
+from diagnosis.audit.fleet.words import found_in
 from diagnosis.audit.fleet_files import fleet_json, load_fleet
 from tests import fleet_samples as samples
 from tests.fleet_samples import DAY_NS, START_NS, Fault, Sample
@@ -98,11 +100,11 @@ def test_a_log_whose_clock_runs_ahead_makes_no_other_one_older(tmp_path: Path) -
 @pytest.mark.parametrize(
     ("verdict", "severity", "standing"),
     [
-        ("stop", "high", "Stop and repair, and what may be later was not judged"),
-        ("watch", "low", "Faults to watch, and what may be later was not judged"),
+        ("stop", "high", "Stop and repair, and its newest mission did not clear the machine"),
+        ("watch", "low", "Faults to watch, and its newest mission did not clear the machine"),
     ],
 )
-def test_a_finding_stays_though_later_missions_were_not_judged(
+def test_a_finding_stays_though_later_missions_gave_no_verdict(
     tmp_path: Path, verdict: str, severity: str, standing: str
 ) -> None:
     d = document(tmp_path, Sample("d0", verdict=verdict, faults=[Fault(severity=severity)]), BLIND)
@@ -187,9 +189,15 @@ def test_a_fault_that_comes_back_is_as_severe_as_it_is_now(
         ([Sample("a"), Sample("b", day=None)], "every part judged long enough in the last mission"),
         ([Sample("a", blind=[("FR", "sensor")])], "1 part not judged long enough in the last mission"),
         ([NO_SIGNAL], "nothing judged"),
-        ([Sample("a", day=None, verdict="not_assessed", blind=samples.PARTS)], "not known of 1 machine"),
-        ([Sample("a"), Sample("b", "HX-2", state="crashed")], "not known of 1 machine"),
-        ([Sample("a"), Sample("b", state="crashed")], "not known of 1 machine"),
+        (
+            [Sample("a", day=None, verdict="not_assessed", blind=samples.PARTS)],
+            "not known of HX-1, whose newest mission gave no verdict",
+        ),
+        (
+            [Sample("a"), Sample("b", "HX-2", state="crashed")],
+            "not known of HX-2, whose newest mission gave no verdict",
+        ),
+        ([Sample("a"), Sample("b", state="crashed")], "not known of HX-1, whose newest mission gave no verdict"),
     ],
 )
 def test_every_part_is_assessed_only_where_that_is_known(tmp_path: Path, missions: list[Sample], told: str) -> None:
@@ -311,3 +319,14 @@ def test_the_terminal_says_why_a_machine_is_not_assessed(tmp_path: Path) -> None
     (m,) = listed_machines(d)  # type: ignore[arg-type]
     assert m.words.startswith("Not assessed since")
     assert m.words.endswith("(2 missions of unknown order)")
+
+
+def test_counts_add_up_and_are_said_once() -> None:
+    """*In 1 of the 1 mission*, and *5 faults that stand: …, 1 repaired*, which add to six."""
+    assert found_in(1, 1) == "in the one mission that judged the part"
+    assert found_in(4, 4) == "in all 4 missions that judged the part"
+    assert found_in(1, 3) == "in 1 of the 3 missions that judged the part"
+    none = dict.fromkeys(("new", "recurring", "once", "past", "repaired"), 0)
+    assert of_faults({**none, "new": 1, "once": 3, "repaired": 1}) == "1 new, 3 found once; beside them 1 repaired"
+    assert of_faults({**none, "past": 2}) == "none, 2 past"
+    assert of_faults(none) == "none was ever found"
