@@ -14,13 +14,18 @@ from replay.machine.config import WheelPlant
 
 #: Of the loss that counts [ln]: oil, load and supply change what a healthy machine gives by more than wheels differ.
 LIMIT = 0.65
+#: The same of what all wheels come to lose for a part of the mission, which slopes and loads that last for a while make more of.
+PART = 1.2
+_OF_IT, _SPLITS, _WHEELS = 0.2, 40, 3  # of the windows, at least; moments that are tried; that must be known at a time
 _LEAST_WINDOWS = 8
 _UNSEEN = 0.1  # of the expected speed, by which the file does not know it
 _HELD = 8.0  # times as much does the ground hold a wheel as its own valve drives it: its own map is hardly known, that of all wheels is
 
 
-def beside_plant(cells: Cells, opening: Array, responses: Responses) -> list[float | None]:
-    """ln of each wheel's usual speed over what its [plant] gives at the same openings; None where that is not known.
+def beside_plant(cells: Cells, opening: Array, responses: Responses) -> tuple[list[float | None], float | None]:
+    """ln of each wheel's usual speed over what its [plant] gives at the same openings, and what most wheels are off it for a part of the mission.
+
+    None where that is not known.
 
     Wheels that the ground holds much more than their valves drive them are asked together: a fit of one mission and another shares
     what all of them give between them by chance.
@@ -38,16 +43,19 @@ def beside_plant(cells: Cells, opening: Array, responses: Responses) -> list[flo
     wheels = list(cells.machine.wheels)
     logs: list[float | None] = [None] * len(wheels)
     sums: dict[int, tuple[float, float]] = {}
+    columns: list[Array] = []
     for i, wheel in enumerate(wheels):
         if (plant := plants.get(wheel)) is None:
             continue
         moved, expected = _moved(cells, i, opening[:, i], plant, responses)
+        columns.append(_windows(cells, moved, expected, wheel))
         if (plant.grip or 0.0) > _HELD:
             sums[i] = float(moved.sum()), float(expected.sum())
         else:
-            logs[i] = _usual(cells, moved, expected, wheel)
+            known = columns[-1][np.isfinite(columns[-1])]
+            logs[i] = float(np.median(known)) if known.size >= _LEAST_WINDOWS else None
     together = _together(list(sums.values()), cells)
-    return [together if i in sums else log for i, log in enumerate(logs)]
+    return [together if i in sums else log for i, log in enumerate(logs)], _for_a_part(columns)
 
 
 def _together(sums: Sequence[tuple[float, float]], cells: Cells) -> float | None:
@@ -57,14 +65,27 @@ def _together(sums: Sequence[tuple[float, float]], cells: Cells) -> float | None
     return float(np.log(moved / expected)) if moved > least and expected > 0.0 else None
 
 
-def _usual(cells: Cells, moved: Array, expected: Array, wheel: str) -> float | None:
-    """Median of ln of a wheel's speed over the expected one in windows that are full of both; None of few."""
+def _windows(cells: Cells, moved: Array, expected: Array, wheel: str) -> Array:
+    """ln of a wheel's speed over the expected one in windows that are full of both and beside its stated faults, else NaN, shape (windows,)."""
     frame = cells.frame
     full = frame.sums((moved > 0.0).astype(np.float64)) >= 0.5 * frame.length
     with np.errstate(divide="ignore", invalid="ignore"):
-        log = np.where(full, np.log(frame.sums(moved) / frame.sums(expected)), np.nan)
-    log = log[np.isfinite(log) & ~cells.explained(wheel)]
-    return float(np.median(log)) if log.size >= _LEAST_WINDOWS else None
+        log = np.log(frame.sums(moved) / frame.sums(expected))
+    return np.where(full & np.isfinite(log) & ~cells.explained(wheel), log, np.nan)
+
+
+def _for_a_part(columns: Sequence[Array]) -> float | None:
+    """Largest median of what most wheels are off before, or from, any moment on [ln]; None of few wheels or windows."""
+    if len(columns) < _WHEELS:
+        return None
+    every = np.column_stack(columns)
+    every = every[np.isfinite(every).sum(axis=1) >= _WHEELS]
+    least = max(_LEAST_WINDOWS, round(_OF_IT * len(every)))
+    if len(every) < 2 * least:
+        return None
+    most = np.nanmedian(every, axis=1)
+    splits = range(least, len(most) - least + 1, max(1, len(most) // _SPLITS))
+    return max(max(abs(float(np.median(most[:k]))), abs(float(np.median(most[k:])))) for k in splits)
 
 
 def _moved(cells: Cells, i: int, opening: Array, plant: WheelPlant, responses: Responses) -> tuple[Array, Array]:

@@ -16,7 +16,7 @@ from diagnosis.clearing.measure import alone, compared, lasts, late, off_command
 from diagnosis.clearing.opening_offsets import opening_offsets
 from diagnosis.clearing.openings import openings_tell
 from diagnosis.clearing.pairs import FALLS, pairs_fall
-from diagnosis.clearing.plant_response import LIMIT, beside_plant
+from diagnosis.clearing.plant_response import LIMIT, PART, beside_plant
 from diagnosis.clearing.responses import OTHERS, USUAL_TOP, largest, others_at, responses_of
 from diagnosis.clearing.same_side import beside_its_side
 from diagnosis.clearing.seconds import off_second
@@ -76,7 +76,7 @@ def wheel_checks(cells: Cells, clear_at: float) -> Iterator[Checked]:
     worst_tracking, roughest = ([float(x) for x in largest(z)] for z in (tracking, rough))
     beside, together = beside_its_side(cells, responses), pairs_fall(responses)
     offsets = opening_offsets(cells, speed, used)
-    by_file = beside_plant(cells, used, responses)
+    by_file, for_a_part = beside_plant(cells, used, responses)
     most_off = [float(x) for x in largest(offsets[0])], [float(x) for x in offsets[1]]
     delays, made = late(speed, reference, cells.dt), made_of_commands(cells, speed, reference)
     either = Side.SENSOR_OR_ACTUATOR
@@ -104,7 +104,9 @@ def wheel_checks(cells: Cells, clear_at: float) -> Iterator[Checked]:
             yield Checked(*about, Side.ACTUATOR, Check.CARRIED, most, most_carried(clear_at))
         if by_file[i] is not None:
             about_plant = (*about, either, Check.PLANT_RESPONSE)
-            yield lasts(cells, about_plant, abs(by_file[i] or 0.0), -LIMIT * float(np.log1p(-clear_at)))
+            share = -float(np.log1p(-clear_at))
+            whole = lasts(cells, about_plant, abs(by_file[i] or 0.0), LIMIT * share)
+            yield max(whole, lasts(cells, about_plant, for_a_part, PART * share), key=times)
         # where an opening is no speed, what it gives says nothing of a wheel whose sides are both measured twice
         if _known(used[:, i]) and speed.shape[1] > OTHERS and (tells or not all(twice[i])):
             own = limits[i]

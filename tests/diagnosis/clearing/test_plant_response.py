@@ -61,5 +61,14 @@ def test_wheels_that_the_ground_holds_are_asked_together(own_gain: float) -> Non
     assert [c.passed for c in by_file(own_gain, *lost, held=True)] == [False] * 4
 
 
+def test_what_all_wheels_come_to_lose_shows_for_its_part(own_gain: float) -> None:
+    """Half of the mission is half of what is usual."""
+    lost = [FaultSpec(w, Side.SENSOR, FaultMode.INEFFICIENT, 0.55 * LENGTH, LENGTH, 0.4) for w in haulotte().wheels]
+    found = by_file(own_gain, *lost)
+    assert [c.passed for c in found] == [False] * 4
+    one = by_file(own_gain, lost[0])
+    assert sum(c.passed for c in one) >= 3  # what one wheel does is its own
+
+
 def test_without_a_file_nothing_is_asked() -> None:
     assert by_file(None) == []
