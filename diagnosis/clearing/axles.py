@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from diagnosis.clearing.cells import Array, Cells, Frame
 from diagnosis.clearing.measure import alone, compared, lasts, off_commands, times, worst
-from diagnosis.clearing.responses import growth, largest, largest_change
+from diagnosis.clearing.responses import clear_change, growth, largest, largest_change
 from diagnosis.clearing.still import (
     ALIKE,
     OVERLAP,
@@ -39,11 +39,9 @@ VALVE = 1.4  # dead band and hysteresis of a healthy valve: its limit, likewise
 #: Limits of the rate in windows and over the mission, as multiples of the loss that counts, by whether angle and opening are measured twice.
 RATE = {False: (2.0, 0.6), True: (3.0, 2.0)}
 _LEAST_WINDOWS = 16  # for a change
-#: Times the scatter about its trend by which what lies between two axles changes, where it is no scatter: on tuning machines healthy ones
-#: reached 1.5, a sensor that comes to read 1.4 mostly 1.8 to 18.
-_CLEARLY, _NORMAL = 1.75, 1.4826
 #: Of the loss that counts, and times the other axle's: a change of one axle alone. Dead bands that are not known hide half of one.
 _CHANGED, _ALONE = 0.3, 1.5
+_ONE_AXLE = 0.75  # of the loss that counts: a change of the only axle, whose oil warms
 #: Of the loss that counts, and times the other axle's: a deviation of one axle alone in windows. Of 36 healthy tuning missions of nine machines
 #: the axles' largest ones were alike within a factor of 2.6.
 _BRIEF, _BRIEF_ALONE = 0.9, 3.0
@@ -83,7 +81,7 @@ def axle_checks(cells: Cells, clear_at: float) -> Iterator[Checked]:
             off = _alone(rates.off, j) if twice else np.abs(rates.off[:, j])
             deviates = worst(cells, (*about, either, Check.RATE), off[place], brief_limit(rates, j, share, twice=twice))
             changed = lasts(cells, (*about, either, Check.RATE), rates.changes[j], changes[j])
-            between = (1.0 if twice else _CHANGED) * share
+            between = (1.0 if twice else _CHANGED if len(cells.machine.axles) > 1 else _ONE_AXLE) * share
             parted = lasts(cells, (*about, either, Check.RATE), None if told else rates.parted[j], between)
             yield max([deviates, *(c for c in (changed, parted) if c.worst is not None)], key=times)
             if len(cells.machine.axles) > 1:
@@ -192,31 +190,26 @@ def rates_of(cells: Cells, rate: Array, opening: Array) -> Rates:
         np.where(enough, _off(frame, cells.dt, rate, opening, use, band, by_way=True), np.nan)
         for band in (dead - unsure, dead, most)
     ]
-    return Rates(frame, off, whole, apart, ahead, changes, _parted([*tried, *ways]))
+    as_they_are, by_side = _parted(tried), _parted(ways)
+    parted = [a if b is None else b if a is None else min(a, b) for a, b in zip(as_they_are, by_side, strict=True)]
+    return Rates(frame, off, whole, apart, ahead, changes, parted)
 
 
 def _parted(tried: Sequence[Array]) -> list[float | None]:
     """By how much what lies between neighbouring axles changes at least [ln], for `Rates`.
 
-    `tried` of shape (windows, axles): by dead bands, and where what an axle is slower to one side is evened.
+    `tried` of shape (windows, axles), by dead bands, of which two of three must say so.
     Axles of one supply lose their oil together, so that a drift of one alone shows between them that its own rates hide.
     """
     out: list[float | None] = [None] * tried[0].shape[1]
+    if len(out) == 1 and min(np.count_nonzero(np.isfinite(off)) for off in tried) >= _LEAST_WINDOWS:
+        out[0] = float(np.median([clear_change(off[:, 0]) for off in tried]))
     for a, b in pairwise(range(len(out))):
         between = [off[:, a] - off[:, b] for off in tried]
         if min(np.count_nonzero(np.isfinite(x)) for x in between) >= _LEAST_WINDOWS:
-            least = float(np.median([_clear_change(x) for x in between]))  # one dead band in three may blur it
+            least = float(np.median([clear_change(x) for x in between]))  # one dead band in three may blur it
             out[a], out[b] = max(out[a] or 0.0, least), max(out[b] or 0.0, least)
     return out
-
-
-def _clear_change(log: Array) -> float:
-    """Change of some windows, shape (windows,), in the mission [ln]; 0 where it may be their scatter about their trend."""
-    every, at = [np.ones(log.size, np.bool_)], np.flatnonzero(np.isfinite(log))
-    change = max(largest_change(log, every), growth(log, every))
-    about = log[at] - np.polyval(np.polyfit(at, log[at], 1), at)
-    scatter = _NORMAL * float(np.median(np.abs(about - np.median(about))))
-    return change if change >= _CLEARLY * scatter else 0.0
 
 
 def _changes(cells: Cells, frame: Frame, off: Array, j: int) -> float | None:

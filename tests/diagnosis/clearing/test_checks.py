@@ -248,6 +248,9 @@ def test_a_drift_between_axles_shows_that_their_common_supply_hides(scatter: flo
     bands = [np.column_stack([supply + grows, supply]) + rng.normal(0.0, scatter, (n, 2)) for _ in range(3)]
     assert _parted(bands) == pytest.approx([expected, expected], abs=0.02)
     assert _parted([b[:10] for b in bands]) == [None, None]
+    assert _parted([b[:, :1] - b[:, 1:] for b in bands]) == pytest.approx(
+        [expected], abs=0.02
+    )  # of the only axle, its own
 
 
 def test_an_axle_that_is_slower_to_one_side_is_evened_where_it_was_steered_to_both() -> None:
