@@ -40,6 +40,7 @@ from diagnosis.response.models import (
     Beside,
     Blocks,
 )
+from diagnosis.response.nearer import nearer_to_its_command
 from diagnosis.response.pairs import by_leaps
 from diagnosis.response.power import powers_of, unshown
 from diagnosis.response.ramps import only_a_ramp
@@ -212,7 +213,13 @@ def assess_response(
     kept = {w: [x for x in spells if not only_a_ramp(x, unclear[w], judged[w], width)] for w, spells in kept.items()}
     late = {w: [f for f in found if f not in unclear[w]] for w, found in late.items()}
     nobodys = {
-        w: [x for x in spells if lower_by_a_load(x, judged[w]) or calm_hold(x, w, judged, MOVES * limits.driving_speed)]
+        w: [
+            x
+            for x in spells
+            if lower_by_a_load(x, judged[w])
+            or calm_hold(x, w, judged, MOVES * limits.driving_speed)
+            or nearer_to_its_command(x, w, judged, mates[w], width * dt)
+        ]
         for w, spells in kept.items()
     }
     kept = {w: [x for x in spells if x not in nobodys[w]] for w, spells in kept.items()}
