@@ -219,7 +219,10 @@ def _off(blocks: Blocks) -> Array:
 
 
 def off_asked(one: Judged, block_s: float) -> Array:
-    """How far each block is from what is asked of the wheel [m/s], whatever the drive makes of it in most of the mission."""
+    """How far each block is from what is asked of the wheel [m/s], shape (b,), whatever the drive makes of it in most of the mission.
+
+    `block_s` is the length of a block [s]; infinite where the distance is not known.
+    """
     blocks = one.wheel.blocks
     asked = cells(one.data.asked, int(blocks.start[1]) if blocks.start.size > 1 else 1)
     back = round(_ANSWER_S / block_s)
