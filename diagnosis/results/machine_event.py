@@ -82,6 +82,25 @@ def other_yaw_rate(text: str) -> MachineEvent:
     return MachineEvent("The gyro contradicts the {wheels}", text, doubt, act)
 
 
+def other_angle(text: str) -> MachineEvent:
+    """A steering angle alone contradicts how the machine turns, all through."""
+    act = "turn the steering to angles that you measure at the {wheels}, compare its sensor with them (zero, scale, unit), and diagnose again"
+    return MachineEvent(
+        "The steering angle contradicts the gyro", text, "the steering angle contradicts how the machine turns", act
+    )
+
+
+def other_turn(text: str) -> MachineEvent:
+    """A yaw rate is another share of the turns than wheels and steering make, all through, and their speeds are not meant."""
+    act = (
+        "compare the gyro with turns of the machine that you count (its axis, its unit), measure steering angle, wheelbase or track against the "
+        "machine file, and diagnose again"
+    )
+    return MachineEvent(
+        "The gyro contradicts the turns", text, "gyro and turns contradict each other by a factor throughout", act
+    )
+
+
 def one_side_otherwise(text: str) -> MachineEvent:
     """The measured yaw rate shows one side going otherwise than it reads, while all keep to their commands."""
     act = (
