@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.response.answering import BODY_COMMANDS, MOVES, wheels_of
+from diagnosis.response.asked import asked_of
 from diagnosis.response.beside import Bodies, same_side, turns_by_wheels, views
 from diagnosis.response.body import BodySpeed
 from diagnosis.response.calm_holds import calm_hold, either
@@ -58,6 +59,7 @@ from diagnosis.response.states import judge
 from diagnosis.response.turning import turning_of, turns_other_way, turns_with, unasked_turn, wrong_yaw_rate
 from diagnosis.response.uphill import lower_by_a_load
 from diagnosis.response.witness import witness_of, witnessed
+from diagnosis.response.wound_up import after_a_fault
 from diagnosis.results.assessment import Assessment, Finding, Reason
 from replay.machine.config import Limits
 from replay.machine.geometry import Geometry
@@ -187,7 +189,7 @@ def assess_response(
         for w, j in judged.items()
     }
     least = max(1, round(_LEAST_S / BLOCK_S))
-    asked = {w: _asked(j, limits) for w, j in judged.items()}
+    asked = {w: asked_of(j, limits) for w, j in judged.items()}
     bare = {w: j.posterior if j.speed is None else None for w, j in judged.items()}
     moves = {w: (x, rolling(x, judged[w].joint, MOVES * limits.driving_speed)) for w, x in asked.items()}
     kept = {w: where_asked(spells, moves[w], least, bare[w]) for w, spells in kept.items()}
@@ -203,6 +205,7 @@ def assess_response(
             judged,
             (like[w], by_motion.get(w)),
             (spans.get(w, []), bool(mates[w]) or not _turned_by(w, found)),
+            efforts.get(w),
             width * dt,
         )
         for w in judged
@@ -286,26 +289,16 @@ def _drives(
     judged: Mapping[str, Judged],
     known: tuple[Blocks | None, Beside | None],
     pull: tuple[list[tuple[int, int]], bool],
+    effort: Array | None,
     block_s: float,
 ) -> list[Finding]:
     """What is known to be a drive's fault, each time once.
 
-    `known`: its blocks with what is expected of it, and how the ground moves; `pull`: blocks in which it pulls nothing, and whether it is dragged along then.
+    `known`: its blocks with what is expected of it, and how the ground moves; `pull`: blocks in which it pulls nothing, and whether it is dragged along then;
+    `effort` in blocks.
     """
-    idle = idle_drives(judged[wheel], *pull, block_s)  # it says why: without power
+    idle = after_a_fault(idle_drives(judged[wheel], *pull, block_s), judged[wheel], effort, block_s)  # without power
     told = idle
     for more in (unanswered(wheel, judged, known, block_s), running_on(wheel, judged, known[0], block_s)):
         told = told + [f for f in more if not any(f.start < g.stop and g.start < f.stop for g in told)]
     return told
-
-
-def _asked(one: Judged, limits: Limits) -> Flags:
-    """Blocks in which the wheel must move, by its command or by another view, shape (b,).
-
-    Where it has a command only a view of this very wheel counts beside it: one that stands as it is told does nothing wrong.
-    """
-    blocks, least = one.wheel.blocks, MOVES * limits.driving_speed
-    asked = (blocks.low > least) | (blocks.high < -least)
-    if one.speed is None or (one.response.answered and not one.wheel.own):
-        return asked
-    return asked | (np.abs(np.nan_to_num(one.speed)) > least)
