@@ -23,6 +23,7 @@ from diagnosis.response.common_cause import (
     unwinds,
     without_consequences,
 )
+from diagnosis.response.company import after_a_dispute, in_company
 from diagnosis.response.disputed import DISPUTED, HIDES, disputed_steps, doubted, unproved
 from diagnosis.response.drive import by_peers, unanswered
 from diagnosis.response.effort import idle_drives, idle_spans, own_pull, powered, shares_of
@@ -197,6 +198,8 @@ def assess_response(
     kept = {w: [s for s in spells if not stands_with_all(s, w, judged, asked)] for w, spells in kept.items()}
     turning = turning_of(judged, geometry, bodies.yaw if not sideways else None)
     kept = {w: [s._replace(turns=turns_with(w, s, judged, turning)) for s in spells] for w, spells in kept.items()}
+    other_way = exchanged or turns_other_way(judged, geometry, turning)
+    by_motion = {} if other_way else by_motion  # then a yaw rate confirms no wheel
     together = held_back_together(judged)
     like = {w: by_peers(w, judged, geometry, cell) for w in judged}
     weak = {
@@ -222,6 +225,8 @@ def assess_response(
             if lower_by_a_load(x, judged[w])
             or calm_hold(x, w, judged, MOVES * limits.driving_speed)
             or nearer_to_its_command(x, w, judged, mates[w], width * dt)
+            or in_company(x, w, judged)
+            or after_a_dispute(x, w, judged, width * dt)
         ]
         for w, spells in kept.items()
     }
@@ -248,7 +253,7 @@ def assess_response(
     doubts = {w: Reason(j.odd) for w, j in judged.items() if j.odd and not any(side.findings for side in parts[w])}
     doubts |= {w: j.joint.unlike for w, j in judged.items() if j.joint is not None and j.joint.unlike}
     doubts |= unlike(judged)
-    if exchanged or turns_other_way(judged, geometry, turning):
+    if other_way:
         doubts = dict.fromkeys(judged, Reason(_EXCHANGED)) | doubts
     for w, why in doubts.items():
         parts[w] = doubted(parts[w][0], [slice(None)], why), parts[w][1]
