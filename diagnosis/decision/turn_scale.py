@@ -93,9 +93,10 @@ def _by_difference(cells: Cells, v: Array, expected: Array) -> tuple[float, str]
     if np.count_nonzero(use) * cells.dt < _LEAST_S:
         return None
     table, y = np.column_stack([expected, v])[use], made[use]  # worn tyres differ by a share of the speed
-    kept, weights = np.ones(y.size, np.bool_), np.zeros(2)
+    kept = np.ones(y.size, np.bool_)
+    weights: Array = np.zeros(2)
     for _ in range(_ROUNDS):
-        weights = np.linalg.lstsq(table[kept], y[kept], rcond=None)[0]
+        weights = np.asarray(np.linalg.lstsq(table[kept], y[kept], rcond=None)[0], dtype=np.float64)
         off = np.abs(y - table @ weights)
         kept = off <= np.quantile(off, _KEPT)
     made_by = weights[0] * table[:, 0]

@@ -17,6 +17,7 @@ from diagnosis.response.heading import agree
 from diagnosis.response.machine import Judged
 from diagnosis.response.spells import Spell
 from diagnosis.response.turning import Turning, difference, fitted
+from diagnosis.results.machine_event import GYRO_CONSTANT, GYRO_SLIP
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -133,12 +134,12 @@ def _kind(about: _Spread, part: slice, sound: Flags, block_s: float) -> str:
         return ""
     if by_constant < by_gain:
         aside = abs(constant) > _ASIDE * about.usual
-        return f"reads {constant:+.2g} rad/s more than the {{wheels}} make" if aside else ""
+        return f"reads {constant:+.2g} {GYRO_CONSTANT}" if aside else ""
     if not turns or abs(gain - 1.0) < _SAME:
         return ""
     if abs(gain) < _NOTHING:
         return f"gives next to nothing while the {{wheels}} turn the machine at up to {np.max(np.abs(made)):.2g} rad/s{_HELD}"
-    ground = ", unless the ground let them slip" if 0.0 < gain < 1.0 else ""
+    ground = f", {GYRO_SLIP}" if 0.0 < gain < 1.0 else ""
     return f"reads {gain:.2f} × what the {{wheels}} make{ground}"
 
 
