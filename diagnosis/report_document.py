@@ -28,6 +28,7 @@ from diagnosis.results.clearing import Checked, clearing_rows
 from diagnosis.results.detectability import Detectability, detectability_table
 from diagnosis.results.document import SCHEMA, CoverageRow, MachineRow, ReportDocument
 from diagnosis.results.loss import loss_rows
+from diagnosis.results.machine_event import MachineEvent
 from diagnosis.results.result import FaultInterval, to_json
 from diagnosis.results.vocabulary import Kind, Tier
 from replay.control.loop import Replay
@@ -180,7 +181,14 @@ def _told_scale(judged: Judged) -> list[str]:
     for f in judged.intervals:
         if f.kind is Kind.WHEEL and f.side is Side.SENSOR and f.mode.scaled and 2.0 * (f.stop_s - f.start_s) > length:
             return []
-    return [scale.sentence] if scale is not None and scale.sentence and not scale.gross else []
+    told = scale is None or scale.gross or scale.event is not None
+    return [scale.sentence] if scale is not None and scale.sentence and not told else []
+
+
+def _turned_otherwise(judged: Judged) -> tuple[MachineEvent, ...]:
+    """What contradicts the turns by a factor throughout, as what happened to the whole machine."""
+    event = None if judged.scale is None else judged.scale.event
+    return () if event is None else (event.worded(judged.found.words),)
 
 
 def _decision(
@@ -201,7 +209,7 @@ def _decision(
         model=judged.found.wheel_model,
         checks=judged.checks,
         scope=_scope(judged),
-        events=judged.found.events,
+        events=(*judged.found.events, *_turned_otherwise(judged)),
         hints=(*(h.text for h in judged.hints), *([s.gross] if (s := judged.scale) is not None and s.gross else [])),
         misplaced=judged.places,
         open_state=open_state,

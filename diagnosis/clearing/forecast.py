@@ -71,10 +71,15 @@ def forecast(
                 sides = _wheel_sensor(has, speeds, words, commanded), _wheel_drive(has, speeds, words, commanded)
             else:
                 told_where = "phi_ref" in has or {"cmd.v", "cmd.omega"} <= set(logged)
+                bare = machine.control.law == "none" and not has & {"u", "u_applied"}
                 sides = (
                     _angle_sensor(has, "imu.yaw_rate" in logged, words, told_where),
                     _steering_drive(has, words, told_where),
                 )
+                if (
+                    bare and told_where and {"phi"} <= has and "phi_true" not in has
+                ):  # nothing says what opens the {valve}
+                    sides = _bare(has, "imu.yaw_rate" in logged)
             if any(n.startswith(f"{prefix}.{name}.") for n in opened):
                 sides = sides[0], (False, _DOUBTED, ())
             for side, (told, text, more) in zip((Side.SENSOR, Side.ACTUATOR), sides, strict=True):
@@ -152,6 +157,17 @@ def _angle_sensor(has: set[str], yaw: bool, words: MachineWords, commanded: bool
         more = ("steer.*.u", *more)
     offset = "an offset shows by the yaw rate" if yaw else "an offset does not show"
     return False, f"shows while the axle is steered, mostly as one of sensor or {words.drive}; {offset}", more
+
+
+def _bare(has: set[str], yaw: bool) -> tuple[_Told, _Told]:
+    """Sensor and drive of an axle whose loop is another controller's, with an angle and a command alone."""
+    if "phi_ref" not in has:
+        both = "not judged: neither a commanded angle nor a {valve} command of it is logged"
+        return (False, both, (_ASKED,)), (False, both, (_ASKED,))
+    offset = "an offset shows by the yaw rate" if yaw else "an offset does not show"
+    more: tuple[str, ...] = ("steer.*.u",) if yaw else ("steer.*.u", "imu.yaw_rate")
+    stays = "only one that stays while its commanded angle goes elsewhere shows"
+    return (False, f"{stays}; {offset}", more), (False, stays, ("steer.*.u",))
 
 
 def _steering_drive(has: set[str], words: MachineWords, commanded: bool) -> _Told:

@@ -17,6 +17,7 @@ from replay.faults import Side
 _EVEN_S = 0.2  # over which a channel and its reference are evened: two healthy instruments differ in lag
 _LAGS_S = (0.0, 0.03, 0.06, 0.1, 0.15, 0.2)  # of healthy valves, motors and their loops
 _FOLLOWED = 0.8  # quantile of the windows: lag shows where a command is quick
+_AS_ALIKE = 0.97  # of the largest correlation
 _EARLIEST_S, _LATEST_S = 0.3, 1.0
 _SURE = 0.95
 _LOSSES = (
@@ -166,14 +167,18 @@ def late(speed: Array, reference: Array, dt: float) -> list[float | None]:
     """
     steps = np.arange(-round(_EARLIEST_S / dt), round(_LATEST_S / dt) + 1)
     found: list[float | None] = []
+    alike = []
     for v, c in zip(speed.T, reference.T, strict=True):
         changes, commanded = np.diff(v), np.diff(c)
-        alike = [_alike(changes, commanded, int(k)) for k in steps]
-        best = int(np.argmax(alike))
-        found.append(float(steps[best] * dt) if alike[best] > 0.3 else None)
+        alike.append([_alike(changes, commanded, int(k)) for k in steps])
+        best = int(np.argmax(alike[-1]))
+        found.append(float(steps[best] * dt) if alike[-1][best] > 0.3 else None)
     known = [x for x in found if x is not None]
     middle = float(np.median(known)) if known else 0.0
-    return [None if x is None else abs(x - middle) for x in found]
+    there = int(np.argmin(np.abs(steps * dt - middle)))
+    # a delay at which it is no more alike than at that of the others is none of its own
+    same = [a[there] >= _AS_ALIKE * max(a) for a in alike]
+    return [None if x is None else 0.0 if s else abs(x - middle) for x, s in zip(found, same, strict=True)]
 
 
 def _alike(x: Array, y: Array, delay: int) -> float:

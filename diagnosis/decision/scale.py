@@ -10,10 +10,11 @@ from collections.abc import Collection, Iterator
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from diagnosis.clearing.cells import Array, Cells
+from diagnosis.decision.turn_scale import ANGLE, GYRO, Meant, factor_of, meant
 from diagnosis.response.body import body_speeds
+from diagnosis.results.machine_event import MachineEvent, other_angle, other_turn, other_yaw_rate
 from replay.machine.geometry import Geometry
 from replay.machine.units import known_unit
 
@@ -21,11 +22,8 @@ _MOVES = 0.3  # of the usual speed: less of it says nothing
 _USUAL = 0.95  # quantile
 _STRAIGHT = 0.05  # of the usual speed: what wheels that go straight on may differ by
 _TURNS = 0.1  # rad; and of the usual yaw rate `_MOVES`
-_LEAST_S = 10.0  # of such motion
-_EVEN = 0.1  # ln; how much the factor may vary, as a standard deviation of its middle half
 _SLIPS = 0.1  # ln; tyres slip and wear by as much
 _TURN_SLIPS = 0.2  # ln; in a turn they slip sideways as well, and its lengths count
-_HARDLY = 0.2  # of the wheels' way: jacked up, or no sensor of this machine
 _STILL, _STILL_S = 0.01, 1.0  # of the usual speed; at rest for this long, a gyro shows its bias
 _ROTATIONAL = ("rad/s", "rpm", "deg/s", "rev/s")
 GROSS = 0.3  # ln; beyond any slip
@@ -42,11 +40,14 @@ class Scaled(NamedTuple):
         Its speed over that by the wheels [1].
     lengths : str
         Lengths of the machine file that stand in the comparison beside the wheels' scale; may be empty.
+    meant : Meant
+        What others say of it.
     """
 
     by: str
     factor: float
     lengths: str
+    meant: Meant = Meant()
 
 
 class Scale(NamedTuple):
@@ -73,15 +74,39 @@ class Scale(NamedTuple):
 
     @property
     def gross(self) -> str:
-        """A sentence where the contradiction is beyond any slip; else empty."""
-        return self.sentence if any(abs(np.log(s.factor)) > GROSS for s in self.wrong) else ""
+        """A sentence where the contradiction is beyond any slip, and may be the machine file's; else empty."""
+        return self.sentence if self._gross and not self._turn else ""
+
+    @property
+    def _gross(self) -> bool:
+        return any(abs(np.log(s.factor)) > GROSS for s in self.wrong)
+
+    @property
+    def _turn(self) -> Scaled | None:
+        """What contradicts the turns alone, where others have the scale of the wheels' speeds; else None."""
+        one = self._worst
+        return one if one is not None and one.lengths and one.meant.speeds else None
+
+    @property
+    def _worst(self) -> Scaled | None:
+        return max(self.wrong, key=lambda s: (not s.lengths, abs(np.log(s.factor))), default=None)
+
+    @property
+    def event(self) -> MachineEvent | None:
+        """What stands before the verdict where turns are beyond any slip, and the wheels' own scale is not meant; else None."""
+        one = self._turn
+        if one is None or not self._gross:
+            return None
+        return {GYRO: other_yaw_rate, ANGLE: other_angle}.get(one.meant.part, other_turn)(self.sentence)
 
     @property
     def sentence(self) -> str:
         """The contradiction in one sentence; empty where there is none."""
-        if not self.wrong:
+        one = self._worst
+        if one is None:
             return ""
-        one = max(self.wrong, key=lambda s: (not s.lengths, abs(np.log(s.factor))))
+        if self._turn is not None:
+            return self._of_turns(one)
         what = "the unit or gain of the wheel speeds"
         if self.diameter is not None:
             what = f"the wheel diameter ({self.diameter:g} m; {self.diameter * one.factor:.3g} m would fit)"
@@ -91,6 +116,37 @@ class Scale(NamedTuple):
             f"wheels share the factor: check {what}{others}{self._where}; if that is right, the wheels slip, or that sensor's "
             "scale is wrong."
         )
+
+    def _of_turns(self, one: Scaled) -> str:
+        """The same where the scale of the wheels' speeds is not meant."""
+        said, angle = one.meant, one.lengths == "the wheelbase"
+        makes = "wheel speeds and steering angle make" if angle else "left and right wheel make"
+        agree = " and ".join(said.speeds)
+        head = (
+            f"By the gyro (imu.yaw_rate) the machine turns {one.factor:.2f} times as fast as {makes} it, throughout, while {agree} "
+            f"{'agrees' if len(said.speeds) == 1 else 'agree'} with the wheels' speeds: "
+        )
+        if said.part == ANGLE:
+            return head + (
+                f"{said.by} turns it as the gyro has it, so that the steering angle reads about {1.0 / one.factor:.2f} times what it is, or the "
+                f"wheelbase{self._where} is wrong."
+            )
+        alike = ""
+        if self.diameter is not None:
+            alike = f"; a wheel diameter that controller and machine file have wrong alike ({self.diameter * one.factor:.3g} m would fit) looks the same"
+        if said.part == GYRO:
+            return head + (
+                f"{said.by} turns it as steering angle and wheelbase have it, so that the scale of the gyro is wrong (it would be multiplied by "
+                f"{1.0 / one.factor:.2f}){alike}."
+            )
+        where = (
+            f"the wheelbase{self._where}" if angle else f"the track{self._where} is wrong, or the wheels slip in turns"
+        )
+        if angle:
+            return f"{head}the scale of the gyro or of the steering angle is wrong, or {where}; nothing in the log tells which{alike}."
+        if said.track:
+            return f"{head}the scale of the gyro is wrong, or the wheels slip in turns; the commanded yaw rate agrees with the track{alike}."
+        return f"{head}the scale of the gyro is wrong, or {where}; nothing in the log tells which{alike}."
 
     @property
     def _where(self) -> str:
@@ -135,7 +191,10 @@ def scale_of(cells: Cells, units: Collection[str], *, factor: float = 1.0) -> Sc
     turned = any(known_unit(u) in _ROTATIONAL for u in units)
     diameter = machine.geometry.wheel_diameter if machine.geometry is not None and turned else None
     speeds = cells.wheels("v")
-    found = () if not np.isfinite(speeds).any() else (*_straight(cells, speeds), *_turning(cells, speeds))
+    found: tuple[Scaled, ...] = ()
+    if np.isfinite(speeds).any():
+        found = tuple(_straight(cells, speeds))
+        found = (*found, *_turning(cells, speeds, factor, tuple(s.by for s in found if _agrees(s.factor * factor))))
     found = tuple(s._replace(factor=s.factor * factor) for s in found)
     return Scale(diameter, found, assumed="geometry" in machine.assumed)
 
@@ -150,13 +209,20 @@ def _straight(cells: Cells, speeds: Array) -> Iterator[Scaled]:
         & (np.abs(v) > _MOVES * usual)
     )
     for body in body_speeds(cells.timeline, cells.width):
-        factor = _factor(np.abs(body.speed), np.abs(v), straight, cells.dt)
+        factor = factor_of(np.abs(body.speed), np.abs(v), straight, cells.dt)
         if factor is not None:
             yield Scaled(body.name, factor, "")
 
 
-def _turning(cells: Cells, speeds: Array) -> Iterator[Scaled]:
-    """By a yaw rate while the machine turns without skidding: two sides on one line, or a steered axle."""
+def _agrees(factor: float) -> bool:
+    return abs(float(np.log(factor))) < _SLIPS
+
+
+def _turning(cells: Cells, speeds: Array, by: float, agreeing: tuple[str, ...]) -> Iterator[Scaled]:
+    """By a yaw rate while the machine turns without skidding: two sides on one line, or a steered axle.
+
+    `by`: what the speeds were multiplied by; `agreeing`: sensors of the body that have their scale.
+    """
     geometry, yaw = cells.machine.geometry, cells.means("imu.yaw_rate")
     if geometry is None or not np.isfinite(yaw).any():
         return
@@ -171,9 +237,10 @@ def _turning(cells: Cells, speeds: Array) -> Iterator[Scaled]:
     if not known.size:
         return
     turning = (np.abs(expected) > _MOVES * float(np.quantile(known, _USUAL))) & (expected * yaw > 0.0)
-    factor = _factor(np.abs(yaw), np.abs(expected), turning, cells.dt)
+    factor = factor_of(np.abs(yaw), np.abs(expected), turning, cells.dt)
     if factor is not None:
-        yield Scaled("the yaw rate", factor, lengths)
+        others = meant(cells, v, expected, turning, factor, agreeing) if by == 1.0 else Meant()
+        yield Scaled("the yaw rate", factor, lengths, others)
 
 
 def _by_sides(cells: Cells, geometry: Geometry, speeds: Array) -> tuple[Array, str] | None:
@@ -208,15 +275,3 @@ def _median(speeds: Array) -> tuple[Array, float]:
     v[known] = np.nanmedian(speeds[known], axis=1)
     moving = np.abs(v[known])
     return v, float(np.quantile(moving[moving > 0.0], _USUAL)) if (moving > 0.0).any() else np.inf
-
-
-def _factor(body: Array, wheels: Array, use: NDArray[np.bool_], dt: float) -> float | None:
-    """Median of body over wheels; None for too little motion, where it varies, and of what hardly moves."""
-    use = use & np.isfinite(body) & np.isfinite(wheels) & (wheels > 0.0)
-    if np.count_nonzero(use) * dt < _LEAST_S:
-        return None
-    ratio = np.log(np.maximum(body[use], 1e-9) / wheels[use])
-    low, middle, high = np.quantile(ratio, [0.25, 0.5, 0.75])
-    if (high - low) / 1.349 > _EVEN or not np.log(_HARDLY) < middle < -np.log(_HARDLY):
-        return None
-    return float(np.exp(middle))

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.response.answering import BODY_COMMANDS, MOVES, wheels_of
+from diagnosis.response.asked import asked_of
 from diagnosis.response.beside import Bodies, same_side, turns_by_wheels, views
 from diagnosis.response.body import BodySpeed
 from diagnosis.response.calm_holds import calm_hold, either
@@ -22,6 +23,7 @@ from diagnosis.response.common_cause import (
     unwinds,
     without_consequences,
 )
+from diagnosis.response.company import after_a_dispute, in_company
 from diagnosis.response.disputed import DISPUTED, HIDES, disputed_steps, doubted, unproved
 from diagnosis.response.drive import by_peers, unanswered
 from diagnosis.response.effort import idle_drives, idle_spans, own_pull, powered, shares_of
@@ -40,6 +42,7 @@ from diagnosis.response.models import (
     Beside,
     Blocks,
 )
+from diagnosis.response.nearer import nearer_to_its_command
 from diagnosis.response.pairs import by_leaps
 from diagnosis.response.power import powers_of, unshown
 from diagnosis.response.ramps import only_a_ramp
@@ -58,6 +61,7 @@ from diagnosis.response.turning import turning_of, turns_other_way, turns_with, 
 from diagnosis.response.unlike import unlike_in_motion
 from diagnosis.response.uphill import lower_by_a_load
 from diagnosis.response.witness import witness_of, witnessed
+from diagnosis.response.wound_up import after_a_fault
 from diagnosis.results.assessment import Assessment, Finding, Reason
 from replay.machine.config import Limits
 from replay.machine.geometry import Geometry
@@ -187,7 +191,7 @@ def assess_response(
         for w, j in judged.items()
     }
     least = max(1, round(_LEAST_S / BLOCK_S))
-    asked = {w: _asked(j, limits) for w, j in judged.items()}
+    asked = {w: asked_of(j, limits) for w, j in judged.items()}
     bare = {w: j.posterior if j.speed is None else None for w, j in judged.items()}
     moves = {w: (x, rolling(x, judged[w].joint, MOVES * limits.driving_speed)) for w, x in asked.items()}
     kept = {w: where_asked(spells, moves[w], least, bare[w]) for w, spells in kept.items()}
@@ -195,6 +199,8 @@ def assess_response(
     kept = {w: [s for s in spells if not stands_with_all(s, w, judged, asked)] for w, spells in kept.items()}
     turning = turning_of(judged, geometry, bodies.yaw if not sideways else None)
     kept = {w: [s._replace(turns=turns_with(w, s, judged, turning)) for s in spells] for w, spells in kept.items()}
+    other_way = exchanged or turns_other_way(judged, geometry, turning)
+    by_motion = {} if other_way else by_motion  # then a yaw rate confirms no wheel
     together = held_back_together(judged)
     like = {w: by_peers(w, judged, geometry, cell) for w in judged}
     weak = {
@@ -203,6 +209,7 @@ def assess_response(
             judged,
             (like[w], by_motion.get(w)),
             (spans.get(w, []), bool(mates[w]) or not _turned_by(w, found)),
+            efforts.get(w),
             width * dt,
         )
         for w in judged
@@ -213,7 +220,15 @@ def assess_response(
     kept = {w: [x for x in spells if not only_a_ramp(x, unclear[w], judged[w], width)] for w, spells in kept.items()}
     late = {w: [f for f in found if f not in unclear[w]] for w, found in late.items()}
     nobodys = {
-        w: [x for x in spells if lower_by_a_load(x, judged[w]) or calm_hold(x, w, judged, MOVES * limits.driving_speed)]
+        w: [
+            x
+            for x in spells
+            if lower_by_a_load(x, judged[w])
+            or calm_hold(x, w, judged, MOVES * limits.driving_speed)
+            or nearer_to_its_command(x, w, judged, mates[w], width * dt)
+            or in_company(x, w, judged)
+            or after_a_dispute(x, w, judged, width * dt)
+        ]
         for w, spells in kept.items()
     }
     kept = {w: [x for x in spells if x not in nobodys[w]] for w, spells in kept.items()}
@@ -239,7 +254,7 @@ def assess_response(
     doubts = {w: Reason(j.odd) for w, j in judged.items() if j.odd and not any(side.findings for side in parts[w])}
     doubts |= {w: j.joint.unlike for w, j in judged.items() if j.joint is not None and j.joint.unlike}
     doubts |= unlike_in_motion(judged, mates, sideways=sideways) | unlike(judged)
-    if exchanged or turns_other_way(judged, geometry, turning):
+    if other_way:
         doubts = dict.fromkeys(judged, Reason(_EXCHANGED)) | doubts
     for w, why in doubts.items():
         parts[w] = doubted(parts[w][0], [slice(None)], why), parts[w][1]
@@ -284,26 +299,16 @@ def _drives(
     judged: Mapping[str, Judged],
     known: tuple[Blocks | None, Beside | None],
     pull: tuple[list[tuple[int, int]], bool],
+    effort: Array | None,
     block_s: float,
 ) -> list[Finding]:
     """What is known to be a drive's fault, each time once.
 
-    `known`: its blocks with what is expected of it, and how the ground moves; `pull`: blocks in which it pulls nothing, and whether it is dragged along then.
+    `known`: its blocks with what is expected of it, and how the ground moves; `pull`: blocks in which it pulls nothing, and whether it is dragged along then;
+    `effort` in blocks.
     """
-    idle = idle_drives(judged[wheel], *pull, block_s)  # it says why: without power
+    idle = after_a_fault(idle_drives(judged[wheel], *pull, block_s), judged[wheel], effort, block_s)  # without power
     told = idle
     for more in (unanswered(wheel, judged, known, block_s), running_on(wheel, judged, known[0], block_s)):
         told = told + [f for f in more if not any(f.start < g.stop and g.start < f.stop for g in told)]
     return told
-
-
-def _asked(one: Judged, limits: Limits) -> Flags:
-    """Blocks in which the wheel must move, by its command or by another view, shape (b,).
-
-    Where it has a command only a view of this very wheel counts beside it: one that stands as it is told does nothing wrong.
-    """
-    blocks, least = one.wheel.blocks, MOVES * limits.driving_speed
-    asked = (blocks.low > least) | (blocks.high < -least)
-    if one.speed is None or (one.response.answered and not one.wheel.own):
-        return asked
-    return asked | (np.abs(np.nan_to_num(one.speed)) > least)

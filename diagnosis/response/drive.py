@@ -147,7 +147,7 @@ def unanswered(
     habit = _habit(there, off, [j.wheel.blocks for w, j in judged.items() if w != wheel], top)
     there &= (beside < _AGREES * np.nan_to_num(view.noise)) & (beside < _CLOSER * off)
     there &= np.logical_and.reduce([x < _CLOSER * off for x in others]) if others else True
-    there &= _off_asked(one, block_s) > _CLOSER * off
+    there &= off_asked(one, block_s) > _CLOSER * off
     there &= ~_eager(one, blocks)
     there &= ~with_another(one, [j for w, j in judged.items() if w != wheel], off, top)
     limit = at_body_limit(judged, block_s)
@@ -218,8 +218,11 @@ def _off(blocks: Blocks) -> Array:
     return np.abs(blocks.mean - np.clip(blocks.mean, blocks.low, blocks.high))
 
 
-def _off_asked(one: Judged, block_s: float) -> Array:
-    """How far each block is from what is asked of the wheel [m/s], whatever the drive makes of it in most of the mission."""
+def off_asked(one: Judged, block_s: float) -> Array:
+    """How far each block is from what is asked of the wheel [m/s], shape (b,), whatever the drive makes of it in most of the mission.
+
+    `block_s` is the length of a block [s]; infinite where the distance is not known.
+    """
     blocks = one.wheel.blocks
     asked = cells(one.data.asked, int(blocks.start[1]) if blocks.start.size > 1 else 1)
     back = round(_ANSWER_S / block_s)

@@ -19,11 +19,11 @@ from diagnosis.response.sides import without_doubles
 from diagnosis.response.tracking import assess_channel, assess_tracking
 from diagnosis.results.assessment import Assessment, Reason
 from diagnosis.results.machine_event import (
+    gyro_or_slip,
     not_following,
     not_related,
     not_shown,
     one_side_otherwise,
-    other_yaw_rate,
     turns_otherwise,
 )
 from diagnosis.results.vocabulary import Tier
@@ -70,7 +70,7 @@ class ResponseEvidence:
             *map(not_related, judged.unrelated),
             *map(not_shown, judged.unshown),
             *map(one_side_otherwise, judged.scaled),
-            *map(other_yaw_rate, judged.gyro),
+            *map(gyro_or_slip, judged.gyro),
             *(turns_otherwise(t.text) for t in turns),
         )
         return Contribution(parts, events=events)

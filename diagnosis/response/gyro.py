@@ -17,6 +17,7 @@ from diagnosis.response.heading import agree
 from diagnosis.response.machine import Judged
 from diagnosis.response.spells import Spell
 from diagnosis.response.turning import Turning, difference, fitted
+from diagnosis.results.machine_event import GYRO_CONSTANT, GYRO_REST, GYRO_SLIP
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -35,7 +36,6 @@ _STRAIGHT_S, _RESTS_S, _STANDS = (
     0.5,
     0.02,
 )  # of a constant, nearly straight ahead; of rest in it; of the usual speed
-_MORE = "rad/s more than the {wheels} make"
 _OR_SIDE = "; or one side goes otherwise than it reads, as with an encoder that is scaled inside the speed loop that it closes."
 _HELD = ", unless something held it and the {wheels} slipped"
 _APART = 0.05  # of the speed: sides that differ by less turn nothing worth a word
@@ -124,10 +124,10 @@ def wrong_gyro(
         if heading is not None and agree(turning.yaw - offset, heading, about.made, slice(start, stop)):
             continue
         if what:
-            constant = what.endswith(_MORE)
+            constant = what.endswith(GYRO_CONSTANT)
             rests = bool(np.count_nonzero((stands & off)[start:stop]) * block_s >= _RESTS_S)
             text = f"From {start * block_s:.1f} to {stop * block_s:.1f} s the gyro (imu.yaw_rate) {what}, by what the rest of the mission shows of the two"
-            text += "." if rests or not constant else _OR_SIDE
+            text += _OR_SIDE if constant and not rests else f"{GYRO_REST}." if constant else "."
             out.append(Contradicted(text, start, stop, sure=rests or not constant))
     return tuple(out)
 
@@ -144,7 +144,7 @@ def _constant(about: _Spread, part: slice, straight: Flags, sound: Flags, block_
     helps = not turns.any() or float(np.mean((apart[turns] - constant) ** 2)) < float(np.mean(apart[turns] ** 2))
     if abs(constant) <= max(_ASIDE * about.usual, _OFF * about.noise) or left > _FITS * abs(constant) or not helps:
         return ""
-    return f"reads {constant:+.2g} {_MORE}"
+    return f"reads {constant:+.2g} {GYRO_CONSTANT}"
 
 
 def _spans(off: Flags, shows: Flags) -> list[tuple[int, int]]:
@@ -175,12 +175,12 @@ def _kind(about: _Spread, part: slice, sound: Flags, block_s: float) -> str:
         return ""
     if by_constant < by_gain:
         aside = abs(constant) > _ASIDE * about.usual
-        return f"reads {constant:+.2g} {_MORE}" if aside else ""
+        return f"reads {constant:+.2g} {GYRO_CONSTANT}" if aside else ""
     if not turns or abs(gain - 1.0) < _SAME:
         return ""
     if abs(gain) < _NOTHING:
         return f"gives next to nothing while the {{wheels}} turn the machine at up to {np.max(np.abs(made)):.2g} rad/s{_HELD}"
-    ground = ", unless the ground let them slip" if 0.0 < gain < 1.0 else ""
+    ground = f", {GYRO_SLIP}" if 0.0 < gain < 1.0 else ""
     return f"reads {gain:.2f} × what the {{wheels}} make{ground}"
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.response.identification import Response
-from diagnosis.response.inputs import FollowerData
+from diagnosis.response.inputs import FollowerData, cells
 from diagnosis.response.joint import Joint
 from diagnosis.response.models import Beside
 from diagnosis.response.spells import Spell
@@ -187,7 +187,18 @@ def unlike_others(judged: Mapping[str, Judged]) -> dict[str, float]:
 
 def _made(judged: Mapping[str, Judged]) -> dict[str, float]:
     """What each wheel makes of its command [1]."""
-    return {w: abs(float(j.response.left(j.data.commands)[0])) for w, j in judged.items() if j.response.answered}
+    return {w: share for w, j in judged.items() if j.response.answered and np.isfinite(share := _share_made(j))}
+
+
+def _share_made(one: Judged) -> float:
+    """What a wheel makes of a commanded speed, or, where only turns are ever asked for, of what these ask of it [1]; NaN where that is nothing."""
+    commands = np.nan_to_num(one.data.commands)
+    weights = one.response.left(one.data.commands)
+    if np.any(np.abs(commands[:, 0]) > 0.0):
+        return abs(float(weights[0]))
+    asked = np.nan_to_num(cells(one.data.asked, -(-one.data.asked.size // len(commands))))[: len(commands)]
+    power = float(asked @ asked)
+    return abs(float(asked @ (commands @ weights)[: asked.size])) / power if power > 0.0 else np.nan
 
 
 def lasting_losses(judged: Mapping[str, Judged]) -> dict[str, float]:

@@ -32,6 +32,11 @@ _MOSTLY, _AWAY_S = 0.25, 2.0  # ... for as much of the time, and for so long
 _FOLLOWS = 0.7  # of the time, in which another wheel is as near to its own command as it should
 _OTHERS = 2
 _P, _SENSOR = 0.85, 0.1
+_STANDS, _RESTS_S, _LEAVES_S = (
+    0.04,
+    2.0,
+    1.0,
+)  # of the top speed, below which the other wheels stand; while it keeps its speed; for which it leaves that
 _LEAST_BLOCKS, _MOST_OF = 40, 0.8  # that show a share of what is asked; of them that it explains
 _TWICE = 2.0  # tolerances, by which two wheels at one speed differ
 _WEAK, _IN_SHARE = (
@@ -93,7 +98,20 @@ def running_on(wheel: str, judged: Mapping[str, Judged], blocks: Blocks | None, 
     gain = _share(y, asked, alive, 2.0 * tolerance) if found else None
     if gain is not None:
         return [_weak(one, gain, (int(found[0][0]), int(found[-1][1])), block_s)]
-    return [_finding(one, span, asked, block_s) for span in found]
+    stand = np.logical_and.reduce(
+        [np.abs(np.nan_to_num(j.wheel.blocks.mean)) < _STANDS * top for w, j in judged.items() if w != wheel]
+    )
+    out = []
+    for span in found:
+        part = slice(span[0], span[1])
+        near = np.abs(y[part] - span[2]) <= 2.0 * _NEAR * top
+        rests, leaves = (np.count_nonzero(x) * block_s for x in (stand[part] & near, ~near & alive[part]))
+        others_near = [  # one that goes elsewhere in between, or keeps another speed next, is not held there
+            f for f in found if abs(f[2] - span[2]) > 4.0 * _NEAR * top and _gap(f, span) * block_s <= _JOIN_S
+        ]
+        shifted = rests >= _RESTS_S and (leaves >= _LEAVES_S or bool(others_near))
+        out.append(_shifted(one, span, block_s) if shifted else _finding(one, span, asked, block_s))
+    return out
 
 
 def _with(y: Array, other: Array, tolerance: Array) -> bool:
@@ -130,6 +148,35 @@ def _weak(one: Judged, gain: float, span: tuple[int, int], block_s: float) -> Fi
         probability=_P,
         hypotheses=(Hypothesis(side.value, mode.value, _P), rest),
         epsilon=Epsilon(loss, max(loss - 0.1, 0.0), min(loss + 0.1, 1.0)),
+        sat=None,
+        evidence=(text,),
+        tier=Tier.RESPONSE,
+    )
+
+
+def _gap(one: tuple[int, int, float], other: tuple[int, int, float]) -> int:
+    """Blocks between two spans; negative where they overlap."""
+    return max(one[0], other[0]) - min(one[1], other[1])
+
+
+def _shifted(one: Judged, span: tuple[int, int, float], block_s: float) -> Finding:
+    """A finding of a wheel that reads one speed, part of it while all others stand; in blocks `span`."""
+    start, stop, speed = span
+    width = int(one.wheel.blocks.start[1])
+    text = (
+        f"{one.data.name} stays at {speed:.2g} {{speed_unit}} for {(stop - start) * block_s:.1f} s, part of it while all other {{wheels}} stand, and goes at other speeds as well: its "
+        "readings are shifted, or it turns freely."
+    )
+    side, mode = Side.SENSOR_OR_ACTUATOR, FaultMode.OUTSIDE_TABLE
+    rest = Hypothesis("none", State.HEALTHY.value, 1.0 - _P)
+    return Finding(
+        start=start * width,
+        stop=min(stop * width, one.data.y.size),
+        side=side,
+        mode=mode,
+        probability=_P,
+        hypotheses=(Hypothesis(side.value, mode.value, _P), rest),
+        epsilon=None,
         sat=None,
         evidence=(text,),
         tier=Tier.RESPONSE,

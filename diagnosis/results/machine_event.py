@@ -6,6 +6,10 @@ from dataclasses import dataclass, replace
 
 from diagnosis.results.machine_words import MachineWords
 
+#: What a sentence on a gyro has in it where it is off by a constant, and where the ground is named already.
+GYRO_CONSTANT, GYRO_SLIP = "rad/s more than the {wheels} make", "unless the ground let them slip"
+GYRO_REST = ", where they rest as well"  # so that no slip makes it
+
 
 @dataclass(frozen=True)
 class MachineEvent:
@@ -80,6 +84,40 @@ def other_yaw_rate(text: str) -> MachineEvent:
     doubt = "the gyro contradicts the {wheels}"
     act = "compare the gyro with turns of the machine that you count: its axis, its unit (rad/s or degrees), its plug"
     return MachineEvent("The gyro contradicts the {wheels}", text, doubt, act)
+
+
+def gyro_or_slip(text: str) -> MachineEvent:
+    """The measured yaw rate and the wheels contradict each other, where slip may make it: a constant, or a share, of a time in which they turn the machine."""
+    slips = any(words in text for words in (GYRO_CONSTANT, GYRO_SLIP))
+    if not slips or GYRO_REST in text:
+        return other_yaw_rate(text)
+    if GYRO_SLIP not in text:
+        text += " Slip of the {wheels}, as on a slope, or where steering or another {wheel} turns the machine otherwise, looks the same."
+    doubt = "gyro and {wheels} contradict each other"
+    act = (
+        "look whether the {wheels} slipped there (slope, kerb, wet or loose ground); if not, compare the gyro with turns of the machine that you "
+        "count: its axis, its unit (rad/s or degrees), its plug"
+    )
+    return MachineEvent("Gyro and {wheels} contradict each other", text, doubt, act)
+
+
+def other_angle(text: str) -> MachineEvent:
+    """A steering angle alone contradicts how the machine turns, all through."""
+    act = "turn the steering to angles that you measure at the {wheels}, compare its sensor with them (zero, scale, unit), and diagnose again"
+    return MachineEvent(
+        "The steering angle contradicts the gyro", text, "the steering angle contradicts how the machine turns", act
+    )
+
+
+def other_turn(text: str) -> MachineEvent:
+    """A yaw rate is another share of the turns than wheels and steering make, all through, and their speeds are not meant."""
+    act = (
+        "compare the gyro with turns of the machine that you count (its axis, its unit), measure steering angle, wheelbase or track against the "
+        "machine file, and diagnose again"
+    )
+    return MachineEvent(
+        "The gyro contradicts the turns", text, "gyro and turns contradict each other by a factor throughout", act
+    )
 
 
 def one_side_otherwise(text: str) -> MachineEvent:

@@ -22,6 +22,7 @@ from diagnosis.steering.driven import driven_by
 from diagnosis.steering.evidence import evidence_columns, path_angle
 from diagnosis.steering.filter_state import SteeringPath
 from diagnosis.steering.findings import SideFindings, apart, findings_of
+from diagnosis.steering.followed import assessed, stays
 from diagnosis.steering.inputs import AxleInputs, Counts, axle_inputs
 from diagnosis.steering.measured_twice import of_one_cause
 from diagnosis.steering.model_error import ModelError, model_error
@@ -148,8 +149,13 @@ def assess_steering(
         if one is not None:
             sides = alone.get(inputs.name, one.sides)
             judged = _judged(inputs, replace(one, sides=sides), otherwise=otherwise)
+        found_still = stays(timeline, machine, inputs.name) if judged is None else None
         for side in _SIDES:
-            assessments[inputs.name, side.value] = _assessment(side, inputs, judged)
+            assessments[inputs.name, side.value] = (
+                _assessment(side, inputs, judged)
+                if found_still is None
+                else assessed(found_still, inputs.values("phi"), side)
+            )
         angle, doubt = _best_angle(inputs, assessments[inputs.name, Side.SENSOR.value], judged)
         angles.append(angle)
         doubts.append(doubt)

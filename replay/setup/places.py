@@ -33,6 +33,7 @@ _SHORTEST = 0.1  # m
 _TRIMMED, _SOUND, _APART = 0.2, 0.8, 0.95
 _HALF = 0.5
 _STRAFES = 0.05  # m/s
+_ONE_VALUE = 0.98  # of the moments
 
 
 class _Pair(NamedTuple):
@@ -131,7 +132,8 @@ def _pairs(seen: Mapping[str, Array], machine: Machine) -> Iterator[_Pair]:
     """Wheels beside each other on one axle or at one place along the machine."""
     assert machine.geometry is not None
     places = machine.geometry.wheels
-    for a, b in combinations([w for w in machine.wheels if f"wheel.{w}.v" in seen and w in places], 2):
+    live = [w for w in machine.wheels if w in places and _lives(seen.get(f"wheel.{w}.v"))]
+    for a, b in combinations(live, 2):
         left, right = (a, b) if places[a].y > places[b].y else (b, a)
         apart = places[left].y - places[right].y
         if apart < _SHORTEST or abs(places[a].x - places[b].x) > 0.1 * apart:
@@ -139,6 +141,12 @@ def _pairs(seen: Mapping[str, Array], machine: Machine) -> Iterator[_Pair]:
         if sum(abs(p.x - places[a].x) <= 0.1 * apart for p in places.values()) != 2:
             continue  # twin wheels: which is the other's is not told
         yield _Pair(left, right, (seen[f"wheel.{right}.v"] - seen[f"wheel.{left}.v"]) / apart)
+
+
+def _lives(speed: Array | None) -> bool:
+    """Whether a speed is logged, and is more than one value: a dead one turns the machine by nothing that it does."""
+    known = np.zeros(0) if speed is None else speed[np.isfinite(speed)]
+    return bool(known.size and np.mean(known == np.median(known)) < _ONE_VALUE)
 
 
 def _measured(seen: Mapping[str, Array], speed: Array, dt: float) -> Iterator[_View]:

@@ -31,6 +31,7 @@ _CURRENT = (3.5, 21.0)  # mA; what a signal of 4 to 20 mA keeps between
 _MOST_OF_IT = 0.2  # of the samples other than zero lie beyond the limit: no spikes
 _ANY_MACHINE = 30.0  # m/s; faster than any machine whose top speed was not given
 _SOUND = 2  # other signals of the kind, recorded in the same unit, that are plausible: then it is a fault of this one
+_ONE_VALUE = 0.95  # of the samples: a dead reading
 _TURN = 3.1  # rad; a machine file can give no larger limit of steering
 _ROTATIONS, _TURNING = ("rad/s", "rpm", "deg/s"), ("rad/s", "rpm", "deg/s", "rev/s")
 _ANGLES, _LENGTHS = ("rad", "deg"), ("m", "mm")  # of positions, whose slopes are speeds
@@ -222,9 +223,19 @@ def questions(doubts: Sequence[Doubt], items: Mapping[str, Signal]) -> tuple[str
             for n, s in items.items()
             if n not in doubted and _alike(n, d.signal) and s.origin.unit == items[d.signal].origin.unit
         ]
-        if d.impossible and len(sound) < _SOUND:
+        if d.impossible and len(sound) < _SOUND and not (sound and _runs_away(d.signal, items)):
             out.append(d.question)
     return tuple(out)
+
+
+def _runs_away(signal: str, items: Mapping[str, Signal]) -> bool:
+    """Whether a joint turns too fast while its speed reads one value all through: its loop drives it blindly, and its unit is that of the others."""
+    kind, wheel, leaf = (*signal.split("."), "", "")[:3]
+    speed = items.get(f"{kind}.{wheel}.v") if kind == "wheel" and leaf == "v_position" else None
+    if speed is None:
+        return False
+    known = speed.values[np.isfinite(speed.values)]
+    return bool(known.size and np.mean(known == np.median(known)) > _ONE_VALUE)
 
 
 def _alike(a: str, b: str) -> bool:

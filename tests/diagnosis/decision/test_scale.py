@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from diagnosis.decision.scale import Scale, Scaled, scale_of
+from diagnosis.decision.turn_scale import ANGLE, GYRO, Meant, meant
 from replay.faults import FaultMode, FaultSpec, Side
 from replay.machine.config import haulotte
 from replay.simulation.options import SimulatedMission
@@ -56,9 +59,9 @@ def test_a_sound_scale_agrees_with_receiver_and_gyro(seed: int) -> None:
 def test_a_wrong_diameter_is_told_with_the_one_that_fits(factor: float) -> None:
     found = scale(mission(5), factor)
     assert found.diameter is not None
-    (said,) = [s for s in found.wrong if s.by == "odometry"]
-    assert said.factor == pytest.approx(1 / factor, rel=0.04)
-    assert f"{found.diameter * said.factor:.3g} m would fit" in found.sentence
+    (one,) = [s for s in found.wrong if s.by == "odometry"]
+    assert one.factor == pytest.approx(1 / factor, rel=0.04)
+    assert f"{found.diameter * one.factor:.3g} m would fit" in found.sentence
     assert bool(found.gross) == (factor in (0.5, 2.0))
     assert found.result[2] is False
 
@@ -81,3 +84,44 @@ def test_speeds_of_the_rim_name_no_diameter() -> None:
     assert found.diameter is None
     assert "the unit or gain" in Scale(None, (Scaled("odometry", 2.0, ""),)).sentence
     assert np.isfinite([s.factor for s in found.found]).all()
+
+
+def said(factor: float, meant: Meant, lengths: str = "the wheelbase") -> Scale:
+    return Scale(0.5, (Scaled("odometry", 1.0, ""), Scaled("the yaw rate", factor, lengths, meant)))
+
+
+def test_what_alone_contradicts_the_turns_is_named_where_the_speeds_agree_with_others() -> None:
+    gyro = said(0.6, Meant(("odometry",), GYRO, "the difference of RR and RL"))
+    angle = said(1.42, Meant(("odometry",), ANGLE, "the difference of RR and RL"))
+    either, track = said(0.6, Meant(("odometry",))), said(0.45, Meant(("odometry",), track=True), "the track")
+    assert "the scale of the gyro is wrong (it would be multiplied by 1.67)" in gyro.sentence
+    assert "the steering angle reads about 0.70 times what it is" in angle.sentence
+    assert "diameter" not in angle.sentence
+    assert "nothing in the log tells which" in either.sentence
+    assert "or the wheels slip in turns; the commanded yaw rate agrees with the track" in track.sentence
+    titles = [s.event.title if s.event is not None else "" for s in (gyro, angle, either, track)]
+    assert titles[0] == "The gyro contradicts the {wheels}"
+    assert titles[1] == "The steering angle contradicts the gyro"
+    assert titles[2] == titles[3] == "The gyro contradicts the turns"
+    assert not any(s.gross for s in (gyro, angle, either, track))
+
+
+def test_without_anything_that_has_the_speeds_scale_the_diameter_comes_first() -> None:
+    one = said(0.6, Meant())
+    assert one.event is None
+    assert "check the wheel diameter" in one.gross
+
+
+@pytest.mark.parametrize(("part", "turns"), [(GYRO, 1.0), (ANGLE, 0.6)])
+def test_the_wheels_of_the_unsteered_axle_tell_gyro_from_angle(part: str, turns: float) -> None:
+    rng, n, wheels = np.random.default_rng(2), 1200, ("RR", "RL")
+    v = np.repeat(rng.choice([1.0, 2.0, 3.0], n // 40), 40)
+    expected = v * np.repeat(rng.choice([-0.3, 0.0, 0.0, 0.2, 0.3], n // 40), 40)
+    across = 1.6 * turns * expected / 2.0 + 0.01 * v  # a worn tyre
+    means = {"cmd.v": v, "wheel.RR.v": v + across, "wheel.RL.v": v - across}
+    means = {k: x + 0.005 * rng.normal(size=n) for k, x in means.items()}
+    places = {w: SimpleNamespace(x=-1.0, y=y, axle="fixed") for w, y in zip(wheels, (-0.8, 0.8), strict=True)}
+    machine = SimpleNamespace(wheels=wheels, axles=("front",), geometry=SimpleNamespace(wheels=places))
+    cells: Any = SimpleNamespace(means=lambda k: means.get(k, np.full(n, np.nan)), machine=machine, dt=0.1)
+    told = meant(cells, v, expected, np.abs(expected) > 0.2, 0.6, ())
+    assert told == Meant(("the commanded speed",), part, "the difference of RR and RL")

@@ -55,3 +55,17 @@ def test_wheels_that_all_keep_their_speeds_do_not_follow_their_commands_and_none
     for k, w in enumerate(WHEELS):
         measured[w][PART] = np.round(0.4 + np.random.default_rng(k).normal(0.0, 0.006, PART.stop - PART.start), 3)
     assert [f for _, f in told(measured, asked, body) if f.side is Side.ACTUATOR] == []
+
+
+def test_one_that_reads_a_speed_while_all_others_stand_and_follows_in_between_may_be_shifted() -> None:
+    measured, asked, body = speeds(3, WHEELS)
+    wheel, rng = WHEELS[1], np.random.default_rng(1)
+    for k, told_to in enumerate((0.5, 0.0, -0.5, 0.0, -0.5, 0.0)):
+        part = slice(PART.start + 80 * k, PART.start + 80 * (k + 1))
+        for w in WHEELS:
+            asked[w][part] = told_to
+            measured[w][part] = told_to + (0.006 * rng.normal(size=80) if told_to or w == wheel else 0.0)
+        measured[wheel][part] = 0.3 + 0.006 * rng.normal(size=80) if k < 2 else measured[wheel][part] + 0.3
+        body[part] = (told_to, 0.0)
+    found = [f for w, f in told(measured, asked, body) if w == wheel and f.side is not Side.ACTUATOR]
+    assert any("while all other {wheels} stand" in f.evidence[0] for f in found)

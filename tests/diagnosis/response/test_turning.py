@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from diagnosis.response.assess import assess_response
 from diagnosis.response.kernel import follow
 from diagnosis.results.assessment import CODE, Finding
-from replay.faults import FaultMode, State
+from replay.faults import FaultMode, Side, State
 from replay.machine.config import Limits
 from tests.campaigns import campaign
 from tests.diagnosis.response.robot import DT, TRACK, WHEELS, commands, followers_of, geometry, speeds
@@ -123,3 +123,13 @@ def test_nothing_healthy_is_said_of_sides_that_are_exchanged(seed: int) -> None:
 def test_a_gyro_with_the_other_sign_says_nothing_against_wheels_that_do_as_they_are_told(seed: int) -> None:
     measured, _, _ = speeds(seed, PAIR)
     assert healthy_anywhere(measured, -yaw_of(measured, seed), seed) == [True, True]
+
+
+@pytest.mark.parametrize("seed", campaign([3, 8]))
+def test_no_drive_is_named_by_a_yaw_rate_against_which_the_sides_turn(seed: int) -> None:
+    measured, _, _ = speeds(seed, PAIR)
+    yaw = -yaw_of(measured, seed)
+    part = slice(SPELL.start, SPELL.start + round(8.0 / DT))
+    measured["L"] = measured["L"].copy()
+    measured["L"][part] *= 0.7
+    assert [w for w, f in told(measured, yaw, seed) if f.side is Side.ACTUATOR] == []

@@ -68,6 +68,12 @@ def test_faults_are_no_contradiction(wheel: str, gain: float) -> None:
     assert place_doubts(line(stuck), machine()) == ()
 
 
+def test_a_wheel_that_runs_away_from_its_dead_speed_exchanges_nothing() -> None:
+    signals = {n: x for n, x in driven().items() if ".F" not in n and ".front" not in n}
+    signals |= {"wheel.RR.v": np.zeros_like(signals["cmd.v"]), "wheel.RL.v": 2.0 * signals["cmd.omega"]}
+    assert place_doubts(line(signals), machine()) == ()
+
+
 def test_two_wheels_of_one_axle() -> None:
     assert place_doubts(line(exchanged(driven(), "RR", "RL")), machine()) == (
         "RL and RR are exchanged: they turn against the other wheels, the measured yaw rate, the steering and the commanded yaw rate",

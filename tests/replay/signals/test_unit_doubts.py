@@ -123,3 +123,15 @@ def test_turns_per_minute_are_offered_though_neither_speed_nor_size_is_known() -
     found = doubt("wheel.FR.v", values, SignalSource(column="MAIN.fbRad_VR.rDrehzahl_Ist"), machine)
     assert found is not None
     assert "rpm" in found.line
+
+
+@pytest.mark.parametrize(("dead", "asked"), [(True, False), (False, True)])
+def test_a_wheel_that_runs_away_from_a_dead_speed_is_no_wrong_unit(dead: bool, asked: bool) -> None:
+    at = np.arange(400) * 0.01
+    columns = {"v": 0.0 * at if dead else 2.0 * WAVE, "p": 30.0 * KNOWN.max_speed * at, "o": 0.02 * WAVE}
+    given = {
+        "wheel.FR.v": SignalSource(column="v", unit="rad/s"),
+        "wheel.FR.v_position": SignalSource(column="p", unit="rad", derivative=True),
+        "wheel.FL.v_position": SignalSource(column="o", unit="rad", derivative=True),
+    }
+    assert bool(mapped(columns, given).questions) is asked
