@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,12 +18,22 @@ LIMIT = 0.65
 #: The same of what all wheels come to lose for a part of the mission, which slopes and loads that last for a while make more of.
 PART = 1.2
 _OF_IT, _SPLITS, _WHEELS = 0.2, 40, 3  # of the windows, at least; moments that are tried; that must be known at a time
+_SPELL_S, _SHORT = 20.0, 1.25  # in which all lose likewise, and by how many times as much: hills last as long
+#: Where what most wheels are off it hardly scatters [ln], the limit of the whole mission holds for parts, and for shorter spells.
+_FITS, _BRIEF_S = 0.05, 10.0
 _LEAST_WINDOWS = 8
 _UNSEEN = 0.1  # of the expected speed, by which the file does not know it
 _HELD = 8.0  # times as much does the ground hold a wheel as its own valve drives it: its own map is hardly known, that of all wheels is
 
 
-def beside_plant(cells: Cells, opening: Array, responses: Responses) -> tuple[list[float | None], float | None]:
+class ForAPart(NamedTuple):
+    """What most wheels are off their [plant] for a part of the mission [ln], and from where on it counts, as a multiple of the loss that counts."""
+
+    off: float
+    limit: float
+
+
+def beside_plant(cells: Cells, opening: Array, responses: Responses) -> tuple[list[float | None], ForAPart | None]:
     """ln of each wheel's usual speed over what its [plant] gives at the same openings, and what most wheels are off it for a part of the mission.
 
     None where that is not known.
@@ -55,7 +66,9 @@ def beside_plant(cells: Cells, opening: Array, responses: Responses) -> tuple[li
             known = columns[-1][np.isfinite(columns[-1])]
             logs[i] = float(np.median(known)) if known.size >= _LEAST_WINDOWS else None
     together = _together(list(sums.values()), cells)
-    return [together if i in sums else log for i, log in enumerate(logs)], _for_a_part(columns)
+    return [together if i in sums else log for i, log in enumerate(logs)], _for_a_part(
+        columns, cells.frame.hop * cells.dt
+    )
 
 
 def _together(sums: Sequence[tuple[float, float]], cells: Cells) -> float | None:
@@ -74,8 +87,8 @@ def _windows(cells: Cells, moved: Array, expected: Array, wheel: str) -> Array:
     return np.where(full & np.isfinite(log) & ~cells.explained(wheel), log, np.nan)
 
 
-def _for_a_part(columns: Sequence[Array]) -> float | None:
-    """Largest median of what most wheels are off before, or from, any moment on [ln]; None of few wheels or windows."""
+def _for_a_part(columns: Sequence[Array], hop_s: float) -> ForAPart | None:
+    """Largest median of what most wheels are off before, or from, any moment on, or for a spell; None of few wheels or windows, one every `hop_s`."""
     if len(columns) < _WHEELS:
         return None
     every = np.column_stack(columns)
@@ -85,7 +98,17 @@ def _for_a_part(columns: Sequence[Array]) -> float | None:
         return None
     most = np.nanmedian(every, axis=1)
     splits = range(least, len(most) - least + 1, max(1, len(most) // _SPLITS))
-    return max(max(abs(float(np.median(most[:k]))), abs(float(np.median(most[k:])))) for k in splits)
+    sides = max(max(abs(float(np.median(most[:k]))), abs(float(np.median(most[k:])))) for k in splits)
+    if float(np.median(np.abs(most - np.median(most)))) <= _FITS:
+        return ForAPart(max(sides, _spell(most, round(_BRIEF_S / hop_s))), LIMIT)
+    return ForAPart(max(sides, _spell(most, round(_SPELL_S / hop_s)) / _SHORT), PART)
+
+
+def _spell(off: Array, length: int) -> float:
+    """Largest median over so many values on end, 0 of fewer."""
+    if off.size < length:
+        return 0.0
+    return float(np.abs(np.median(np.lib.stride_tricks.sliding_window_view(off, length), axis=1)).max())
 
 
 def _moved(cells: Cells, i: int, opening: Array, plant: WheelPlant, responses: Responses) -> tuple[Array, Array]:

@@ -16,7 +16,7 @@ from diagnosis.clearing.measure import alone, compared, lasts, late, off_command
 from diagnosis.clearing.opening_offsets import opening_offsets
 from diagnosis.clearing.openings import openings_tell
 from diagnosis.clearing.pairs import FALLS, pairs_fall
-from diagnosis.clearing.plant_response import LIMIT, PART, beside_plant
+from diagnosis.clearing.plant_response import LIMIT, beside_plant
 from diagnosis.clearing.responses import OTHERS, USUAL_TOP, largest, others_at, responses_of
 from diagnosis.clearing.same_side import beside_its_side
 from diagnosis.clearing.seconds import off_second
@@ -106,7 +106,8 @@ def wheel_checks(cells: Cells, clear_at: float) -> Iterator[Checked]:
             about_plant = (*about, either, Check.PLANT_RESPONSE)
             share = -float(np.log1p(-clear_at))
             whole = lasts(cells, about_plant, abs(by_file[i] or 0.0), LIMIT * share)
-            yield max(whole, lasts(cells, about_plant, for_a_part, PART * share), key=times)
+            part = whole if for_a_part is None else lasts(cells, about_plant, for_a_part.off, for_a_part.limit * share)
+            yield max(whole, part, key=times)
         # where an opening is no speed, what it gives says nothing of a wheel whose sides are both measured twice
         if _known(used[:, i]) and speed.shape[1] > OTHERS and (tells or not all(twice[i])):
             own = limits[i]
