@@ -9,6 +9,7 @@ import numpy as np
 
 from diagnosis.clearing import axles, still
 from diagnosis.clearing.cells import Array, Cells, Frame
+from diagnosis.clearing.limits import measured_twice
 from diagnosis.clearing.measure import compared
 from diagnosis.clearing.responses import responses_of
 from diagnosis.results.assessment import Finding
@@ -93,12 +94,20 @@ def fault_of_wheel(check: Checked, cells: Cells, *, alone: bool) -> Finding | No
         )
     )
     sizes = Epsilon(float(middle), float(min(low, high)), float(max(low, high)))
-    return finding_of((start, stop), mode, sizes, (text, _UNTOLD), p=_P if below else _P_ABOVE)
+    behind = below and all(measured_twice(cells)[cells.machine.wheels.index(check.component)])
+    side, why = (Side.ACTUATOR, _BEHIND) if behind else (Side.SENSOR_OR_ACTUATOR, _UNTOLD)
+    return finding_of((start, stop), mode, sizes, (text, why), side, p=_P if below else _P_ABOVE)
 
 
 _UNTOLD = (
     "No row of the tables fits well enough to say whether the sensor or the {valve} fails: a second measurement of either "
     "would tell them apart."
+)
+
+
+_BEHIND = (
+    "Its speed and the position of its {valve} both agree with their second measurements: what gives less lies behind the {valve}, such as a motor, "
+    "a gear or a brake that drags."
 )
 
 

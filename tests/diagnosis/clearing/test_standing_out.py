@@ -208,3 +208,12 @@ def test_a_wheel_that_is_off_the_machine_file_alone_is_named(worst: tuple[float,
     found = what_stands_out(checks, cells, HYDRAULIC)
     assert list(found) == (["FR"] if named else [])
     assert all(f.mode is FaultMode.INEFFICIENT and f.side is Side.SENSOR_OR_ACTUATOR for f in found.values())
+
+
+def test_what_stands_out_although_both_measurements_agree_lies_behind_the_valve(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("diagnosis.clearing.untold_faults.measured_twice", lambda cells: [(True, True)] * 4)
+    fault = _found(FaultSpec("RR", Side.ACTUATOR, FaultMode.INEFFICIENT, *WHOLE, 0.6))["RR"]
+    assert (fault.side, fault.mode) == (Side.ACTUATOR, FaultMode.INEFFICIENT)
+    assert "lies behind the valve" in fault.evidence[-1]
