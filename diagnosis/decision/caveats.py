@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 from diagnosis.decision.explained import explaining
 from diagnosis.decision.open_checks import open_words
-from diagnosis.decision.severity import halved_words, unanswered
+from diagnosis.decision.severity import halved_words, often_dead, unanswered
 from diagnosis.decision.short import main_reason, main_state, short_parts, unjudged_axles
 from diagnosis.decision.wording import MORE, count_words, join_words
 from diagnosis.results.assessed import Cut
@@ -180,13 +180,23 @@ def _most(fault: FaultInterval) -> float:
 
 
 def doubts_of(faults: Sequence[FaultInterval], words: MachineWords) -> list[tuple[FaultInterval, str]]:
-    """Faults to watch that alone keep a machine from being cleared, each with why: one reason for each fault, in their order."""
-    return [
+    """Faults to watch that alone keep a machine from being cleared, each with why: one reason for each fault, in their order.
+
+    Of a part that gives nothing usable again and again, each time briefly, the first one stands for all.
+    """
+    out = [
         (f, f"the {words.part_words(f.kind, f.component, f.side)} {why}")
         for f in faults
         if f.severity in (Severity.MEDIUM, Severity.LOW)
         and (why := "may not answer" if unanswered(f) else halved_words(f.side, f.mode, f.epsilon))
     ]
+    told = {(f.component, f.side) for f, _ in out}
+    for same in often_dead(faults):
+        first, lasts = same[0], sum(f.stop_s - f.start_s for f in same)
+        if (first.component, first.side) not in told:
+            part = words.part_words(first.kind, first.component, first.side)
+            out.append((first, f"the {part} gave nothing usable {len(same)} times, {lasts:.1f} s in all"))
+    return out
 
 
 def caveats_of(

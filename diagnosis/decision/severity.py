@@ -38,6 +38,9 @@ _ALONE = "This alone is no reason to stop; check it before it grows."
 HELD = (
     "Alone it would keep no machine in, but this mission does not clear it: check it before the machine goes out again."
 )
+#: The same of one that is dead briefly again and again, and how often, and for how long in all, that is: a contact is loose.
+AGAIN = "Each time it is tolerable (the paper’s Assumption 1), so often it is not: check plug and cable before the machine goes out again."
+_OFTEN, _OFTEN_S = 5, 3.0
 _PARTIAL = (FaultMode.INEFFICIENT, FaultMode.OUTSIDE_TABLE)  # rows of which ε̂ says how much is left
 
 
@@ -125,7 +128,22 @@ def advised(intervals: Sequence[FaultInterval], status: Verdict, *, cleared: boo
     """Faults with the advice that fits their mission's verdict: what alone is no reason to stop is looked at where the mission gives no leave."""
     if status is not Verdict.WATCH or cleared:
         return tuple(intervals)
-    return tuple(replace(f, advice=HELD) if f.advice == _ALONE else f for f in intervals)
+    again = [f for same in often_dead(intervals) for f in same]
+    return tuple(
+        replace(f, advice=HELD) if f.advice == _ALONE else replace(f, advice=AGAIN) if any(f is g for g in again) else f
+        for f in intervals
+    )
+
+
+def often_dead(faults: Sequence[FaultInterval]) -> list[list[FaultInterval]]:
+    """Faults of parts that give nothing usable again and again, each time briefly enough to be tolerated, by part."""
+    brief: dict[tuple[str, str], list[FaultInterval]] = {}
+    for f in faults:
+        if f.severity is Severity.LOW and f.mode.total:
+            brief.setdefault((f.component, f.side.value), []).append(f)
+    return [
+        same for same in brief.values() if len(same) >= _OFTEN and sum(f.stop_s - f.start_s for f in same) >= _OFTEN_S
+    ]
 
 
 def halved_words(side: Side, mode: FaultMode, epsilon: Epsilon | None) -> str:

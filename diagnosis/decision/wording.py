@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from diagnosis.decision.severity import HELD, halved_words, unanswered
+from diagnosis.decision.severity import AGAIN, HELD, halved_words, unanswered
 from diagnosis.results.candidates import UNCLEAR, candidates, unclear_words
 from diagnosis.results.document import ActionRow
 from diagnosis.results.durations import seconds_words
@@ -69,7 +69,7 @@ def _order(faults: Sequence[FaultInterval]) -> str:
         return "Stop at once and repair" if worst.side is Side.ACTUATOR else "Stop and repair"
     if (
         unanswered(worst)
-        or any(f.advice == HELD for f in faults)
+        or any(f.advice in (AGAIN, HELD) for f in faults)
         or any(halved_words(f.side, f.mode, f.epsilon) for f in faults)
     ):
         return "Before the machine goes out, check"

@@ -6,13 +6,15 @@ from dataclasses import replace
 
 import pytest
 
-from diagnosis.decision.severity import severity_of
+from diagnosis.decision.caveats import doubts_of
+from diagnosis.decision.intervals import intervals_of
+from diagnosis.decision.severity import AGAIN, advised, severity_of
 from diagnosis.results.machine_words import HYDRAULIC
 from diagnosis.results.result import Epsilon, Hypothesis
-from diagnosis.results.vocabulary import Severity
+from diagnosis.results.vocabulary import Severity, Verdict
 from replay.faults import FaultMode, Side
 from replay.machine.config import Limits
-from tests.diagnosis.decision.findings import LIMITS, finding
+from tests.diagnosis.decision.findings import LIMITS, MACHINE, STEP, assessed, finding
 
 TOTAL = pytest.mark.parametrize("mode", [FaultMode.STUCK, FaultMode.NO_SIGNAL])
 
@@ -183,3 +185,17 @@ def test_a_moment_of_a_kind_that_is_not_clear_is_a_remark(seconds: float, expect
     unclear = replace(finding(Side.ACTUATOR, FaultMode.OUTSIDE_TABLE, epsilon=-0.5), probability=0.48, hypotheses=rows)
     assert severity_of(unclear, seconds, LIMITS, HYDRAULIC)[0] == expected
     assert severity_of(finding(Side.ACTUATOR, FaultMode.STUCK), seconds, LIMITS, HYDRAULIC)[0] == "high"
+
+
+@pytest.mark.parametrize(("times", "length", "often"), [(6, 600, True), (4, 900, False), (6, 100, False)])
+def test_a_sensor_that_is_dead_briefly_again_and_again_is_looked_at_before_the_machine_goes_out(
+    times: int, length: int, *, often: bool
+) -> None:
+    """Each is tolerable; with 74 drop-outs, 8 s in all, a machine might go out."""
+    dead = [finding(Side.SENSOR, FaultMode.NO_SIGNAL, 1000 * k, 1000 * k + length) for k in range(1, times + 1)]
+    faults = intervals_of({("FR", "sensor"): assessed(*dead)}, MACHINE, HYDRAULIC, 0, STEP)
+    assert {f.severity for f in faults} == {Severity.LOW}
+    doubts = [doubt for _, doubt in doubts_of(faults, HYDRAULIC)]
+    assert doubts == (["the FR speed sensor gave nothing usable 6 times, 3.6 s in all"] if often else [])
+    told = advised(faults, Verdict.WATCH, cleared=not often)
+    assert all((f.advice == AGAIN) is often for f in told)
