@@ -100,7 +100,11 @@ def _for_a_part(columns: Sequence[Array], hop_s: float) -> ForAPart | None:
     splits = range(least, len(most) - least + 1, max(1, len(most) // _SPLITS))
     sides = max(max(abs(float(np.median(most[:k]))), abs(float(np.median(most[k:])))) for k in splits)
     if float(np.median(np.abs(most - np.median(most)))) <= _FITS:
-        return ForAPart(max(sides, _spell(most, round(_BRIEF_S / hop_s))), LIMIT)
+        two = np.sort(np.where(np.isfinite(every), every, np.inf), axis=1)[
+            :, 1
+        ]  # what two wheels lose at least, of an axle or a side
+        brief = round(_BRIEF_S / hop_s)
+        return ForAPart(max(sides, _spell(most, brief), _spell(np.minimum(two, 0.0), brief)), LIMIT)
     return ForAPart(max(sides, _spell(most, round(_SPELL_S / hop_s)) / _SHORT), PART)
 
 

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from diagnosis.clearing.checks import cells_of, checks_of
+from diagnosis.clearing.plant_response import LIMIT, PART, _for_a_part
 from diagnosis.results.clearing import Check, Checked
 from diagnosis.results.machine_words import HYDRAULIC
 from replay.arrays.envelope import bucket_of
@@ -68,6 +70,20 @@ def test_what_all_wheels_come_to_lose_shows_for_its_part(own_gain: float) -> Non
     assert [c.passed for c in found] == [False] * 4
     one = by_file(own_gain, lost[0])
     assert sum(c.passed for c in one) >= 3  # what one wheel does is its own
+
+
+def test_two_wheels_that_lose_for_ten_seconds_show_where_the_file_fits() -> None:
+    every = np.random.default_rng(1).normal(0.0, 0.02, (140, 4))
+    every[40:64, 2:] += np.log(0.7)
+    found = _for_a_part(list(every.T), 0.5)
+    assert found is not None
+    assert found.limit == LIMIT
+    assert found.off == pytest.approx(-np.log(0.7), abs=0.05)
+    every[:, 2:] += np.random.default_rng(2).normal(0.0, 0.3, (140, 1))
+    rough = _for_a_part(list(every.T), 0.5)
+    assert rough is not None
+    assert rough.limit == PART
+    assert _for_a_part(list(every.T[:2]), 0.5) is _for_a_part([every[:9, 0]] * 4, 0.5) is None
 
 
 def test_without_a_file_nothing_is_asked() -> None:
