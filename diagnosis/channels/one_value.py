@@ -13,6 +13,7 @@ TURNS = 0.02  #: Of the largest speed: a wheel that turns.
 _LEAST_S, _READINGS = 0.5, 20  # of one value, and readings at the channel's usual rate
 _LONGER = 2.5  # times the longest other run of one value, that is not this value
 _FREEZES, _PARTED = 12, 4.0  # other runs that may be a frozen sensor's, too; times the next one
+_AGAIN = 2  # values at which it stays more than once
 _FEW, _SECOND = 5, 6.0 * 0.455  # readings; median of the square of a second difference of unit noise
 _OF_MOST = 0.97  # of its own largest: an end of its range
 
@@ -51,7 +52,8 @@ def frozen_of(y: Array, span: float, dt: float) -> list[Frozen]:
         beside = max(_largest(y[: starts[k]]), _largest(y[stops[k] :]))
         if np.abs(value[k]) >= _OF_MOST * beside >= 0.0:
             continue  # the end of its range
-        longest = _habit(length[turns & (value != value[k])], float(length[k]), usual)
+        other = turns & (value != value[k])
+        longest = _habit(length[other], float(length[k]), usual, steps=_in_steps(value[other], length[other]))
         if longest is not None:
             out.append(Frozen(int(starts[k]), int(stops[k]), float(value[k]), longest))
     return out
@@ -76,14 +78,22 @@ def trembling(y: Array, least: float) -> tuple[float, float] | None:
     return float(np.mean(np.diff(y)[turning] != 0.0)), float(np.sqrt(np.median(np.diff(y, 2) ** 2) / _SECOND))
 
 
-def _habit(others: Array, length: float, usual: float) -> float | None:
+def _in_steps(value: Array, length: Array) -> bool:
+    """Whether a channel comes back to values at which it stays [m/s], for so long [s]: it reads in steps, and none of these runs is a freeze."""
+    _, count = np.unique(value[length >= _LEAST_S], return_counts=True)
+    return int(np.count_nonzero(count > 1)) >= _AGAIN
+
+
+def _habit(others: Array, length: float, usual: float, *, steps: bool = False) -> float | None:
     """Longest run of other values that is none of a frozen sensor; None where a run of this length [all s] is no longer than the habit.
 
-    A sensor that freezes again and again has a few such runs, and far shorter ones after them.
+    A sensor that freezes again and again has a few such runs, and far shorter ones after them; one that reads in `steps` has such runs by habit.
     """
-    ranked = np.r_[np.sort(others)[::-1][: _FREEZES + 1], usual]
+    ranked = np.r_[np.sort(others)[::-1][: 1 if steps else _FREEZES + 1], usual]
     found = None
     for k, longest in enumerate(ranked):
+        if steps and k:
+            break
         parted = k == 0 or ranked[k - 1] >= max(_LEAST_S, _PARTED * longest)
         if parted and length >= (_LONGER if k == 0 else _PARTED) * max(longest, usual):
             found = float(max(longest, usual))

@@ -225,3 +225,16 @@ def test_a_sensor_that_freezes_again_and_again_makes_no_habit_of_it() -> None:
     runs = frozen_of(y[:, 0], SPAN, DT)
     assert [r.start for r in runs] == [pytest.approx(500 + 1_000 * k, abs=2) for k in range(5)]
     assert max(r.usual_s for r in runs) < 0.3
+
+
+@pytest.mark.parametrize(("again", "frozen"), [(True, False), (False, True)])
+def test_a_sensor_that_comes_back_to_the_values_at_which_it_stays_reads_in_steps(*, again: bool, frozen: bool) -> None:
+    """Teeth that are counted make holds of the same few values; one that freezes again and again holds another value each time."""
+    rng = np.random.default_rng(7)
+    holds = [0.1, 0.2, 0.1, 0.3, 0.2] if again else [0.11, 0.23, 0.14, 0.32, 0.21]
+    y = np.concatenate(
+        [piece for v in holds for piece in (np.full(round(1.5 / DT), v), rng.normal(v, 0.01, round(1.0 / DT)))]
+    )
+    y = np.concatenate([y, np.full(round(1.6 / DT), 0.25), rng.normal(0.25, 0.01, round(1.0 / DT)), np.full(9, 0.35)])
+    last = [r for r in frozen_of(y, SPAN, DT) if r.value == 0.25]
+    assert bool(last) is frozen
