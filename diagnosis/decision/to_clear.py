@@ -158,6 +158,10 @@ def to_clear(
     out += [point for _, point in sorted(deviating, key=lambda d: ranks[d[0]])]
     out += short_parts(brief, assessments, decided_s, driven, limits, words, Kind.STEER, open_state=against.open_state)
     out += [] if first else dark
+    open_for_steering = {
+        c.component for c in left if _asks_for_steering(c, twice)
+    }  # which has the parts judged as well
+    at_rest -= {k for k in at_rest if k[0] in open_for_steering}
     rested = [k for k in steered if k in at_rest and k not in unjudged and _brief(k, decided_s, driven, limits)]
     return tuple(  # these keep no machine in, and come last: what has them judged is said all the same
         out

@@ -92,7 +92,10 @@ def gyro_or_slip(text: str) -> MachineEvent:
     if not slips or GYRO_REST in text:
         return other_yaw_rate(text)
     if GYRO_SLIP not in text:
-        text += " Slip of the {wheels}, as on a slope, or where steering or another {wheel} turns the machine otherwise, looks the same."
+        text = (
+            f"{text.removesuffix('.')}; slip of the {{wheels}}, as on a slope, or where steering or another {{wheel}} turns the machine otherwise, "
+            "looks the same."
+        )
     doubt = "gyro and {wheels} contradict each other"
     act = (
         "look whether the {wheels} slipped there (slope, kerb, wet or loose ground); if not, compare the gyro with turns of the machine that you "
