@@ -61,7 +61,8 @@ def beside_plant(cells: Cells, opening: Array, responses: Responses) -> tuple[li
         moved, expected = _moved(cells, i, opening[:, i], plant, responses)
         columns.append(_windows(cells, moved, expected, wheel))
         if (plant.grip or 0.0) > _HELD:
-            sums[i] = float(moved.sum()), float(expected.sum())
+            sound = ~cells.told(wheel)
+            sums[i] = float(moved[sound].sum()), float(expected[sound].sum())
         else:
             known = columns[-1][np.isfinite(columns[-1])]
             logs[i] = float(np.median(known)) if known.size >= _LEAST_WINDOWS else None

@@ -65,8 +65,10 @@ def what_stands_out(checks: Sequence[Checked], cells: Cells, words: MachineWords
     found |= {component: fault for component, fault in axles.items() if fault is not None}
     alone = _alone(checks, cells) or _off_its_plant(checks, cells)
     wheel = alone or (None if _stated(cells) else _alone_not_following(checks, cells))
-    if wheel is not None and (told := fault_of_wheel(wheel, cells, alone=alone is not None)) is not None:
-        found[wheel.component] = told
+    if wheel is not None:
+        agree = _agree(checks, wheel.component)
+        told = fault_of_wheel(wheel, cells, alone=alone is not None, agree=agree)
+        found |= {} if told is None else {wheel.component: told}
     return {
         component: replace(f, evidence=tuple(mapped(text, words.fill) for text in f.evidence))
         for component, f in found.items()
@@ -158,6 +160,12 @@ def _off_its_plant(checks: Sequence[Checked], cells: Cells) -> Checked | None:
         return None
     first, second, *_ = own
     return first if _times(first) >= _BY_FILE and _times(second) <= _AS_FILED else None
+
+
+def _agree(checks: Sequence[Checked], wheel: str) -> bool:
+    """Whether the speed and the opening of a wheel are both measured twice, and pass that check."""
+    own = {c.side: c.passed for c in checks if (c.component, c.check) == (wheel, Check.SECOND_MEASUREMENT)}
+    return own.get(Side.SENSOR, False) and own.get(Side.ACTUATOR, False)
 
 
 def _known(check: Checked) -> bool:

@@ -9,7 +9,6 @@ import numpy as np
 
 from diagnosis.clearing import axles, still
 from diagnosis.clearing.cells import Array, Cells, Frame
-from diagnosis.clearing.limits import measured_twice
 from diagnosis.clearing.measure import compared
 from diagnosis.clearing.responses import responses_of
 from diagnosis.results.assessment import Finding
@@ -57,7 +56,7 @@ class _Shown:
     size: Array
 
 
-def fault_of_wheel(check: Checked, cells: Cells, *, alone: bool) -> Finding | None:
+def fault_of_wheel(check: Checked, cells: Cells, *, alone: bool, agree: bool = False) -> Finding | None:
     """The fault of a wheel whose speed per opening is not that of the others; None where no window of driving shows it.
 
     Parameters
@@ -68,6 +67,8 @@ def fault_of_wheel(check: Checked, cells: Cells, *, alone: bool) -> Finding | No
         The mission.
     alone : bool
         Whether it is the only one that deviates so far; else it is the only one that does not follow its command.
+    agree : bool
+        Whether its speed and its valve agree with second measurements of both.
     """
     speed, command, opening = (cells.wheels(leaf) for leaf in ("v", "u", "u_applied"))
     used = np.where(np.isfinite(opening), opening, command)
@@ -94,8 +95,7 @@ def fault_of_wheel(check: Checked, cells: Cells, *, alone: bool) -> Finding | No
         )
     )
     sizes = Epsilon(float(middle), float(min(low, high)), float(max(low, high)))
-    behind = below and all(measured_twice(cells)[cells.machine.wheels.index(check.component)])
-    side, why = (Side.ACTUATOR, _BEHIND) if behind else (Side.SENSOR_OR_ACTUATOR, _UNTOLD)
+    side, why = (Side.ACTUATOR, _BEHIND) if below and agree else (Side.SENSOR_OR_ACTUATOR, _UNTOLD)
     return finding_of((start, stop), mode, sizes, (text, why), side, p=_P if below else _P_ABOVE)
 
 

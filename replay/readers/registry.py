@@ -17,7 +17,7 @@ from replay.readers.common.border import Bordered
 from replay.readers.common.mistaken import lfs_pointer, mistaken
 from replay.readers.common.protocol import Reader
 
-_BLOCK, _FEW = 1 << 20, 16  # bytes that are looked at together, and fewer than which tell nothing
+_BLOCK, _FEW = 1 << 24, 16  # bytes that are looked at, at most, and fewer than which tell nothing
 
 
 @cache
@@ -80,16 +80,17 @@ def _zeros(path: Path) -> str:
     """What is wrong with a file that begins with zeros, as none that was written does; empty for any other."""
     if not path.is_file():
         return ""
-    found, size = 0, path.stat().st_size
+    size = path.stat().st_size
     with path.open("rb") as file:
-        while block := file.read(_BLOCK):
-            lead = len(block) - len(block.lstrip(b"\0"))
-            found += lead
-            if lead < len(block):
-                break
-    if found < _FEW:
-        return ""
-    much = "holds nothing but zeros" if found >= size else f"begins with {found} zeros in place of a log's header"
+        head = file.read(_FEW)
+        if head.strip(b"\0") or len(head) < _FEW:
+            return ""
+        block = head + file.read(_BLOCK)
+    found = len(block) - len(block.lstrip(b"\0"))
+    least = "at least " if found == len(block) else ""
+    much = (
+        "holds nothing but zeros" if found >= size else f"begins with {least}{found} zeros in place of a log's header"
+    )
     return f"{path} {much} ({size} bytes): it was never written out, or overwritten, so copy it from the recorder once more, or leave it out"
 
 

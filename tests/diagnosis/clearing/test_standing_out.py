@@ -210,10 +210,23 @@ def test_a_wheel_that_is_off_the_machine_file_alone_is_named(worst: tuple[float,
     assert all(f.mode is FaultMode.INEFFICIENT and f.side is Side.SENSOR_OR_ACTUATOR for f in found.values())
 
 
+@pytest.mark.parametrize(
+    ("off", "side"),
+    [
+        ((0.05, 0.05), Side.ACTUATOR),
+        ((0.3, 0.05), Side.SENSOR_OR_ACTUATOR),
+        ((0.05, None), Side.SENSOR_OR_ACTUATOR),
+        ((), Side.SENSOR_OR_ACTUATOR),
+    ],
+)
 def test_what_stands_out_although_both_measurements_agree_lies_behind_the_valve(
-    monkeypatch: pytest.MonkeyPatch,
+    off: tuple[float | None, ...], side: Side
 ) -> None:
-    monkeypatch.setattr("diagnosis.clearing.untold_faults.measured_twice", lambda cells: [(True, True)] * 4)
-    fault = _found(FaultSpec("RR", Side.ACTUATOR, FaultMode.INEFFICIENT, *WHOLE, 0.6))["RR"]
-    assert (fault.side, fault.mode) == (Side.ACTUATOR, FaultMode.INEFFICIENT)
-    assert "lies behind the valve" in fault.evidence[-1]
+    cells = in_cells(simulated(FaultSpec("RR", Side.ACTUATOR, FaultMode.INEFFICIENT, *WHOLE, 0.6), seed=5), base=True)
+    second = [
+        Checked(Kind.WHEEL, "RR", of, Check.SECOND_MEASUREMENT, x, 0.25)
+        for of, x in zip((Side.SENSOR, Side.ACTUATOR), off, strict=False)
+    ]
+    fault = what_stands_out((*checks_of(cells, HYDRAULIC), *second), cells, HYDRAULIC)["RR"]
+    assert (fault.side, fault.mode) == (side, FaultMode.INEFFICIENT)
+    assert ("lies behind the valve" in fault.evidence[-1]) is (side is Side.ACTUATOR)
