@@ -2,20 +2,21 @@
 
 Coils warm, supplies fall, and a position sensor has a zero and a gain of its own: each keeps a healthy valve some hundredths off its
 command for long, which evidence that grows with time takes for a certain loss or noise. How far off valves usually are, and are
-at the same time, is taken from the others; a finding that is no further off is left open.
+at the same time, is taken from the others; a finding that is no further off is left open, or healthy where it is hardly off at all.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from diagnosis.channels.sample_status import PAIR
 from diagnosis.direct.identification import IdentifiedPair
 from diagnosis.direct.low_speed import left_open
-from diagnosis.results.assessment import Assessment, Finding
-from replay.faults import FaultMode
+from diagnosis.results.assessment import CODE, Assessment, Finding
+from replay.faults import FaultMode, State
 
 _SMALL = 0.1  # of the span, root mean square: a larger deviation is none of a healthy valve, whatever is usual
 _SMALL_OTHERS = 0.15  # the same while others are off as well
@@ -24,6 +25,7 @@ _WINDOW_S, _KNOWN, _WINDOWS = 2.0, 0.25, 4  # s; of it, in which readings come; 
 _USUAL, _BEYOND = 0.9, 1.8  # quantile of the windows, and times it
 _BEYOND_OTHERS = 1.6  # times what the others are off meanwhile
 _EITHER = 0.3  # probability of a share beside a constant
+_HARDLY, _LOST = 0.08, 0.25  # of the command, root mean square; of ε: less than a loss that counts by default
 _VALVES = 3  # fewer show no habit
 
 
@@ -46,15 +48,32 @@ def without_small_deviations(
     for w, a in assessments.items():
         others = [other for other in found if other != w]
         most = max(usual[other] for other in others)
-        out[w] = left_open(
-            a,
-            [
-                f
-                for f in a.findings
-                if _may_be_small(f) and _small(f, found[w], most, _meanwhile(f, [found[x] for x in others]))
-            ],
-        )
+        small = [
+            f
+            for f in a.findings
+            if _may_be_small(f) and _small(f, found[w], most, _meanwhile(f, [found[x] for x in others]))
+        ]
+        built = [f for f in small if _hardly_off(f, found[w])]
+        out[w] = left_open(as_built(a, built), [f for f in small if not any(f is b for b in built)])
     return out
+
+
+def as_built(a: Assessment, findings: Sequence[Finding]) -> Assessment:
+    """An assessment that calls healthy what some findings said."""
+    if not findings:
+        return a
+    states = a.states.copy()
+    for f in findings:
+        inside = states[f.start : f.stop]
+        inside[inside == CODE[State(f.mode.value)]] = CODE[State.HEALTHY]
+    return replace(a, states=states, findings=tuple(f for f in a.findings if not any(f is b for b in findings)))
+
+
+def _hardly_off(finding: Finding, one: IdentifiedPair) -> bool:
+    """Whether a position that is off as others are is so by less than a tenth of its command, and has surely not lost a quarter of it."""
+    off, asked = _off(finding, one)
+    lost = finding.epsilon is not None and finding.epsilon.high >= _LOST
+    return off is not None and not finding.mode.total and off < _HARDLY * asked and not lost
 
 
 def _may_be_small(finding: Finding) -> bool:

@@ -25,6 +25,7 @@ from diagnosis.wheels.frames.features import mission_features
 from diagnosis.wheels.frozen import with_frozen
 from diagnosis.wheels.inputs import WheelsData
 from diagnosis.wheels.looks import second_look
+from diagnosis.wheels.machine_held import or_machine_held
 from diagnosis.wheels.many_weak import without_many_weak
 from diagnosis.wheels.models import ODD, JointModel, WheelFilterModel
 from diagnosis.wheels.own_swings import with_open_side
@@ -83,6 +84,7 @@ def assess_wheels(data: WheelsData, limits: Limits, *, gains: bool) -> WheelsJud
     doubted = without_many_weak(with_frozen(data, swings.found))
     measured = {i: bool(data.measured[i]) for i in paths}
     told = or_standing(doubted.found, {i: path.y for i, path in paths.items()}, measured, data.dt)
+    told = or_machine_held(data, told)
     out = {}
     for i, path in paths.items():
         claimed = as_claimed(told[i], limits.clear_at, measured=measured[i], swings=bool(swings.spans))

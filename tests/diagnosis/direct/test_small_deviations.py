@@ -77,3 +77,10 @@ def test_a_constant_that_may_be_a_share_is_left_open_likewise() -> None:
     """Nothing moves, so that a stuck valve and one that opens a little less are alike."""
     either = (Hypothesis("actuator", "stuck", 0.5), Hypothesis("actuator", "inefficient", 0.5))
     assert told((0.9, 1.0, 0.93, 0.96), FaultMode.STUCK, hypotheses=either).findings == ()
+
+
+@pytest.mark.parametrize(("gain", "state"), [(0.94, State.HEALTHY), (0.9, State.NOT_ASSESSED)])
+def test_what_is_hardly_off_its_command_is_healthy(gain: float, state: State) -> None:
+    after = told((gain, 1.0, 0.93, 0.96))
+    assert after.findings == ()
+    assert (after.states[slice(*SPAN)] == CODE[state]).all()

@@ -1,0 +1,74 @@
+"""Wheels that stand while the other wheels fall far behind their commands as well: what holds the machine may hold them.
+
+A machine that pushes into a heap, or whose engine stalls, stops its wheels one after the other, and some of them spin before they do. By command and
+speed alone that is a dead valve of every wheel that stood first. One that is dead leaves the other wheels driving, as far as they can.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from diagnosis.results.assessment import Finding
+from diagnosis.results.limited import limited
+from diagnosis.wheels.findings import WheelFindings
+from diagnosis.wheels.inputs import WheelsData
+from replay.faults import State
+
+_BEHIND = 0.5  # of its command: a wheel that makes less is held, or starts
+_PART = 0.25  # of a finding's time in which most of the other wheels are
+_DRIVES = 0.1  # of the span: a command to drive
+_RESTS = 0.1  # of the span: the finding's own wheel hardly moves, half of the time
+_OTHERS = 2  # wheels beside this one
+_MOST = 0.55  # of any fault; set by hand: less than one that is worth a check by itself
+_HELD = (
+    "The other {wheel}s fell far behind their commands at the same time: what holds the machine, such as a heap before it or an engine that stalls, "
+    "may hold this {wheel} as well. The {position}, or a second speed, would tell."
+)
+
+
+def or_machine_held(data: WheelsData, found: Mapping[int, WheelFindings]) -> dict[int, WheelFindings]:
+    """Findings of wheels that stand, less sure where most other wheels make little of their commands for a good part of their time.
+
+    Only of wheels whose valve's position is not measured.
+
+    Parameters
+    ----------
+    data : WheelsData
+        Channels.
+    found : Mapping[int, WheelFindings]
+        By wheel.
+    """
+    return {
+        i: wheel
+        if data.measured[i] or data.y.shape[1] <= _OTHERS
+        else replace(wheel, findings=[_less_sure(data, i, f) for f in wheel.findings])
+        for i, wheel in found.items()
+    }
+
+
+def _less_sure(data: WheelsData, i: int, f: Finding) -> Finding:
+    if not f.mode.total or not _held(data, i, f):
+        return f
+    faulty = sum(h.p for h in f.hypotheses if h.mode != State.HEALTHY.value)
+    return limited(f, f.probability * _MOST / faulty, _HELD) if faulty > _MOST else f
+
+
+def _held(data: WheelsData, i: int, f: Finding) -> bool:
+    """Whether wheel `i` stands through most of a finding while most other wheels make little of what they are told for part of it."""
+    speed, asked = np.abs(data.y[f.start : f.stop]), np.abs(data.reference[f.start : f.stop])
+    own = speed[:, i][np.isfinite(speed[:, i])]
+    if not own.size or float(np.median(own)) > _RESTS * data.span:
+        return False
+    others = np.arange(speed.shape[1]) != i
+    with np.errstate(invalid="ignore"):
+        told = (asked > _DRIVES * data.span) & np.isfinite(speed)
+        behind = told & (speed < _BEHIND * asked)
+    count = told[:, others].sum(axis=1)
+    known = count >= _OTHERS
+    if not known.any():
+        return False
+    most = behind[:, others].sum(axis=1)[known] > 0.5 * count[known]
+    return bool(np.mean(most) >= _PART)
