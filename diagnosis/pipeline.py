@@ -27,6 +27,7 @@ from diagnosis.clearing.contradicted import without_contradicted
 from diagnosis.clearing.nothing_moves import supply_gone
 from diagnosis.clearing.standing_out import what_stands_out, with_findings, without_explained, without_followers
 from diagnosis.decision import quality
+from diagnosis.decision.as_a_whole import as_a_whole
 from diagnosis.decision.changing_rows import with_chains_as_one
 from diagnosis.decision.episodes import with_episodes
 from diagnosis.decision.second_onsets import with_second_onsets
@@ -271,12 +272,15 @@ def _with_what_stands_out(judged: Judged) -> Judged:
 
 
 def _with_stalls(judged: Judged) -> Judged:
-    """The same with what stopped the whole machine, whose drives were open."""
-    event = supply_gone(judged.cells)
-    if event is None:
+    """The same with what stopped the whole machine, whose drives were open, or what it does as a whole that no part explains."""
+    stopped = supply_gone(judged.cells)
+    events = [] if stopped is None else [stopped]
+    if not judged.found.events and not judged.hints and not judged.places:
+        events += as_a_whole(judged.cells)
+    if not events:
         return judged
     found = judged.found
-    return replace(judged, found=replace(found, events=(*found.events, event.worded(found.words))))
+    return replace(judged, found=replace(found, events=(*found.events, *(e.worded(found.words) for e in events))))
 
 
 def _require_something(assessments: Mapping[tuple[str, str], Assessment], mission: Mission, machine: Machine) -> None:

@@ -28,7 +28,7 @@ from diagnosis.results.clearing import Checked, clearing_rows
 from diagnosis.results.detectability import Detectability, detectability_table
 from diagnosis.results.document import SCHEMA, CoverageRow, MachineRow, ReportDocument
 from diagnosis.results.loss import loss_rows
-from diagnosis.results.machine_event import MachineEvent
+from diagnosis.results.machine_event import GYRO_OTHERWISE, MachineEvent
 from diagnosis.results.result import FaultInterval, to_json
 from diagnosis.results.vocabulary import Kind, Tier
 from replay.control.loop import Replay
@@ -185,10 +185,13 @@ def _told_scale(judged: Judged) -> list[str]:
     return [scale.sentence] if scale is not None and scale.sentence and not told else []
 
 
-def _turned_otherwise(judged: Judged) -> tuple[MachineEvent, ...]:
-    """What contradicts the turns by a factor throughout, as what happened to the whole machine."""
-    event = None if judged.scale is None else judged.scale.event
-    return () if event is None else (event.worded(judged.found.words),)
+def _events(judged: Judged) -> tuple[MachineEvent, ...]:
+    """What happened to the whole machine; what contradicts the turns by a factor throughout is said once, with what it may be."""
+    scale, events = judged.scale, judged.found.events
+    if scale is None or not (scale.gross or scale.event is not None):
+        return events
+    events = tuple(e for e in events if e.title != GYRO_OTHERWISE)
+    return events if scale.event is None else (*events, scale.event.worded(judged.found.words))
 
 
 def _decision(
@@ -209,7 +212,7 @@ def _decision(
         model=judged.found.wheel_model,
         checks=judged.checks,
         scope=_scope(judged),
-        events=(*judged.found.events, *_turned_otherwise(judged)),
+        events=_events(judged),
         hints=(*(h.text for h in judged.hints), *([s.gross] if (s := judged.scale) is not None and s.gross else [])),
         misplaced=judged.places,
         open_state=open_state,

@@ -27,6 +27,7 @@ _OFF_BY_WHEELS = (
     0.12  # rad, of windows: on straight ways wheels that slip differ for a moment, up to 0.09 on tuning machines
 )
 _STRAIGHT, _SHORTEST = 0.08, 0.1  # rad, m
+_TURNS = 0.1  # difference of the ends' tangents, from which on offsets of the angles are a small part of it
 _LEAST_S = 6.0  # of driving straight, or of driving
 _OF_TURN = 0.15  # of a turn, by which its path may be off that by the angles
 ANSWERED = 0.7  # of an angle by which one axle alone is off: tyres give way sideways
@@ -50,7 +51,7 @@ def yaw_checks(cells: Cells) -> Iterator[Checked]:
     turns = None if off.by_wheels else off.in_turns(cells)
     lasting = lasting if turns is None else max(lasting, abs(float(np.nanmedian(turns))))
     told = bool(np.isfinite(windows).any()) and not (off.by_wheels and straight is None)  # in turns wheels slip
-    for end in _ends(cells.machine).values():
+    for end in ends_of(cells.machine).values():
         for axle in (name for name in end if name != _FIXED):  # one wheel's angle is a share of the mean of its end
             about = (Kind.STEER, axle, Side.SENSOR_OR_ACTUATOR)
             found = [worst(cells, (*about, Check.YAW), len(end) * windows, off.most)] if told else []
@@ -64,7 +65,7 @@ def off_straight(cells: Cells) -> Array | None:
     return None if off is None or off.by_wheels else off.straight_ways(cells)
 
 
-def _ends(machine: Machine) -> dict[float, list[str]]:
+def ends_of(machine: Machine) -> dict[float, list[str]]:
     """Axles by their place [m]: wheels that are steered one by one are one where they stand side by side."""
     ends: dict[float, list[str]] = {}
     wheels = machine.geometry.wheels.values() if machine.geometry is not None else ()
@@ -81,7 +82,7 @@ def yaw_by_wheels(cells: Cells) -> Array:
     """
     geometry, speeds = cells.machine.geometry, dict(zip(cells.machine.wheels, cells.wheels("v").T, strict=True))
     rates = []
-    for end in _ends(cells.machine).values():
+    for end in ends_of(cells.machine).values():
         placed = [(geometry.wheels[w].y, v) for w, v in speeds.items() if geometry and geometry.wheels[w].axle in end]
         left, right = ([(y, v) for y, v in placed if side * y > _SHORTEST] for side in (1.0, -1.0))
         if left and right:
@@ -91,6 +92,35 @@ def yaw_by_wheels(cells: Cells) -> Array:
         return np.full(cells.size, np.nan)
     both = np.column_stack(rates)
     return np.asarray(np.take_along_axis(both, np.abs(both).argmin(axis=1)[:, np.newaxis], axis=1)[:, 0])
+
+
+def turn_by_angles(cells: Cells) -> tuple[Array, Array] | None:
+    """Measured yaw rate without its bias, and that by angles and speed, while the machine turns [rad/s], each of shape (cells,), NaN elsewhere.
+
+    Without axles of which a fault is stated. None where no yaw rate is logged, or an axle's angle is missing.
+    """
+    path = _path(cells)
+    if path is None or path.by_wheels:
+        return None
+    told = np.column_stack([cells.told(axle) for axle in cells.machine.axles]).any(axis=1)
+    with np.errstate(invalid="ignore"):
+        use = path.moving & ~told & np.isfinite(path.yaw) & (np.abs(path.turn) > _TURNS)
+    expected = np.where(use, path.speed * path.turn / path.length, np.nan)
+    return np.where(use, path.yaw, np.nan), expected
+
+
+class _Path(NamedTuple):
+    """How the machine turns and where its angles point, each of shape (cells,), and its length between the ends [m].
+
+    Yaw rate without its bias [rad/s], the wheels' median speed [m/s], whether that moves the machine, and the difference of the ends' tangents.
+    """
+
+    yaw: Array
+    speed: Array
+    moving: NDArray[np.bool_]
+    turn: Array
+    length: float
+    by_wheels: bool
 
 
 class _Off(NamedTuple):
@@ -130,10 +160,20 @@ class _Off(NamedTuple):
 
 def _off_angles(cells: Cells) -> _Off | None:
     """How far the machine is off where its angles point; NaN where it is too slow. None without yaw rate, or an axle's angle."""
+    path = _path(cells)
+    if path is None:
+        return None
+    with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
+        off = np.where(path.moving, path.yaw / path.speed * path.length - path.turn, np.nan)
+    return _Off(off, path.turn, np.abs(path.turn) < _STRAIGHT, path.by_wheels)
+
+
+def _path(cells: Cells) -> _Path | None:
+    """How the machine turns, and where its angles point; None without yaw rate, or an axle's angle."""
     geometry, axles = cells.machine.geometry, cells.machine.axles
     if geometry is None:
         return None
-    ends = _ends(cells.machine)
+    ends = ends_of(cells.machine)
     yaw = cells.means("imu.yaw_rate")
     by_wheels = not np.isfinite(yaw).any()
     if by_wheels:
@@ -152,6 +192,4 @@ def _off_angles(cells: Cells) -> _Off | None:
     bias = float(np.median(yaw[rest])) if np.count_nonzero(rest) * cells.dt >= _STILL_S else 0.0
     moving = np.abs(speed) > _MOVING * cells.machine.max_speed
     turn = np.tan(angle[:, 0]) - np.tan(angle[:, 1])
-    with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
-        off = np.where(moving, (yaw - bias) / speed * length - turn, np.nan)
-    return _Off(off, turn, np.abs(turn) < _STRAIGHT, by_wheels)
+    return _Path(yaw - bias, speed, moving, turn, length, by_wheels)

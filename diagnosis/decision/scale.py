@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from diagnosis.clearing.cells import Array, Cells
+from diagnosis.clearing.yaw import ends_of
 from diagnosis.decision.turn_scale import ANGLE, GYRO, Meant, factor_of, meant
 from diagnosis.response.body import body_speeds
 from diagnosis.results.machine_event import MachineEvent, other_angle, other_turn, other_yaw_rate
@@ -256,16 +257,18 @@ def _by_sides(cells: Cells, geometry: Geometry, speeds: Array) -> tuple[Array, s
 
 
 def _by_angles(cells: Cells, geometry: Geometry, v: Array) -> tuple[Array, str] | None:
-    """Yaw rate by speed and steering angles [rad/s], shape (cells,), where these are large; None without two axles."""
-    names = list(dict.fromkeys(p.axle for p in geometry.wheels.values()))
-    if len(names) != 2 or any(n != "fixed" and n not in cells.machine.axles for n in names) or names == ["fixed"]:
+    """Yaw rate by speed and steering angles [rad/s], shape (cells,), where these are large; None without two ends."""
+    ends = ends_of(cells.machine)
+    names = [name for end in ends.values() for name in end]
+    if len(ends) != 2 or len({p.axle for p in geometry.wheels.values()} - set(names)) or set(names) == {"fixed"}:
         return None
-    x = [float(np.mean([p.x for p in geometry.wheels.values() if p.axle == n])) for n in names]
-    angles = [np.zeros(cells.size) if n == "fixed" else cells.means(f"steer.{n}.phi") for n in names]
+    angles = [
+        np.mean([np.zeros(cells.size) if n == "fixed" else cells.means(f"steer.{n}.phi") for n in end], axis=0)
+        for end in ends.values()
+    ]
+    first, last = ends
     turn = np.tan(angles[0]) - np.tan(angles[1])
-    if abs(x[0] - x[1]) < _TURNS:
-        return None
-    return np.where(np.abs(turn) > _TURNS, v * turn / (x[0] - x[1]), np.nan), "the wheelbase"
+    return np.where(np.abs(turn) > _TURNS, v * turn / (first - last), np.nan), "the wheelbase"
 
 
 def _median(speeds: Array) -> tuple[Array, float]:

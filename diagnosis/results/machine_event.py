@@ -8,6 +8,7 @@ from diagnosis.results.machine_words import MachineWords
 
 #: What a sentence on a gyro has in it where it is off by a constant, and where the ground is named already.
 GYRO_CONSTANT, GYRO_SLIP = "rad/s more than the {wheels} make", "unless the ground let them slip"
+GYRO_OTHERWISE = "Gyro and steering angles contradict each other"
 GYRO_REST = ", where they rest as well"  # so that no slip makes it
 
 
@@ -139,6 +140,37 @@ def turns_otherwise(text: str) -> MachineEvent:
     doubt = "gyro and odometry contradict each other"
     act = "turn the machine by a counted number of turns and compare both with them, then check the gyro's axis and unit, and the encoders"
     return MachineEvent("Gyro and odometry contradict each other", text, doubt, act)
+
+
+def less_than_told(text: str) -> MachineEvent:
+    """All wheels make another share of their commands throughout, or after some moment; `text` without its stop."""
+    if text.endswith("throughout"):
+        more = ": what supplies or loads them all, or the scale of commands or speeds, is not as it should be; no part is blamed for it."
+        act = "check the unit and scale of commanded and measured speeds, and what all {wheels} share (supply, oil, load), and diagnose again"
+        doubt = "the machine makes another share of its commands throughout"
+        return MachineEvent("The {wheels} do not make their commands", text + more, doubt, act)
+    act = "look for what all {wheels} share (supply, oil, load, a slope, limits of the controller), and record a mission on level ground again"
+    more = (
+        ": what supplies or loads them all has changed, or all their speeds read otherwise; no part is blamed for it."
+    )
+    doubt = "the machine made another share of its commands for a part of the mission"
+    return MachineEvent("The {wheels} make another share of their commands for a time", text + more, doubt, act)
+
+
+def body_otherwise(text: str) -> MachineEvent:
+    """A sensor of the body shows another share of the wheels' speed for a time; `text` without its stop."""
+    act = "look whether all {wheels} slipped there; if not, compare that sensor, and the {wheel} speeds, with a measured way"
+    more = ": all {wheels} slip there, or all speeds, or that sensor, are wrong; no part is blamed for it."
+    doubt = "{wheels} and the sensor of the machine's speed contradict each other for a time"
+    return MachineEvent("The {wheels} contradict the machine's measured speed", text + more, doubt, act)
+
+
+def gyro_otherwise(text: str) -> MachineEvent:
+    """The measured yaw rate is another share of the turns for a time; `text` without its stop."""
+    event = other_yaw_rate(text)
+    more = ": the gyro, or what it is held against, is wrong there; no part is blamed for it."
+    doubt = "gyro and steering angles contradict each other for a time"
+    return replace(event, title=GYRO_OTHERWISE, text=text + more, doubt=doubt)
 
 
 def openings_doubted(text: str, act: str) -> MachineEvent:

@@ -1,0 +1,240 @@
+"""The machine as a whole: what its wheels have in common beside its commands, and beside what measures the body, as it changes in a mission.
+
+Wheels that are compared with each other alone show nothing of what they share: a supply that gives less to all motors, speeds that all read less,
+tyres that all slip, and a receiver or a gyro that fails, on which other judgements rest. Each of these is no part's fault that could be named.
+What is so from start to end beside the body's sensors is a scale's, which `diagnosis.decision.scale` judges.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from diagnosis.clearing.cells import Array, Cells
+from diagnosis.clearing.yaw import turn_by_angles
+from diagnosis.response.body import body_speeds
+from diagnosis.results.machine_event import MachineEvent, body_otherwise, gyro_otherwise, less_than_told
+
+Flags = NDArray[np.bool_]
+
+_MOVES = 0.3  # of the usual speed: less of it says nothing
+_USUAL = 0.95  # quantile
+_ALIKE = 0.15  # of the usual speed, by which half of the wheels are no further from their median: in tight turns none is the body's
+_SETTLED_S, _SETTLED = 0.6, 0.03  # a command that has changed by less than this share of the usual one over this time
+_KNOWN = 0.5  # of a window
+_SPELL_S = (
+    6.0  # for which the body is off without a break; healthy machines slip for up to four, of 34 + 20 tuning missions
+)
+_MANY, _CUTS = (
+    20,
+    60,
+)  # windows before and after a change, at least: ten seconds; moments at which it is looked for first
+_FEW, _FEW_CHANGE = 10, 1.5  # windows in turns, of which there are fewer, and times the change that counts
+_TURNS = 0.3  # of the usual yaw rate, root mean square over a window
+_DEAF, _WILD, _DEAF_S = (
+    0.35,
+    2.2,
+    2.5,
+)  # slope of the measured yaw rate by that of the angles: healthy ones 0.6 to 1.2 in any window
+_NEARLY_ALL = 0.15, 0.85  # quantiles
+_FLOOR = 0.03  # of a share, for its logarithm
+
+
+class _Course(NamedTuple):
+    """What one size is of another in windows, and where in the mission it is something else.
+
+    Attributes
+    ----------
+    share : Array, shape (windows,)
+        The share [1]; NaN where nothing is known.
+    cells : Cells
+        The mission.
+    """
+
+    share: Array
+    cells: Cells
+
+    @property
+    def log(self) -> Array:
+        """ln of the share, of which hardly anything is as little as `_FLOOR`."""
+        return np.log(np.maximum(self.share, _FLOOR))
+
+    @property
+    def usual(self) -> float:
+        """Median of the share [1]; NaN where few windows are known."""
+        known = self.share[np.isfinite(self.share)]
+        return float(np.median(known)) if known.size >= _FEW else np.nan
+
+    def mostly(self, middle: float, counts: float) -> bool:
+        """Whether the share is not 1, by `middle` in its median and by `counts` nearly always the same way [ln]."""
+        known = self.share[np.isfinite(self.share)]
+        if known.size < _FEW:
+            return False
+        low, median, high = np.log(np.maximum(np.quantile(known, (*_NEARLY_ALL, 0.5)), _FLOOR))[[0, 2, 1]]
+        return bool(abs(median) >= middle and (high <= -counts or low >= counts))
+
+    def changes(self, what: str, counts: float, least: int) -> str:
+        """From when on its median is another one by `counts` [ln], as "0.98 times `what` up to 40 s, and 0.6 times from 43 s on".
+
+        Empty where it is not, or where fewer than `least` windows are known before and after.
+        """
+        at = np.flatnonzero(np.isfinite(self.share))
+        if at.size < 2 * least:
+            return ""
+        x, n = self.log[at], at.size
+
+        def left(k: int) -> float:
+            """What medians before and after a window leave."""
+            return float(sum(np.abs(part - np.median(part)).sum() for part in (x[:k], x[k:])))
+
+        step = max(1, n // _CUTS)
+        k = min(range(least, n - least + 1, step), key=left)
+        k = min(range(max(least, k - step + 1), min(n - least, k + step - 1) + 1), key=left)
+        one, other = float(np.median(x[:k])), float(np.median(x[k:]))
+        if abs(one - other) < counts:
+            return ""
+        last, first = self.span(int(at[k - 1]), int(at[k - 1]) + 1)[1], self.span(int(at[k]), n)[0]
+        middle = (last + first) / 2
+        last, first = min(last, middle), max(first, middle)
+        return f"{np.exp(one):.2f} times {what} up to {last:.0f} s, and {np.exp(other):.2f} times from {first:.0f} s on"
+
+    def span(self, first: int, last: int) -> tuple[float, float]:
+        """Time of windows [first, last) [s]."""
+        frame, dt = self.cells.frame, self.cells.dt
+        return first * frame.hop * dt, ((last - 1) * frame.hop + frame.length) * dt
+
+    def longest(self, flags: Flags, least_s: float) -> tuple[int, int] | None:
+        """First window of the longest run of `flags`, and the one behind it; None where none is longer than `least_s`."""
+        edges = np.flatnonzero(np.diff(np.r_[False, flags, False].astype(np.int8)))
+        runs = zip(edges[::2], edges[1::2], strict=True)
+        first, last = max(runs, key=lambda r: r[1] - r[0], default=(0, 0))
+        return (int(first), int(last)) if (last - first) * self.cells.frame.hop * self.cells.dt >= least_s else None
+
+
+def as_a_whole(cells: Cells) -> list[MachineEvent]:
+    """What the machine does as a whole that no part explains, worded without its machine's words.
+
+    None of a machine whose drives have no openings: what it has in common is judged by its own models.
+    """
+    if not np.isfinite(cells.wheels("u")).any():
+        return []
+    beside_body = list(_beside_body(cells))
+    # speeds that are in doubt make the turns by them doubtful as well
+    return [*_beside_commands(cells), *(beside_body or _beside_gyro(cells))]
+
+
+def _counts(cells: Cells) -> float:
+    """The loss that counts [ln]."""
+    return -float(np.log1p(-cells.machine.limits.clear_at))
+
+
+def _common(cells: Cells) -> tuple[Array, Array, float]:
+    """Speeds of wheels of which nothing is stated (cells, wheels), the size of their median (cells,), and what it usually is [m/s]."""
+    sound = np.column_stack([~cells.told(wheel) for wheel in cells.machine.wheels])
+    speeds = np.where(sound, cells.wheels("v"), np.nan)
+    v = _median(speeds)
+    return speeds, v, _usual(v)
+
+
+def _median(x: Array) -> Array:
+    """Size of the median of the wheels, NaN where hardly half of them are known; from shape (cells, wheels) to (cells,)."""
+    known = np.isfinite(x).sum(axis=1) > x.shape[1] / 2
+    out = np.full(len(x), np.nan)
+    out[known] = np.abs(np.nanmedian(x[known], axis=1))
+    return out
+
+
+def _usual(size: Array) -> float:
+    """What a size of shape (cells,) usually is while it is anything; infinite where it never is."""
+    some = size[np.nan_to_num(size) > 0.0]
+    return float(np.quantile(some, _USUAL)) if some.size else np.inf
+
+
+def _course(cells: Cells, of: Array, by: Array, use: Flags) -> _Course:
+    """What one size is of another where both are used, each of shape (cells,)."""
+    use = use & np.isfinite(of) & np.isfinite(by)
+    frame = cells.frame
+    enough = frame.sums(use.astype(np.float64)) >= _KNOWN * min(frame.length, frame.cells)
+    part, whole = (frame.sums(np.where(use, x, 0.0)) for x in (of, by))
+    enough &= whole > 0.0
+    return _Course(np.where(enough, part / np.where(enough, whole, 1.0), np.nan), cells)
+
+
+def _beside_commands(cells: Cells) -> Iterator[MachineEvent]:
+    """All wheels make another share of what they are told from some moment on, or do not make it throughout."""
+    _, v, _ = _common(cells)
+    asked = _median(cells.reference)
+    usual, back = _usual(asked), max(1, round(_SETTLED_S / cells.dt))
+    before = np.r_[np.full(min(back, asked.size), np.nan), asked[:-back]]
+    with np.errstate(invalid="ignore"):
+        use = (asked > _MOVES * usual) & (np.abs(asked - before) < _SETTLED * usual)
+    course, counts = _course(cells, v, asked, use), _counts(cells)
+    text = course.changes("what they are told", counts, _MANY)
+    if not text and course.mostly(counts, counts):
+        text = f"{course.usual:.2f} times what they are told throughout"
+    if text:
+        yield less_than_told(f"All {{wheels}} together make {text}")
+
+
+def _beside_body(cells: Cells) -> Iterator[MachineEvent]:
+    """A sensor of the body shows another share of the wheels' speed for a time."""
+    speeds, v, usual = _common(cells)
+    with np.errstate(invalid="ignore"):
+        near = (np.abs(np.abs(speeds) - v[:, np.newaxis]) < _ALIKE * usual).sum(axis=1)
+        use = (v > _MOVES * usual) & (near >= np.isfinite(speeds).sum(axis=1) / 2)
+    counts = _counts(cells)
+    for body in body_speeds(cells.timeline, cells.width):
+        course = _course(cells, np.abs(body.speed), v, use)
+        text = course.changes("as fast as by its {wheels}", counts, _MANY)
+        spell = course.longest(
+            np.abs(np.nan_to_num(course.log - np.log(max(course.usual, _FLOOR)))) >= counts, _SPELL_S
+        )
+        if not text and spell is not None:
+            inside, (start, stop) = float(np.nanmedian(course.share[slice(*spell)])), course.span(*spell)
+            text = f"{inside:.2f} times as fast as by its {{wheels}} at {start:.0f}–{stop:.0f} s, and {course.usual:.2f} times else"
+        if text:
+            yield body_otherwise(f"By {body.name} the machine goes {text}")
+            return
+
+
+def _beside_gyro(cells: Cells) -> Iterator[MachineEvent]:
+    """The measured yaw rate is another share of that by angles and speed, throughout, for a spell, or from some moment on."""
+    turn = turn_by_angles(cells)
+    if turn is None:
+        return
+    yaw, expected = turn
+    known, frame = np.isfinite(yaw) & np.isfinite(expected), cells.frame
+    y, x = (np.where(known, z, 0.0) for z in (yaw, expected))
+    power = frame.sums(x * x)
+    turns = power >= (_TURNS * _usual(np.abs(x))) ** 2 * min(frame.length, frame.cells)
+    course = _Course(np.where(turns, frame.sums(x * y) / np.where(turns, power, 1.0), np.nan), cells)
+    text = _turns_otherwise(course, _counts(cells))
+    if text:
+        yield gyro_otherwise(f"By the gyro (imu.yaw_rate) the machine {text}")
+
+
+def _turns_otherwise(course: _Course, counts: float) -> str:
+    """How the machine turns by the gyro, and when, where that is another share by `counts` [ln]; empty where it is not."""
+    what, share, usual = "as fast as steering angles and {wheel} speeds make it", course.share, course.usual
+    if course.mostly(_FEW_CHANGE * counts, counts):
+        return f"{_turning(usual)} {what} throughout"
+    deaf, wild = (
+        course.longest(flags, _DEAF_S)
+        for flags in (np.nan_to_num(share, nan=1.0) < _DEAF, np.nan_to_num(share) > _WILD)
+    )
+    spell = deaf or wild
+    if spell is not None:
+        start, stop = course.span(*spell)
+        return f"{_turning(float(np.median(share[slice(*spell)])))} {what} at {start:.0f}–{stop:.0f} s"
+    found = course.changes(what, counts, _MANY) or course.changes(what, _FEW_CHANGE * counts, _FEW)
+    return found and f"turns {found}"
+
+
+def _turning(share: float) -> str:
+    """How a machine turns that turns so many times as fast as it should."""
+    if share < -_DEAF:
+        return f"turns the other way, {abs(share):.2f} times"
+    return f"hardly turns, {max(share, 0.0):.2f} times" if share < _DEAF else f"turns {share:.2f} times"

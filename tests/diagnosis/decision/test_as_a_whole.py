@@ -1,0 +1,80 @@
+"""What a machine does as a whole: all of it is another share of its commands, or what measures the body contradicts its wheels for a time."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from diagnosis.decision.as_a_whole import as_a_whole
+from replay.machine.config import haulotte
+from replay.simulation.options import SimulatedMission
+from tests.diagnosis.clearing.missions import LENGTH, in_cells, simulated
+
+Array = NDArray[np.float64]
+SETTLED = 10  # a mission in which the commands rest for long enough
+
+
+@cache
+def mission(seed: int) -> SimulatedMission:
+    """One with a receiver's speed and a gyro that measure the body itself."""
+    one, geometry, rng = simulated(seed=seed), haulotte().geometry, np.random.default_rng(1)
+    assert geometry is not None
+    v = np.median([x for n, x in one.columns.items() if n.startswith("wheel.") and n.endswith(".v_true")], axis=0)
+    turn = np.tan(one.columns["steer.front.phi"]) - np.tan(one.columns["steer.rear.phi"])
+    yaw = v * turn / (geometry.axle_x("front") - geometry.axle_x("rear"))
+    body = {"gnss.speed": np.abs(v) + 0.005 * rng.normal(size=v.size)}
+    return replace(one, columns={**one.columns, **body, "imu.yaw_rate": yaw + 0.005 * rng.normal(size=v.size)})
+
+
+def told(seed: int, leaf: str, share: float, since: float, until: float = LENGTH) -> list[str]:
+    """Events of a mission in which channels are multiplied for a time."""
+    one = mission(seed)
+    t = (one.stamps - one.stamps[0]) * 1e-9
+    at = np.where((t >= since) & (t < until), share, 1.0)
+    columns = {n: x * at if n.endswith(leaf) else x for n, x in one.columns.items()}
+    return [e.text for e in as_a_whole(in_cells(replace(one, columns=columns), base=False))]
+
+
+@pytest.mark.parametrize("seed", [5, 6, 7])
+def test_a_healthy_machine_does_nothing_of_it(seed: int) -> None:
+    assert told(seed, ".v", 1.0, 0.0) == []
+
+
+def test_wheels_that_all_make_less_of_their_commands_are_told() -> None:
+    text = " ".join(told(SETTLED, ".v", 0.6, 30.0))
+    assert text.startswith("All {wheels} together make ")
+    assert "times what they are told up to" in text
+    assert told(SETTLED, ".v", 0.85, 30.0) == []
+    assert "times what they are told throughout" in " ".join(told(SETTLED, ".v", 0.6, 0.0))
+
+
+def test_a_receiver_that_comes_to_show_less_contradicts_the_wheels() -> None:
+    (text,) = told(5, "gnss.speed", 0.6, 30.0)
+    assert text.startswith("By speed over ground the machine goes ")
+    assert "as fast as by its {wheels} up to" in text
+
+
+@pytest.mark.parametrize(
+    ("share", "since", "words"),
+    [
+        (0.5, 0.0, "turns 0.5"),
+        (-1.0, 0.0, "turns the other way, "),
+        (0.0, 20.0, "hardly turns, 0.0"),
+    ],
+)
+def test_a_gyro_that_contradicts_the_turns_is_told(share: float, since: float, words: str) -> None:
+    (text,) = told(6, "imu.yaw_rate", share, since)
+    assert words in text
+    assert ("throughout" in text) == (since == 0.0)
+
+
+def test_without_openings_other_models_judge_the_machine() -> None:
+    one = mission(5)
+    t = (one.stamps - one.stamps[0]) * 1e-9
+    columns = {n: x for n, x in one.columns.items() if not n.endswith((".u", ".u_applied"))}
+    columns["gnss.speed"] = columns["gnss.speed"] * np.where(t > 30.0, 0.5, 1.0)
+    assert as_a_whole(in_cells(replace(one, columns=columns), base=False)) == []
