@@ -37,7 +37,7 @@ _WRONG_WAY = 5.0  # for an axle that turns against its opening
 _UNSURE, _EDGE = 0.02, 0.5  # by how much a dead band is not known: of full opening, and of itself
 VALVE = 1.4  # dead band and hysteresis of a healthy valve: its limit, likewise
 #: Limits of the rate in windows and over the mission, as multiples of the loss that counts, by whether angle and opening are measured twice.
-RATE = {False: (2.0, 0.6), True: (3.0, 2.0)}
+RATE = {False: (2.0, 0.6), True: (1.6, 1.0)}
 _LEAST_WINDOWS = 16  # for a change
 #: Of the loss that counts, and times the other axle's: a change of one axle alone. Dead bands that are not known hide half of one.
 _CHANGED, _ALONE = 0.3, 1.5

@@ -38,9 +38,9 @@ _STRICT = 0.3  # loss that counts, from which on a machine file asks for no more
 #: nothing else would tell it.
 RESPONSE = {
     (False, False): ((0.75, 0.65), (0.9, 0.7)),
-    (True, False): ((1.4, 1.15), (1.25, 0.95)),
+    (True, False): ((1.4, 1.0), (1.25, 0.95)),
     (False, True): ((1.15, 1.0), (1.4, 1.2)),
-    (True, True): ((1.4, 1.15), (2.0, 1.4)),
+    (True, True): ((1.4, 1.0), (2.0, 1.4)),
 }
 
 

@@ -1,7 +1,7 @@
 """Two wheels that come to lose alike: among four each of them looks as usual beside the median of the others, or all do not.
 
-A pump, a hose or a differential feeds two motors. What both lose from some moment on shows in their own speeds per opening, which fall
-together while those of the other wheels stay; hills and loads move all of them.
+A pump, a hose or a differential feeds two motors. What both lose from some moment on, or for a spell, shows in their own speeds per opening, which
+fall together while those of the other wheels stay; hills and loads move all of them.
 """
 
 from __future__ import annotations
@@ -10,19 +10,22 @@ from itertools import combinations
 
 import numpy as np
 
-from diagnosis.clearing.cells import Array
+from diagnosis.clearing.cells import Array, Cells
 from diagnosis.clearing.responses import Responses
 
 #: Of the loss that counts [ln]: of 26 healthy missions of 14 machines that are cleared (tuning) one had a half of it, one 0.43.
 FALLS = 0.6
 _LEAST_WINDOWS, _PART, _SPLITS = 8, 0.2, 40  # before and after; of all; moments that are tried
 _WHEELS = 4
+_ABREAST_M = 0.05  # along the machine
+_SPELL_S = 6.0  # for which two wheels of one axle, or of one side, are below the others by as much as counts
+_IN, _OUT = 0.75, 2.0  # of a spell, that is known of it; times its length, that is known elsewhere
 
 
-def pairs_fall(responses: Responses) -> Array:
-    """By how much more than any other wheel's each wheel's speed per opening falls in the mission, together with another one's [ln], shape (wheels,).
+def pairs_fall(responses: Responses, cells: Cells) -> Array:
+    """By how much more than any other wheel's each wheel's speed per opening falls, together with another one's [ln], shape (wheels,).
 
-    NaN with fewer than four wheels, or of few windows in which all are known.
+    From some moment on, or for a spell of wheels of one axle or one side. NaN with fewer than four wheels, or of few windows in which all are known.
     """
     own = responses.own
     count = own.shape[1]
@@ -38,4 +41,37 @@ def pairs_fall(responses: Responses) -> Array:
                 others = np.abs(np.delete(change, (a, b))).max()
                 more = max(0.0, -max(change[a], change[b]) - others)
                 out[[a, b]] = np.fmax(out[[a, b]], more)
+    return np.asarray(np.fmax(out, _in_spells(responses, cells)))
+
+
+def _in_spells(responses: Responses, cells: Cells) -> Array:
+    """The same of spells of `_SPELL_S` beside the rest of the mission in which it goes the same way, shape (wheels,)."""
+    own, count = responses.own, responses.own.shape[1]
+    long = max(1, round(_SPELL_S / (cells.frame.hop * cells.dt)))
+    out = np.full(count, np.nan)
+    pairs = [p for p in combinations(range(count), 2) if _belong(cells, *p)]
+    for way in (responses.ahead.all(axis=1), ~responses.ahead.any(axis=1)):
+        known = way & np.isfinite(own).all(axis=1)
+        if len(own) <= long or np.count_nonzero(known) < (1.0 + _OUT) * long:
+            continue
+        total = np.concatenate([np.zeros((1, count)), np.cumsum(np.where(known[:, np.newaxis], own, 0.0), axis=0)])
+        number = np.concatenate([[0], np.cumsum(known)])
+        inside, outside = number[long:] - number[:-long], number[-1] - (number[long:] - number[:-long])
+        enough = (inside >= _IN * long) & (outside >= _OUT * long)
+        part = (total[long:] - total[:-long])[enough]
+        change = part / inside[enough, np.newaxis] - (total[-1] - part) / outside[enough, np.newaxis]
+        for a, b in pairs:
+            others = np.delete(change, (a, b), axis=1)
+            most = np.maximum(change[:, a], change[:, b])
+            more = np.minimum(others.min(axis=1) - most, -most)  # wheels that fall, not others that rise
+            out[[a, b]] = np.fmax(out[[a, b]], np.max(more, initial=0.0))
     return out
+
+
+def _belong(cells: Cells, a: int, b: int) -> bool:
+    """Whether two wheels are of one axle or of one side; of a machine without geometry any two."""
+    geometry = cells.machine.geometry
+    if geometry is None:
+        return True
+    one, other = (geometry.wheels[cells.machine.wheels[i]] for i in (a, b))
+    return abs(one.x - other.x) < _ABREAST_M or one.y * other.y > 0.0

@@ -74,7 +74,7 @@ def wheel_checks(cells: Cells, clear_at: float) -> Iterator[Checked]:
     tracking, rough = _tracking(cells, speed, reference), _rough_beside_others(roughness_of(cells, speed, reference))
     rough = np.fmax(rough, wild_readings(cells, speed, FLOOR * cells.machine.max_speed))
     worst_tracking, roughest = ([float(x) for x in largest(z)] for z in (tracking, rough))
-    beside, together = beside_its_side(cells, responses), pairs_fall(responses)
+    beside, together = beside_its_side(cells, responses), pairs_fall(responses, cells)
     offsets = opening_offsets(cells, speed, used)
     by_file, for_a_part = beside_plant(cells, used, responses)
     most_off = [float(x) for x in largest(offsets[0])], [float(x) for x in offsets[1]]

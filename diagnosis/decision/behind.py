@@ -55,7 +55,8 @@ def behind_drives(
     behind = "gear, brake" if words.drive == "motor" else "motor, gear, brake"
     part = f"Behind {words.drive}s that do as they are told ({behind})"
     if not seen:
-        return (f"{part} a loss over the whole mission may not show in the speeds.",)
-    least = f"{part} a loss over the whole mission shows from {100 * max(seen.values()):.0f} % on"
+        return (words.fill(f"{part} a loss may not show in the speeds, least of all one that all {{wheels}} share."),)
+    least = f"{part} a loss of one {{wheel}} over the whole mission shows from {100 * max(seen.values()):.0f} % on"
     hidden = [w for w in measured if w not in seen]
-    return (f"{least}, at {join_words(hidden)} none." if hidden else f"{least}.",)
+    told = f"{least}, at {join_words(hidden)} none" if hidden else least
+    return (words.fill(f"{told}; one that all {{wheels}} share, only where they fall behind their commands."),)

@@ -35,13 +35,29 @@ def said(
 @pytest.mark.parametrize(
     ("grips", "asked", "words"),
     [
-        ((0.0, 0.0), ("FR", "RL"), "shows from 30 % on."),
-        ((0.0, 1.0), ("FR", "RL"), "shows from 60 % on."),
-        ((0.0, 9.0), ("FR", "RL"), "shows from 30 % on, at RL none."),
-        ((0.0, 0.0), ("FR",), "shows from 30 % on, at RL none."),
-        ((9.0, 9.0), ("FR", "RL"), "a loss over the whole mission may not show in the speeds."),
-        ((None, None), ("FR", "RL"), "a loss over the whole mission may not show in the speeds."),
-        (None, ("FR", "RL"), "a loss over the whole mission may not show in the speeds."),
+        (
+            (0.0, 0.0),
+            ("FR", "RL"),
+            "shows from 30 % on; one that all wheels share, only where they fall behind their commands.",
+        ),
+        (
+            (0.0, 1.0),
+            ("FR", "RL"),
+            "shows from 60 % on; one that all wheels share, only where they fall behind their commands.",
+        ),
+        (
+            (0.0, 9.0),
+            ("FR", "RL"),
+            "shows from 30 % on, at RL none; one that all wheels share, only where they fall behind their commands.",
+        ),
+        (
+            (0.0, 0.0),
+            ("FR",),
+            "shows from 30 % on, at RL none; one that all wheels share, only where they fall behind their commands.",
+        ),
+        ((9.0, 9.0), ("FR", "RL"), "a loss may not show in the speeds, least of all one that all wheels share."),
+        ((None, None), ("FR", "RL"), "a loss may not show in the speeds, least of all one that all wheels share."),
+        (None, ("FR", "RL"), "a loss may not show in the speeds, least of all one that all wheels share."),
     ],
     ids=["free", "half carried", "one carried", "one not asked", "carried", "no plants", "no model"],
 )
