@@ -27,6 +27,7 @@ _OFF_BY_WHEELS = (
     0.12  # rad, of windows: on straight ways wheels that slip differ for a moment, up to 0.09 on tuning machines
 )
 _STRAIGHT, _SHORTEST = 0.08, 0.1  # rad, m
+_SIDES = 0.06  # of the speed, by which sound wheels of the sides differ
 _TURNS = 0.1  # difference of the ends' tangents, from which on offsets of the angles are a small part of it
 _LEAST_S = 6.0  # of driving straight, or of driving
 _OF_TURN = 0.15  # of a turn, by which its path may be off that by the angles
@@ -51,12 +52,22 @@ def yaw_checks(cells: Cells) -> Iterator[Checked]:
     turns = None if off.by_wheels else off.in_turns(cells)
     lasting = lasting if turns is None else max(lasting, abs(float(np.nanmedian(turns))))
     told = bool(np.isfinite(windows).any()) and not (off.by_wheels and straight is None)  # in turns wheels slip
+    sides = _by_sound_wheels(cells.machine) if off.by_wheels else 0.0
     for end in ends_of(cells.machine).values():
         for axle in (name for name in end if name != _FIXED):  # one wheel's angle is a share of the mean of its end
-            about = (Kind.STEER, axle, Side.SENSOR_OR_ACTUATOR)
-            found = [worst(cells, (*about, Check.YAW), len(end) * windows, off.most)] if told else []
-            found.append(lasts(cells, (*about, Check.LASTING_YAW), len(end) * lasting, LASTING_OFF))
+            about, share = (Kind.STEER, axle, Side.SENSOR_OR_ACTUATOR), len(end)
+            most, most_lasting = (max(limit, share * sides) for limit in (off.most, LASTING_OFF))
+            found = [worst(cells, (*about, Check.YAW), share * windows, most)] if told else []
+            found.append(lasts(cells, (*about, Check.LASTING_YAW), share * lasting, most_lasting))
             yield from (c for c in found if not (off.by_wheels and c.passed))
+
+
+def _by_sound_wheels(machine: Machine) -> float:
+    """Angle [rad] by which a machine seems to turn whose sides' speeds differ by as much as sound wheels' may: tyres wear, and drives differ."""
+    ends = ends_of(machine)
+    wheels = [] if machine.geometry is None else list(machine.geometry.wheels.values())
+    across = max((w.y for w in wheels), default=0.0) - min((w.y for w in wheels), default=0.0)
+    return _SIDES * (max(ends) - min(ends)) / across if across > _SHORTEST else 0.0
 
 
 def off_straight(cells: Cells) -> Array | None:
