@@ -16,7 +16,14 @@ from numpy.typing import NDArray
 from diagnosis.clearing.cells import Array, Cells
 from diagnosis.clearing.yaw import turn_by_angles
 from diagnosis.response.body import body_speeds
-from diagnosis.results.machine_event import MachineEvent, body_otherwise, gyro_otherwise, less_than_told
+from diagnosis.results.machine_event import (
+    MachineEvent,
+    beyond_the_top,
+    body_otherwise,
+    gyro_otherwise,
+    less_than_told,
+    not_at_rest,
+)
 
 Flags = NDArray[np.bool_]
 
@@ -39,6 +46,9 @@ _DEAF, _WILD, _DEAF_S = (
     2.2,
     2.5,
 )  # slope of the measured yaw rate by that of the angles: healthy ones 0.6 to 1.2 in any window
+_BEYOND_TOP = 1.6  # times the top speed of the machine file, which no machine reaches
+_STANDS, _CLOSED, _CREEPS = 0.01, 0.03, 0.035  # of the top speed; of full opening; of the top speed
+_SETTLES_S, _CREEPS_S = 1.5, 1.0  # after a stop, in which a machine rolls out, and for which it moves on
 _NEARLY_ALL = 0.15, 0.85  # quantiles
 _FLOOR = 0.03  # of a share, for its logarithm
 
@@ -121,9 +131,12 @@ def as_a_whole(cells: Cells) -> list[MachineEvent]:
     """
     if not np.isfinite(cells.wheels("u")).any():
         return []
+    beyond = list(_beyond_the_top(cells))
+    if beyond:  # of another unit, nothing else is worth asking
+        return beyond
     beside_body = list(_beside_body(cells))
     # speeds that are in doubt make the turns by them doubtful as well
-    return [*_beside_commands(cells), *(beside_body or _beside_gyro(cells))]
+    return [*_beside_commands(cells), *_at_rest(cells), *(beside_body or _beside_gyro(cells))]
 
 
 def _counts(cells: Cells) -> float:
@@ -177,6 +190,40 @@ def _beside_commands(cells: Cells) -> Iterator[MachineEvent]:
         text = f"{course.usual:.2f} times what they are told throughout"
     if text:
         yield less_than_told(f"All {{wheels}} together make {text}")
+
+
+def _beyond_the_top(cells: Cells) -> Iterator[MachineEvent]:
+    """All wheels are much faster for long than the machine file's top speed, as of another unit."""
+    _, v, usual = _common(cells)
+    if (
+        np.isfinite(usual)
+        and usual > _BEYOND_TOP * cells.machine.max_speed
+        and np.isfinite(v).sum() * cells.dt >= _SPELL_S
+    ):
+        yield beyond_the_top(
+            f"The {{wheels}} reach {usual:.3g} {{speed_unit}}, {usual / cells.machine.max_speed:.1f} times [geometry] max_speed"
+        )
+
+
+def _at_rest(cells: Cells) -> Iterator[MachineEvent]:
+    """All wheels read a speed while they are told to stand, and their drives are closed."""
+    speeds, v, _ = _common(cells)
+    asked, top = _median(cells.reference), cells.machine.max_speed
+    command, opening = cells.wheels("u"), cells.wheels("u_applied")
+    used = _median(np.where(np.isfinite(opening), opening, command))
+    with np.errstate(invalid="ignore"):
+        stands = (asked <= _STANDS * top) & (used <= _CLOSED)
+        moves = np.nanmin(np.where(np.isfinite(speeds), np.abs(speeds), np.inf), axis=1, initial=np.inf) > _CREEPS * top
+    before = round(_SETTLES_S / cells.dt)
+    settled = np.lib.stride_tricks.sliding_window_view(np.pad(stands, (before, 0)), before + 1).all(axis=1)
+    edges = np.flatnonzero(np.diff(np.r_[False, settled & moves, False].astype(np.int8)))
+    spells = [(a, b) for a, b in zip(edges[::2], edges[1::2], strict=True) if (b - a) * cells.dt >= _CREEPS_S]
+    if spells:
+        a, b = max(spells, key=lambda s: s[1] - s[0])
+        yield not_at_rest(
+            f"All {{wheels}} read about {float(np.nanmedian(v[a:b])):.2g} {{speed_unit}} at {a * cells.dt:.1f}–{b * cells.dt:.1f} s, while they are told to "
+            "stand and no {valve} is open"
+        )
 
 
 def _beside_body(cells: Cells) -> Iterator[MachineEvent]:

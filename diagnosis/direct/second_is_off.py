@@ -4,6 +4,7 @@ Two measurements that differ do not say which of them is wrong. What turns the w
 opening of its drive and the other wheels explain it as well as they usually do. A loop around a faulty sensor holds that sensor's
 reading and moves the wheel, with the opening, so that the second speed is still explained. Where that is the one which is not, and
 the sensor is, nothing is said of the sensor; of a difference that stays the same, a constant share or offset, this tells nothing.
+But a wheel whose drive is closed, and which by its sensor stands as the other wheels do, does not turn, whatever its second speed reads.
 """
 
 from __future__ import annotations
@@ -29,6 +30,8 @@ _UNEXPLAINED, _EXPLAINED = 3.0, 2.0  # times what is usually left: more of the o
 _OF_OTHER = 0.4  # of what is left of the second speed, at most left of the sensor
 _OF_DIFFERENCE = 0.5  # of how the two differ, at least left of the second speed
 _LEAST_POINTS = 3  # per column
+_CLOSED, _RESTS, _NEARLY_ALL = 0.03, 0.02, 0.7  # of full opening; of the span; of a finding's time
+_OTHERS = 2  # wheels that stand as well
 
 
 @dataclass(frozen=True)
@@ -54,8 +57,9 @@ def without_second_speeds_own(
     openings : Mapping[str, Array], each of shape (n,)
         The drives' measured openings [of full opening], or their commands, by wheel.
     """
+    assessments = _without_at_rest(found, assessments, openings)
     if not any(not f.mode.total for a in assessments.values() for f in a.findings):
-        return dict(assessments)
+        return assessments
     cells = {
         wheel: _cells(one, openings[wheel], [other.pair.y for name, other in found.items() if name != wheel])
         for wheel, one in found.items()
@@ -70,6 +74,29 @@ def without_second_speeds_own(
             varying = [f for f in a.findings if not f.mode.total]
             out[wheel] = left_open(a, [f for f in varying if _is_seconds(f, known, own, dt)])
     return out
+
+
+def _without_at_rest(
+    found: Mapping[str, IdentifiedPair], assessments: Mapping[str, Assessment], openings: Mapping[str, Array]
+) -> dict[str, Assessment]:
+    """The same without sensors that read nothing while their drives are closed and the other wheels stand: their second speeds are off."""
+    out = dict(assessments)
+    for wheel, one in found.items():
+        total = [f for f in assessments[wheel].findings if f.mode.total]
+        others = [other.pair.y for name, other in found.items() if name != wheel]
+        if total and wheel in openings and len(others) >= _OTHERS:
+            rests = [f for f in total if _rests(f, one, openings[wheel], others)]
+            out[wheel] = left_open(assessments[wheel], rests)
+    return out
+
+
+def _rests(finding: Finding, one: IdentifiedPair, opening: Array, others: Sequence[Array]) -> bool:
+    """Whether a drive is closed, its sensor reads nothing and most other wheels stand for nearly all of a finding."""
+    part, least = slice(finding.start, finding.stop), _RESTS * one.pair.span
+    closed = np.abs(np.nan_to_num(opening[part])) <= _CLOSED
+    stand = np.column_stack([np.abs(np.nan_to_num(y[part], nan=np.inf)) <= least for y in others])
+    own = np.abs(np.nan_to_num(one.pair.y[part], nan=np.inf)) <= least
+    return bool(np.mean(closed & own & (stand.mean(axis=1) > 0.5)) >= _NEARLY_ALL)
 
 
 @dataclass(frozen=True)

@@ -157,6 +157,23 @@ def less_than_told(text: str) -> MachineEvent:
     return MachineEvent("The {wheels} make another share of their commands for a time", text + more, doubt, act)
 
 
+def beyond_the_top(text: str) -> MachineEvent:
+    """All wheels are faster than the machine can be; `text` without its stop."""
+    more = ": unit or scale of the speeds, or max_speed in the machine file, is wrong."
+    act = "correct the unit of the speeds under [signals], or max_speed under [geometry], in the machine file, and diagnose again"
+    return MachineEvent(
+        "The speeds do not fit the machine", text + more, "the {wheels}' speeds do not fit the machine", act
+    )
+
+
+def not_at_rest(text: str) -> MachineEvent:
+    """All wheels read a speed where they should stand; `text` without its stop."""
+    more = ": the machine rolls or creeps, or all speeds read too much; no part is blamed for it."
+    act = "stop the machine on level ground and look whether its {wheels} stand while their speeds read something; mend what holds it, or the sensors' zero"
+    doubt = "the {wheels} read a speed where they should stand"
+    return MachineEvent("The {wheels} read a speed while told to stand", text + more, doubt, act)
+
+
 def body_otherwise(text: str) -> MachineEvent:
     """A sensor of the body shows another share of the wheels' speed for a time; `text` without its stop."""
     act = "look whether all {wheels} slipped there; if not, compare that sensor, and the {wheel} speeds, with a measured way"

@@ -34,7 +34,10 @@ def speeds(opening: Array) -> Array:
 
 def sensor(reading: Array, second: Array) -> IdentifiedPair:
     noise = 0.004 * np.random.default_rng(4).standard_normal((2, SIZE))
-    return cast(IdentifiedPair, SimpleNamespace(pair=SimpleNamespace(y=reading + noise[0], x=second + noise[1], dt=DT)))
+    return cast(
+        IdentifiedPair,
+        SimpleNamespace(pair=SimpleNamespace(y=reading + noise[0], x=second + noise[1], dt=DT, span=2.0)),
+    )
 
 
 def told(
@@ -95,3 +98,15 @@ def test_a_wheel_that_its_opening_does_not_move_tells_nothing() -> None:
     pushed = speeds(OPENING) + 0.1 * SLOW
     other = low_passed(np.random.default_rng(9).standard_normal(SIZE), 0.5, DT)
     assert told(pushed + 0.3 * other / other.std() * 0.06, pushed + SLOW * INSIDE).findings
+
+
+@pytest.mark.parametrize(("opens", "stays"), [(0.0, False), (0.3, True)])
+def test_a_sensor_that_reads_nothing_while_nothing_drives_its_wheel_is_sound(opens: float, *, stays: bool) -> None:
+    rests = np.zeros(SIZE)
+    pairs = {w: sensor(rests, rests + 0.4 * INSIDE if w == "FR" else rests) for w in WHEELS}
+    states = np.full(SIZE, CODE[State.HEALTHY])
+    finding = Finding(START, STOP, Side.SENSOR, FaultMode.NO_SIGNAL, 0.96, (), None, None, (), Tier.DIRECT)
+    healthy = Assessment(states, tier=Tier.DIRECT)
+    assessments = dict.fromkeys(WHEELS, healthy) | {"FR": Assessment(states, findings=(finding,), tier=Tier.DIRECT)}
+    after = without_second_speeds_own(pairs, assessments, dict.fromkeys(WHEELS, rests + opens))["FR"]
+    assert bool(after.findings) is stays
