@@ -11,8 +11,9 @@ from __future__ import annotations
 from diagnosis.audit.fleet.document import Fleet
 from diagnosis.audit.fleet.document_rows import bounds_row
 from diagnosis.audit.fleet.fault_types import FaultChange, FaultChangeRow, FaultStandingRow
+from diagnosis.audit.fleet.fleet_fault import FleetFault
 from diagnosis.audit.fleet.fleet_types import BaselineRow, CoverageChangeRow
-from diagnosis.audit.fleet.machines import FleetFault, Machine
+from diagnosis.audit.fleet.machines import Machine
 from diagnosis.audit.fleet.parts import PartKey
 from diagnosis.pages.labels import utc_moment
 from replay.faults import Side

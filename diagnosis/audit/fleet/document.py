@@ -11,6 +11,7 @@ import numpy as np
 from diagnosis.audit.fleet import words
 from diagnosis.audit.fleet.document_rows import bounds_row, mission_row, rounded, six_digits, trend_row
 from diagnosis.audit.fleet.fault_types import FleetFaultRow, Status
+from diagnosis.audit.fleet.fleet_fault import FleetFault
 from diagnosis.audit.fleet.fleet_types import (
     SCHEMA,
     BaselineRow,
@@ -19,7 +20,7 @@ from diagnosis.audit.fleet.fleet_types import (
     MachineRow,
     PartRow,
 )
-from diagnosis.audit.fleet.machines import FleetFault, Machine
+from diagnosis.audit.fleet.machines import Machine
 from diagnosis.audit.fleet.news import news, since_runs
 from diagnosis.audit.fleet.read import Mission
 from diagnosis.audit.fleet.runs import sides_of
