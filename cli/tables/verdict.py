@@ -12,7 +12,7 @@ from rich.text import Text
 from cli.tables.layout import bullets, section, table, text
 from cli.tables.logs import log_parts
 from cli.tables.looks import mode_text, severity_text, verdict_title
-from diagnosis.comparison.words import OUTCOMES, headline
+from diagnosis.comparison.words import OUTCOMES, are_several, headline
 from diagnosis.report.confidence import headline as verdict_words
 from diagnosis.report.confidence import sure_of
 from diagnosis.report.tables import clearing_sentences, merged_caveats, other_caveats
@@ -86,7 +86,9 @@ def _previous(found: PreviousRow, words: MachineWords) -> list[RenderableType]:
     mission = found["mission"]
     which = "later" if found["order"] == "later" else "previous"
     logs = " + ".join(mission["files"]) or "no log named"
-    parts: list[RenderableType] = [text(f"{headline(found['counts'])} ({which} mission: {logs})")]
+    parts: list[RenderableType] = [
+        text(f"{headline(found['counts'], several=are_several(found['faults']))} ({which} mission: {logs})")
+    ]
     worth_saying = ("new", "worse", "resolved", "not_seen_again")
     named = [c for c in found["faults"] if (c["trend"] or c["status"]) in worth_saying]
     parts += [bullets([_became(c, words) for c in named[:_SHOWN]])] if named else []

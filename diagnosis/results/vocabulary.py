@@ -68,6 +68,10 @@ _VERDICT_WORDS = {
 }
 
 
+#: Words for *not assessed* where every part of a wheel was judged, which is not what is missing.
+NOT_CLEARED = "Not cleared"
+
+
 class Leave(StrEnum):
     """Whether a machine may go out; what the data cannot show is to be checked first."""
 

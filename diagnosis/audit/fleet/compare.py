@@ -46,10 +46,17 @@ def compare_fleets(older: Fleet, newer: Fleet) -> BaselineRow:
     names = [{m.name for m in fleet.missions} for fleet in (older, newer)]
     lost = sorted(names[0] - names[1]) if names[0] & names[1] else []  # of another period all are others
     missing = [before[k].label for k in before if k not in now]
+    new = names[1] - names[0]
     return {
         "worse": bool(lost or missing) or any(f["outcome"] in ("new", "worse") for f in faults),
         "counts": {name: sum(f["outcome"] == name for f in faults) for name in OUTCOMES},
-        "missions": {"older": len(names[0]), "newer": len(names[1]), "new": len(names[1] - names[0]), "missing": lost},
+        "missions": {
+            "older": len(names[0]),
+            "newer": len(names[1]),
+            "new": len(new),
+            "new_counted": sum(r.name in new for m in newer.machines for r in m.runs),
+            "missing": lost,
+        },
         "machines": {
             "new": [now[k].label for k in now if k not in before],
             "missing": missing,

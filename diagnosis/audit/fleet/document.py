@@ -107,6 +107,7 @@ def fleet_document(fleet: Fleet, baseline: BaselineRow | None = None) -> FleetDo
             first.setdefault(mission.result.id, mission.name)
     results = {m.name: m.result.id if m.result is not None else -1 for m in fleet.missions}
     at = {mission.name: k for k, mission in enumerate(fleet.missions)}
+    judged = {result for m in fleet.machines for result in m.judged_all()}
     fast = [fast_losses(m, own) for m, own in zip(fleet.machines, fleet.trends, strict=True)]
     lost = [_lost(m, own) for m, own in zip(fleet.machines, fleet.trends, strict=True)]
     status, tag, title = words.headline(fleet.machines, len(fleet.unknown), lost)
@@ -149,6 +150,7 @@ def fleet_document(fleet: Fleet, baseline: BaselineRow | None = None) -> FleetDo
                 failed.get(m.name, owner.get(results[fleet.copies.get(m.name, m.name)])),
                 fleet.copies.get(m.name, first.get(results[m.name])),
                 fleet.first_runs.get(m.name),
+                judged=results[fleet.copies.get(m.name, m.name)] in judged,
             )
             for m in fleet.missions
         ],

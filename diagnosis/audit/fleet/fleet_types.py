@@ -201,6 +201,8 @@ class MissionRow(TypedDict):
         Folder of the report.
     first_run : int or None
         Audit run that judged it first; null: not known.
+    judged : bool
+        Whether every part of a wheel was judged long enough: of a mission without a verdict, that it did not clear its machine, and no less.
     copy_of : str or None
         Name of the mission that this one is a copy of.
     """
@@ -224,6 +226,7 @@ class MissionRow(TypedDict):
     version: NotRequired[str]
     report: NotRequired[str | None]
     first_run: NotRequired[int | None]
+    judged: NotRequired[bool]
     copy_of: NotRequired[str | None]
 
 
@@ -254,11 +257,15 @@ class MachineChangesRow(TypedDict):
 
 
 class MissionChangesRow(TypedDict):
-    """Numbers of missions, and names that the later audit lacks where both hold some of the same missions."""
+    """Numbers of missions, and names that the later audit lacks where both hold some of the same missions.
+
+    `new_counted`: how many of the new ones have a report and count, copies of a log once; documents of earlier versions lack it.
+    """
 
     older: int
     newer: int
     new: int
+    new_counted: NotRequired[int]
     missing: list[str]
 
 

@@ -228,6 +228,11 @@ class Machine:
         least = self.limits.min_assessed
         return {key: self.table.assessed(rows, least).tolist() for key, rows in self.columns.items()}
 
+    def judged_all(self) -> set[int]:
+        """Results of missions that judged every part of a wheel for as long as a verdict of ``ready`` takes."""
+        wheels = [column for (c, _), column in self._assessed.items() if c not in self.limits.axles]
+        return {r.result.id for k, r in enumerate(self.runs) if wheels and all(column[k] for column in wheels)}
+
     def assessed(self, component: str, side: str) -> list[bool]:
         """Which missions judged a part for as long as a verdict of ``ready`` takes, in the order of `runs`."""
         none = [False] * len(self.runs)

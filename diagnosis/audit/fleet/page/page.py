@@ -196,7 +196,7 @@ def _environment() -> jinja2.Environment:
     made.globals |= {
         "mark": mark,
         "legend": [(s, labels.mode_legend(FaultMode(s)) if s in set(FaultMode) else state_label(s)) for s in LEGEND],
-        "verdicts": [(v, v.short) for v in _FILTER],
+        "verdicts": [(v, f"{v.short}, or not cleared" if v is Verdict.NOT_ASSESSED else v.short) for v in _FILTER],
     }
     return made
 
