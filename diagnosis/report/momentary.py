@@ -49,7 +49,7 @@ def momentary_words(fault: IntervalRow, columns: Columns, axis: tuple[float, flo
         return ""
     top = np.argmax(chances, axis=0)
     shares = {m: float(np.mean(top == k)) for k, m in enumerate(modes)}
-    if shares.get(State(fault["mode"].value), 0.0) >= _MOSTLY:
+    if shares.get(State(fault["mode"]), 0.0) >= _MOSTLY:
         return ""
     named = sorted((m for m in modes if shares[m] >= _LEAST), key=lambda m: -shares[m])
     changes = int(np.count_nonzero(np.diff(top)))
