@@ -285,7 +285,11 @@ def _followed(fault: Mapping[str, Any]) -> Iterator[str]:
     """A gain that a sentence gives beside the ε̂ of the table."""
     for text in fault["evidence"]:
         found = re.search(r"followed (\S+) × .*\(95 %: (\S+) to (\S+)\)", text)
-        if found and fault["epsilon"] is not None and " stretches (" not in " ".join(fault["evidence"]):
+        if (
+            found
+            and fault["epsilon"] is not None
+            and not any(x in " ".join(fault["evidence"]) for x in (" stretches (", " pieces that touch "))
+        ):
             said = [1.0 - float(x) for x in found.groups()]
             sizes = [fault["epsilon"][k] for k in ("value", "high", "low")]
             if not np.allclose(said, sizes, atol=1e-3):
