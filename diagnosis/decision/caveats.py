@@ -64,6 +64,8 @@ class Reservations:
         The commonest state of each part that is no judgement, while driving.
     uncommanded : bool
         Whether no command of any wheel is in the log.
+    twice : frozenset[Part]
+        Parts of which a second measurement is in the log.
     """
 
     short: tuple[Part, ...] = ()
@@ -80,6 +82,7 @@ class Reservations:
     words: MachineWords = HYDRAULIC
     open_state: Mapping[Part, State] = field(default_factory=dict)
     uncommanded: bool = False
+    twice: frozenset[Part] = frozenset()
 
 
 def smallest_loads(assessments: Mapping[Part, Assessment], words: MachineWords) -> tuple[str, ...]:

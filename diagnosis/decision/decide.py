@@ -182,6 +182,7 @@ def decide(
         misplaced=tuple(misplaced),
         open_state=open_state or {},
         uncommanded=not commanded,
+        twice=frozenset(twice),
     )
     open_points = to_clear(against, assessments, decided_s, driven, axles, limits, intervals)
     found = _with_faults(intervals, against, endings_of(intervals, assessments, end_s)) or _without_faults(
