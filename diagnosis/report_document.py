@@ -14,7 +14,8 @@ from diagnosis.clearing.checks import cells_of, checks_of
 from diagnosis.clearing.detectable import detectable
 from diagnosis.clearing.mapping import Hint, mapping_hints
 from diagnosis.decision import metrics, quality
-from diagnosis.decision.decide import Decision, decide
+from diagnosis.decision.decide import decide
+from diagnosis.decision.decided import Decision
 from diagnosis.decision.intervals import intervals_of, spans_of
 from diagnosis.decision.log_caveats import more_caveats, without_speed
 from diagnosis.decision.missing import is_commanded

@@ -7,7 +7,8 @@ from typing import Any
 
 import pytest
 
-from diagnosis.decision.decide import Decision, decide
+from diagnosis.decision.decide import decide
+from diagnosis.decision.decided import Decision
 from diagnosis.decision.intervals import intervals_of
 from diagnosis.results.assessed import Cut, CutKind
 from diagnosis.results.assessment import Assessment
