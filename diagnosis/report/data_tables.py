@@ -10,14 +10,9 @@ from diagnosis.report.judged_parts import kind_of
 from diagnosis.report.units import DEGREES, on_page
 from diagnosis.results.clearing import MAY_EXPLAIN, Check, lasts_in, share_covered, size_words
 from diagnosis.results.clearing_rows import ClearingRow
-from diagnosis.results.document import (
-    FileRow,
-    IntervalRow,
-    MissingRow,
-    ReportDocument,
-    SignalRow,
-)
+from diagnosis.results.document import IntervalRow, MissingRow, ReportDocument, SignalRow
 from diagnosis.results.fault_rows import state_label
+from diagnosis.results.log_rows import FileRow
 from diagnosis.results.loop_rows import LoopRow, MetricsRow
 from diagnosis.results.machine_words import MachineWords, words_of
 from diagnosis.results.vocabulary import Severity

@@ -8,11 +8,11 @@ stand any more is ``resolved`` only where a mission assessed the part after the 
 
 from __future__ import annotations
 
+from diagnosis.audit.fleet.baseline_types import BaselineRow, CoverageChangeRow
 from diagnosis.audit.fleet.document import Fleet
 from diagnosis.audit.fleet.document_rows import bounds_row
 from diagnosis.audit.fleet.fault_types import FaultChange, FaultChangeRow, FaultStandingRow
 from diagnosis.audit.fleet.fleet_fault import FleetFault
-from diagnosis.audit.fleet.fleet_types import BaselineRow, CoverageChangeRow
 from diagnosis.audit.fleet.machines import Machine
 from diagnosis.audit.fleet.parts import PartKey
 from diagnosis.pages.labels import utc_moment

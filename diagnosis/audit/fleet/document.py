@@ -9,17 +9,11 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from diagnosis.audit.fleet import words
+from diagnosis.audit.fleet.baseline_types import BaselineRow
 from diagnosis.audit.fleet.document_rows import bounds_row, mission_row, rounded, six_digits, trend_row
 from diagnosis.audit.fleet.fault_types import FleetFaultRow, Status
 from diagnosis.audit.fleet.fleet_fault import FleetFault
-from diagnosis.audit.fleet.fleet_types import (
-    SCHEMA,
-    BaselineRow,
-    CountsRow,
-    FleetDocument,
-    MachineRow,
-    PartRow,
-)
+from diagnosis.audit.fleet.fleet_types import SCHEMA, CountsRow, FleetDocument, MachineRow, PartRow
 from diagnosis.audit.fleet.machines import Machine
 from diagnosis.audit.fleet.news import news, since_runs
 from diagnosis.audit.fleet.read import Mission

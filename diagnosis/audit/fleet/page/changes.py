@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from diagnosis.audit.fleet.baseline_types import MissionChangesRow
 from diagnosis.audit.fleet.compare import OUTCOMES
 from diagnosis.audit.fleet.fault_types import FaultChange, FaultStandingRow
-from diagnosis.audit.fleet.fleet_types import MissionChangesRow
 from diagnosis.audit.fleet.page.shown import Context, ShownBaseline, ShownFaultChange
 from diagnosis.audit.fleet.words import count
 from diagnosis.pages import labels
