@@ -58,6 +58,11 @@ class Verdict(StrEnum):
         """Words for lists, where many verdicts are beside each other: ``Ready``."""
         return _VERDICT_WORDS[self][2]
 
+    @property
+    def group(self) -> str:
+        """Words for all missions of this verdict, in legends and counts: some that are not assessed were judged, and not cleared."""
+        return f"{self.short} or {NOT_CLEARED.lower()}" if self is Verdict.NOT_ASSESSED else self.short
+
 
 _VERDICT_RANK = {member: i for i, member in enumerate(Verdict)}
 _VERDICT_WORDS = {
