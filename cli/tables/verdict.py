@@ -16,7 +16,7 @@ from diagnosis.comparison.words import OUTCOMES, are_several, headline
 from diagnosis.report.confidence import headline as verdict_words
 from diagnosis.report.confidence import sure_of
 from diagnosis.report.tables import clearing_sentences, merged_caveats, other_caveats
-from diagnosis.results.candidates import label_of
+from diagnosis.results.candidates import label_of, symbol_of
 from diagnosis.results.comparison_document import FaultChangeRow, PreviousRow
 from diagnosis.results.document import PAPER_DEFAULTS, ActionRow, IntervalRow, MachineRow, ReportDocument
 from diagnosis.results.fault_rows import mode_words
@@ -159,7 +159,7 @@ def _fault(fault: IntervalRow, words: MachineWords, bounds: bool) -> tuple[objec
     return (
         text(fault["id"], "dim"),
         words.part_words(fault["kind"], fault["component"], fault["side"]),
-        mode_text(fault["mode"], label_of(fault).lower()),
+        mode_text(symbol_of(fault), label_of(fault).lower()),
         f"{fault['start_s']:.{digits}f}–{fault['stop_s']:.{digits}f}",
         _epsilon(fault["epsilon"], bounds),
         _sat(fault["sat"], words),

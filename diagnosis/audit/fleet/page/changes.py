@@ -78,7 +78,7 @@ def _new_words(m: MissionChangesRow) -> str:
 def _changed(f: ShownFaultChange, words: MachineWords) -> Context:
     return {
         "machine": f["machine"],
-        "symbol": labels.known(f["mode"]),
+        "symbol": "warning" if f.get("unclear") else labels.known(f["mode"]),
         "words": f"{words.part_words(f['kind'], f['component'], f['side'])} {UNCLEAR if f.get('unclear') else state_label(f['mode'], f['side']).lower()}",
         "older": _standing(f["older"]),
         "newer": _standing(f["newer"]),

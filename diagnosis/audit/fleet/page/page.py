@@ -302,7 +302,7 @@ def _fault(f: FleetFaultRow, document: ShownDocument, directions: Mapping[tuple[
         notes.append(f"not in the {last_ones} that judged it")
     return {
         "machine": document["machines"][f["machine"]]["label"],
-        "symbol": labels.known(f["mode"]),
+        "symbol": rows.fault_symbol(f),
         "words": UNCLEAR.capitalize() if f.get("unclear") else state_label(f["mode"], f["side"]),
         "part": words_of(document["machines"][f["machine"]]).part_words(f["kind"], f["component"], f["side"]),
         "severity": f["severity"],

@@ -38,8 +38,13 @@ def symbol(mission: ShownMission) -> str:
     if verdict is None:
         return "warning"
     if mission["faults"]:
-        return labels.known(mission["faults"][0]["mode"])
+        return fault_symbol(mission["faults"][0])
     return "warning" if verdict == Verdict.WATCH else Verdict(verdict).symbol
+
+
+def fault_symbol(fault: FleetFaultRow | MissionFaultRow) -> str:
+    """Symbol of a fault: its mode, or a warning where its kind is unclear."""
+    return "warning" if fault.get("unclear") else labels.known(fault["mode"])
 
 
 def fault_words(fault: FleetFaultRow | MissionFaultRow, machine_words: MachineWords) -> str:
