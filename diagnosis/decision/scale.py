@@ -194,7 +194,7 @@ def scale_of(cells: Cells, units: Collection[str], *, factor: float = 1.0) -> Sc
     found: tuple[Scaled, ...] = ()
     if np.isfinite(speeds).any():
         found = tuple(_straight(cells, speeds))
-        found = (*found, *_turning(cells, speeds, factor, tuple(s.by for s in found if _agrees(s.factor * factor))))
+        found = (*found, *_turning(cells, speeds, factor, tuple(s.by for s in found if agrees(s.factor * factor))))
     found = tuple(s._replace(factor=s.factor * factor) for s in found)
     return Scale(diameter, found, assumed="geometry" in machine.assumed)
 
@@ -214,7 +214,8 @@ def _straight(cells: Cells, speeds: Array) -> Iterator[Scaled]:
             yield Scaled(body.name, factor, "")
 
 
-def _agrees(factor: float) -> bool:
+def agrees(factor: float) -> bool:
+    """Whether a factor [1] is none, but for what tyres slip and wear by."""
     return abs(float(np.log(factor))) < _SLIPS
 
 
