@@ -19,7 +19,7 @@ from diagnosis.decision.decided import Decision
 from diagnosis.decision.intervals import intervals_of, spans_of
 from diagnosis.decision.log_caveats import more_caveats, without_speed
 from diagnosis.decision.missing import is_commanded
-from diagnosis.decision.scale import Scale, agrees, scale_of
+from diagnosis.decision.scale import Scale, scale_of
 from diagnosis.decision.severity import advised
 from diagnosis.decision.wording import join_words
 from diagnosis.recording_rows import log_row
@@ -182,16 +182,8 @@ def _told_scale(judged: Judged) -> list[str]:
     for f in judged.intervals:
         if f.kind is Kind.WHEEL and f.side is Side.SENSOR and f.mode.scaled and 2.0 * (f.stop_s - f.start_s) > length:
             return []
-    told = scale is None or scale.gross or scale.event is not None
+    told = scale is None or scale.gross or scale.event is not None or scale.explained
     return [scale.sentence] if scale is not None and scale.sentence and not told else []
-
-
-def _gross_scale(judged: Judged) -> list[str]:
-    """A scale of the wheels' speeds that is contradicted beyond any slip; none where it is that of the first speeds beside the second ones."""
-    scale, by = judged.scale, judged.factor
-    if scale is None or not scale.gross or (by != 1.0 and all(agrees(s.factor / by) for s in scale.wrong)):
-        return []
-    return [scale.gross]
 
 
 def _turned_otherwise(judged: Judged) -> tuple[MachineEvent, ...]:
@@ -219,7 +211,7 @@ def _decision(
         checks=judged.checks,
         scope=_scope(judged),
         events=(*judged.found.events, *_turned_otherwise(judged)),
-        hints=(*(h.text for h in judged.hints), *_gross_scale(judged)),
+        hints=(*(h.text for h in judged.hints), *([s.gross] if (s := judged.scale) is not None and s.gross else [])),
         misplaced=judged.places,
         open_state=open_state,
         shown=judged.detectable.rows,
