@@ -17,7 +17,7 @@ from diagnosis.results.candidates import candidates_of, label_of
 from diagnosis.results.machine_words import HYDRAULIC
 from diagnosis.results.vocabulary import Severity
 from replay.machine.quantities import OPENING
-from tests.clearing_contradictions import of_checks, of_coverage
+from tests.clearing_contradictions import of_checks, of_coverage, of_remedies
 from tests.page_contradictions import of_page
 from tests.plot_contradictions import of_faults, of_states
 from tests.word_slips import slips
@@ -47,6 +47,7 @@ def contradictions(report: Mapping[str, Any], columns: Mapping[str, NDArray[Any]
         *_terminal(report),
         *of_coverage(report),
         *of_checks(report),
+        *of_remedies(report),
         *of_page(report),
         *slips(report),
     ]
