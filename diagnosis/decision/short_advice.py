@@ -41,6 +41,12 @@ def act_of_wheel(
     faster = f"faster than {limits.driving_speed:.3g} {words.speed_unit}"
     if driven is not None and driven < limits.min_assessed and tier is not Tier.NONE:
         return f"move {words.parts_moved} {faster} for at least {limits.min_assessed:g} s, and diagnose that log"
+    second = "wheel.{c}.v_true (a second speed)"
+    other = second if sensor else f"wheel.{{c}}.u_applied (the {words.position})"
+    if lack is Lack.ANSWER:
+        return (
+            f"drive for a minute and longer with several speeds, turns and stops, and diagnose that log; or log {other}"
+        )
     if tier is Tier.NONE:
         return _of_silent(sensor, state, lack)
     by_state = {
@@ -53,7 +59,6 @@ def act_of_wheel(
     }
     if state in by_state:
         return words.fill(by_state[state])
-    second = "wheel.{c}.v_true (a second speed)"
     by_tier = {
         Tier.DIRECT: "log both measurements by one clock, with finer steps"
         if sensor
@@ -75,15 +80,12 @@ def act_of_wheel(
         )
     if lack is Lack.ECHO:
         return words.fill("record what the {wheels} measure (/joint_states, encoder counts) as wheel.{c}.v")
-    if lack is Lack.ANSWER:
-        return f"drive for a minute and longer with several speeds, turns and stops, and diagnose that log; or log {second}"
     if lack is Lack.UNIT:
         return "correct the unit or the channel of wheel.{c}.v and of its command under [signals] in a machine file"
     if tier in by_tier:
         return by_tier[tier]
     if lack is Lack.COMMAND:
         return words.fill(_WITH_COMMAND)
-    other = second if sensor else f"wheel.{{c}}.u_applied (the {words.position})"
     return f"log {other}; without it, drive straight at three steady speeds for 10 s each"
 
 

@@ -256,3 +256,12 @@ def test_what_a_faulty_part_is_off_at_another_time_goes_with_its_fault() -> None
     other = replace(check, side=Side.SENSOR)
     (row,) = to_clear(Reservations(open=(other,)), PARTS, {}, {}, [], Limits(), faults)
     assert "F1" not in row.reason + row.act
+
+
+def test_a_wheel_of_which_no_model_was_found_is_driven_more_and_its_command_is_not_asked_for() -> None:
+    silent = unassessed(N, State.NOT_ASSESSED, "no model of the wheels could be found in this mission", Lack.ANSWER)
+    parts = {("FR", "sensor"): silent, ("FR", "actuator"): silent}
+    for part, other in ((("FR", "sensor"), "v_true"), (("FR", "actuator"), "u_applied")):
+        (row,) = to_clear(Reservations(short=(part,)), parts, {}, dict.fromkeys(parts, 60.0), [], Limits())
+        assert row.act.startswith("drive for a minute and longer with several speeds")
+        assert f"or log wheel.FR.{other}" in row.act
