@@ -7,7 +7,7 @@ another size, a wheel that slips, and a machine that is pulled aside all the tim
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -15,14 +15,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.response.machine import Judged
-from diagnosis.response.sides_by_yaw import Relation, Sides, relation_in, relations_of, rest_of, sides_of
 from diagnosis.response.spells import Spell
 from diagnosis.response.turning import Turning
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
+_OFF, _AROUND = 5.0, 4  # usual misfits beside the command; blocks around a wheel's fault: these are left out
+_LEAST_BLOCKS = 60  # that turn
+_STANDS = 12  # blocks at rest that show the constant of the gyro
+_PARTS = 4  # of the mission: in one of them at least it may be sound
+_KEPT, _ROUNDS = 0.6, 4
 _REFITS, _SAME = 3, 0.02  # of a gain, by what nothing is found wrong in
+_FITS = 0.3  # misfit of the yaw rate, by its own size
+_TURN, _SPEED = 0.12, 0.03  # of the yaw rate by the sides, and of the speed: what slip and load make of it
+_CHANGE = 0.4  # of a change from block to block
 _CAPPED = 16.0  # squared misfit of one block, in usual ones
 _ALIKE = 8.0  # blocks whose misfits are one
 _ENTER = 8.0  # log-odds of a change of state
@@ -35,6 +42,7 @@ _SURE, _TELLS = 5.0, 5.0  # log-odds against a fault of the gyro, and of the oth
 _SOME = 0.15  # of the driving, in which nothing is scaled: less does not tell which of two sides is right
 LENGTH_S = 20.0
 _LARGEST = 3.0  # factor: one that shows from there on only is none
+_OTHER = 2.5  # of two sides, as in `_FACTORS`
 
 
 class Scaled(NamedTuple):
@@ -67,6 +75,23 @@ class Sought(NamedTuple):
     smallest: float = np.inf
 
 
+class _Sides(NamedTuple):
+    """Mean speeds of both sides [m/s], yaw rate [rad/s], blocks that count; each of shape (b,)."""
+
+    right: Array
+    left: Array
+    yaw: Array
+    sound: Flags
+
+
+class _Relation(NamedTuple):
+    """Yaw rate by the difference of the sides: gain [1/m], constant, and misfit [rad/s] of shape (b,)."""
+
+    gain: float
+    constant: float
+    noise: Array
+
+
 def scaled_sides(
     judged: Mapping[str, Judged], faults: Mapping[str, Sequence[Spell]], turning: Turning | None, block_s: float
 ) -> Sought:
@@ -85,8 +110,8 @@ def scaled_sides(
     """
     if turning is None:
         return Sought()
-    sides = sides_of(judged, faults, turning)
-    relations = list(relations_of(sides))
+    sides = _sides(judged, faults, turning)
+    relations = list(_relations(sides))
     if not relations:
         return Sought()
     noise = np.median([about.noise for about in relations], axis=0)  # one for all: that of a smaller gain is smaller
@@ -101,11 +126,46 @@ def scaled_sides(
     return Sought(found, _smallest(sides, about, block_s, wheels))
 
 
-def _settled(sides: Sides, about: Relation) -> tuple[Relation, NDArray[np.intp], float]:
+def _sides(judged: Mapping[str, Judged], faults: Mapping[str, Sequence[Spell]], turning: Turning) -> _Sides:
+    right, left = (
+        np.mean([j.wheel.blocks.mean for w, j in judged.items() if turning.sides[w] == side], axis=0)
+        for side in (1.0, -1.0)
+    )
+    sound = np.isfinite(right) & np.isfinite(left) & np.isfinite(turning.yaw)
+    for w, j in judged.items():
+        b = j.wheel.blocks
+        with np.errstate(invalid="ignore"):
+            sound &= ~(np.abs(b.mean - np.clip(b.mean, b.low, b.high)) > _OFF * b.noise)
+        for s in faults[w]:
+            sound[max(0, s.start - _AROUND) : s.stop + _AROUND] = False
+    return _Sides(np.nan_to_num(right), np.nan_to_num(left), np.nan_to_num(turning.yaw), sound)
+
+
+def _relations(sides: _Sides) -> Iterable[_Relation]:
+    """How the yaw rate may belong to the sides: as in all of the mission, or as in a part of it that is sound."""
+    apart, turns = sides.right - sides.left, np.abs(sides.right - sides.left)
+    rest = _rest(sides)
+    usual = float(np.quantile(turns[sides.sound], 0.9)) if sides.sound.any() else 0.0
+    moved = np.flatnonzero(sides.sound & (turns > 0.2 * usual))
+    if moved.size < _LEAST_BLOCKS:
+        return
+    n = apart.size
+    ends = [0, *(int(x) for x in np.quantile(moved, np.arange(1, _PARTS) / _PARTS)), n]
+    spans = [(0, n), *pairwise(ends), (0, ends[_PARTS // 2]), (ends[_PARTS // 2], n)]
+    for first, last in spans:
+        inside: Flags = np.zeros(n, np.bool_)
+        inside[first:last] = True
+        found = _relation(sides, inside & sides.sound, rest)
+        if found is not None:
+            yield found
+    yield from _two_gains(sides, rest)
+
+
+def _settled(sides: _Sides, about: _Relation) -> tuple[_Relation, NDArray[np.intp], float]:
     """A relation as it is where it calls nothing wrong, the path with it, and its log-likelihood: what is found off decides no gain."""
     path, score = _path(sides, about)
     for _ in range(_REFITS):
-        again = relation_in(sides, sides.sound & (path == 0), rest_of(sides))
+        again = _relation(sides, sides.sound & (path == 0), _rest(sides))
         if again is None or abs(again.gain / about.gain - 1.0) < _SAME:
             break
         about = again._replace(noise=about.noise)
@@ -113,7 +173,60 @@ def _settled(sides: Sides, about: Relation) -> tuple[Relation, NDArray[np.intp],
     return about, path, score
 
 
-def _states(sides: Sides, about: Relation) -> Array:
+def _rest(sides: _Sides) -> float | None:
+    """Constant of the gyro as the machine at rest shows it [rad/s]; None where it hardly rests."""
+    still = sides.sound & (sides.right == 0.0) & (sides.left == 0.0)
+    return float(np.median(sides.yaw[still])) if np.count_nonzero(still) >= _STANDS else None
+
+
+def _two_gains(sides: _Sides, rest: float | None) -> Iterable[_Relation]:
+    """The relation were one side scaled all through, of either side; none where they are alike."""
+    table = np.column_stack([sides.right, -sides.left, np.full(sides.yaw.size, rest is None, np.float64)])
+    kept, off = sides.sound.copy(), np.abs(sides.yaw)
+    weights: Array = np.zeros(3)
+    for _ in range(_ROUNDS):
+        weights = np.asarray(np.linalg.lstsq(table[kept], (sides.yaw - (rest or 0.0))[kept], rcond=None)[0])
+        off = np.abs(sides.yaw - (rest or 0.0) - table @ weights)
+        kept = sides.sound & (off <= np.quantile(off[sides.sound], _KEPT))
+    by_right, by_left, constant = (float(x) for x in weights)
+    if by_right * by_left <= 0.0 or not 1.0 / _OTHER < by_left / by_right < _OTHER:
+        return
+    usual = 1.48 * float(np.quantile(off[sides.sound], 0.5 * _KEPT))
+    for gain in (by_right, by_left):
+        if usual <= _FITS * float(np.std((table @ weights)[sides.sound])):
+            yield _Relation(gain, (rest or 0.0) + constant, _noise(sides, gain, usual))
+
+
+def _noise(sides: _Sides, gain: float, usual: float) -> Array:
+    """Misfit of each block, with what turning, speed and changes make of it [rad/s], shape (b,)."""
+    apart = sides.right - sides.left
+    change = np.abs(np.gradient(apart)) + 0.3 * np.abs(np.gradient(0.5 * (sides.right + sides.left)))
+    speed = np.maximum(np.abs(sides.right), np.abs(sides.left))
+    return np.asarray(np.hypot(usual, abs(gain) * (_TURN * np.abs(apart) + _SPEED * speed + _CHANGE * change)))
+
+
+def _relation(sides: _Sides, use: Flags, rest: float | None) -> _Relation | None:
+    """The relation in some blocks, by most of them; `rest`: the constant, where the machine at rest shows it."""
+    apart = sides.right - sides.left
+    if np.count_nonzero(use) < _LEAST_BLOCKS // 2 or not np.ptp(apart[use]) > 0.0:
+        return None
+    kept, gain, constant = use.copy(), 0.0, rest or 0.0
+    off = np.abs(sides.yaw)
+    for _ in range(_ROUNDS):
+        if rest is None:
+            gain, constant = (float(x) for x in np.polyfit(apart[kept], sides.yaw[kept], 1))
+        else:
+            power = float(apart[kept] @ apart[kept])
+            gain = float(apart[kept] @ (sides.yaw - rest)[kept]) / power if power > 0.0 else 0.0
+        off = np.abs(sides.yaw - constant - gain * apart)
+        kept = use & (off <= np.quantile(off[use], _KEPT))
+    usual = 1.48 * float(np.quantile(off[use], 0.5 * _KEPT))
+    if gain == 0.0 or usual > _FITS * abs(gain) * float(np.std(apart[use])):
+        return None
+    return _Relation(gain, constant, _noise(sides, gain, usual))
+
+
+def _states(sides: _Sides, about: _Relation) -> Array:
     """Yaw rate in each state [rad/s]: sound, left and right by factor, gyro by gain and constant. Shape (b, states)."""
     g, apart = about.gain, sides.right - sides.left
     usual = float(np.quantile(np.abs(g * apart[sides.sound]), 0.9))
@@ -125,14 +238,14 @@ def _states(sides: Sides, about: Relation) -> Array:
     return np.asarray(about.constant + np.column_stack(columns))
 
 
-def _scores(sides: Sides, about: Relation, yaw: Array) -> Array:
+def _scores(sides: _Sides, about: _Relation, yaw: Array) -> Array:
     """Log-likelihood of yaw rates, a share of that of independent blocks. Shape of `yaw`."""
     off = ((sides.yaw - yaw.T) / about.noise).T ** 2
     use = sides.sound if yaw.ndim == 1 else sides.sound[:, np.newaxis]
     return np.asarray(np.where(use, -0.5 * np.minimum(off, _CAPPED) / _ALIKE, 0.0))
 
 
-def _path(sides: Sides, about: Relation) -> tuple[NDArray[np.intp], float]:
+def _path(sides: _Sides, about: _Relation) -> tuple[NDArray[np.intp], float]:
     """The most probable state of each block, shape (b,), and its log-likelihood."""
     score = _scores(sides, about, _states(sides, about))
     n, m = score.shape
@@ -157,7 +270,7 @@ def _spans(path: NDArray[np.intp]) -> list[tuple[int, int, float]]:
     return [(int(a), int(b), float(kind[a])) for a, b in pairwise(edges) if kind[a] != 0.0]
 
 
-def _scaled(sides: Sides, about: Relation, span: tuple[int, int, float], block_s: float) -> Scaled | None:
+def _scaled(sides: _Sides, about: _Relation, span: tuple[int, int, float], block_s: float) -> Scaled | None:
     """A time as it is told; None where it is short, small, or as well a fault of the gyro."""
     start, stop, side = span
     inside: Flags = np.zeros(sides.yaw.size, np.bool_)
@@ -196,7 +309,7 @@ def _by(y: Array, x: Array, noise: Array, use: Flags) -> float:
     return float(np.sum(w * x * y)) / power if power > 0.0 else 0.0
 
 
-def _smallest(sides: Sides, about: Relation, block_s: float, wheels: int) -> float:
+def _smallest(sides: _Sides, about: _Relation, block_s: float, wheels: int) -> float:
     """Smallest factor above 1 of one of so many wheels of a side that shows in 95 of 100 places for `LENGTH_S` [1]."""
     number = max(1, round(LENGTH_S / block_s))
     sizes = []
