@@ -35,6 +35,7 @@ from diagnosis.decision.valve_noise import with_doubted_noise
 from diagnosis.decision.way import path_of
 from diagnosis.recording_rows import machine_row
 from diagnosis.report_document import Judged, report_of_mission
+from diagnosis.response.body import witnesses_of
 from diagnosis.results.assessment import Assessment
 from diagnosis.results.closeups import closeups_of
 from diagnosis.results.document import MachineRow, ReportDocument
@@ -171,7 +172,7 @@ def _walk(
     shown = without_copied_rows(mission.timeline)
     doubt = opening_doubt(shown, mission.signals.items, machine)
     used = shown if doubt is None else without_openings(shown, machine)
-    scale = speed_doubt(used, mission.signals.items, machine)
+    scale = speed_doubt(used, mission.signals.items, machine, lambda: witnesses_of(used))
     timeline = without_shared_gain(with_zeroed_positions(rescaled(used, scale), machine), machine)
     mission = replace(mission, timeline=timeline)
 

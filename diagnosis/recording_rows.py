@@ -8,8 +8,9 @@ from numpy.typing import NDArray
 from diagnosis.decision import quality
 from diagnosis.decision.assumed import assumed_words
 from diagnosis.decision.way import way_of
-from diagnosis.results.document import FileRow, LogRow, MachineRow, WheelPlace
+from diagnosis.results.document import MachineRow, WheelPlace
 from diagnosis.results.left_out import is_left_out
+from diagnosis.results.log_rows import FileRow, LogRow
 from diagnosis.results.machine_words import machine_words
 from replay.arrays.envelope import bucket_of
 from replay.machine.config import Machine

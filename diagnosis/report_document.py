@@ -14,7 +14,8 @@ from diagnosis.clearing.checks import cells_of, checks_of
 from diagnosis.clearing.detectable import detectable
 from diagnosis.clearing.mapping import Hint, mapping_hints
 from diagnosis.decision import metrics, quality
-from diagnosis.decision.decide import Decision, decide
+from diagnosis.decision.decide import decide
+from diagnosis.decision.decided import Decision
 from diagnosis.decision.intervals import intervals_of, spans_of
 from diagnosis.decision.log_caveats import more_caveats, without_speed
 from diagnosis.decision.missing import is_commanded
@@ -181,7 +182,7 @@ def _told_scale(judged: Judged) -> list[str]:
     for f in judged.intervals:
         if f.kind is Kind.WHEEL and f.side is Side.SENSOR and f.mode.scaled and 2.0 * (f.stop_s - f.start_s) > length:
             return []
-    told = scale is None or scale.gross or scale.event is not None
+    told = scale is None or scale.gross or scale.event is not None or scale.explained
     return [scale.sentence] if scale is not None and scale.sentence and not told else []
 
 

@@ -60,3 +60,21 @@ def of_checks(report: Mapping[str, Any]) -> Iterator[str]:
                 yield f"{fault['id']} {lasts} for {max(shared, 0.0):.1f} s of what it may explain: {row['reason']!r}"
             if not during and fault["stop_s"] >= b:
                 yield f"{fault['id']} is said to have ended: {row['reason']!r}"
+
+
+def of_remedies(report: Mapping[str, Any]) -> Iterator[str]:
+    """A remedy that asks for signals which are all in the log, or sends somebody with a tachometer to a valve's position."""
+    logged = {s["name"] for s in report["signals"]}
+    for row in report["verdict"]["to_clear"]:
+        parts = row.get("parts", [])
+        for clause in re.findall(r"\blog ((?:wheel|steer)\.[^;:]*)", row["act"]):
+            asked = [
+                f"{kind}.{c}.{leaf}"
+                for kind, who, leaf in re.findall(r"\b(wheel|steer)\.(\*|\w+)\.(\w+)", clause)
+                for c in (sorted({p["component"] for p in parts}) if who == "*" else [who])
+            ]
+            if asked and logged.issuperset(asked):
+                yield f"{row['reason']!r}: asked to log {clause!r}, which is in the log"
+        valves = bool(parts) and all(p["side"] == "actuator" for p in parts)
+        if valves and "off its second measurement" in row["reason"] and "tachometer" in row["act"]:
+            yield f"{row['reason']!r}: {row['act']!r}"

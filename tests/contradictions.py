@@ -17,7 +17,7 @@ from diagnosis.results.candidates import candidates_of, label_of
 from diagnosis.results.machine_words import HYDRAULIC
 from diagnosis.results.vocabulary import Severity
 from replay.machine.quantities import OPENING
-from tests.clearing_contradictions import of_checks, of_coverage
+from tests.clearing_contradictions import of_checks, of_coverage, of_remedies
 from tests.page_contradictions import of_page
 from tests.plot_contradictions import of_faults, of_states
 from tests.word_slips import slips
@@ -47,6 +47,7 @@ def contradictions(report: Mapping[str, Any], columns: Mapping[str, NDArray[Any]
         *_terminal(report),
         *of_coverage(report),
         *of_checks(report),
+        *of_remedies(report),
         *of_page(report),
         *slips(report),
     ]
@@ -285,7 +286,11 @@ def _followed(fault: Mapping[str, Any]) -> Iterator[str]:
     """A gain that a sentence gives beside the ε̂ of the table."""
     for text in fault["evidence"]:
         found = re.search(r"followed (\S+) × .*\(95 %: (\S+) to (\S+)\)", text)
-        if found and fault["epsilon"] is not None and " stretches (" not in " ".join(fault["evidence"]):
+        if (
+            found
+            and fault["epsilon"] is not None
+            and not any(x in " ".join(fault["evidence"]) for x in (" stretches (", " pieces that touch "))
+        ):
             said = [1.0 - float(x) for x in found.groups()]
             sizes = [fault["epsilon"][k] for k in ("value", "high", "low")]
             if not np.allclose(said, sizes, atol=1e-3):

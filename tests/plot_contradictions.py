@@ -43,7 +43,9 @@ def of_faults(
         # an onset is where a channel began to hold, which shows only later: in its second half, or from its detection on, where that is told
         middle = 0.5 * (fault["start_s"] + fault["stop_s"])
         means = []
-        for seen in (middle, max(middle, fault["detected_s"] or 0.0)):
+        # of one in several stretches each begins so, and its words say what lies between them
+        parted = any(" stretches (" in text for text in fault["evidence"])
+        for seen in (middle, max(middle, fault["detected_s"] or 0.0), *([fault["start_s"]] if parted else [])):
             late = inside & _rows(columns, seen, fault["stop_s"])
             if chance is not None and fault["severity"] != "info" and np.isfinite(chance[late]).any():
                 both = [

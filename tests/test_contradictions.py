@@ -161,6 +161,12 @@ def _other_act(d: Document) -> None:
     d["verdict"]["to_clear"].append({"reason": "It deviates.", "act": act, "parts": [], "fault": "", "why": ""})
 
 
+def _logged_already(d: Document) -> None:
+    act = "inspect these parts, and log wheel.*.v (a speed)"
+    parts = [{"component": "FR", "side": "sensor"}]
+    d["verdict"]["to_clear"].append({"reason": "It deviates.", "act": act, "parts": parts, "fault": "", "why": ""})
+
+
 def _no_reason(d: Document) -> None:
     fault = next(f for f in d["intervals"] if f["mode"] == "inefficient")
     fault["epsilon"]["low"] = 0.0
@@ -170,7 +176,7 @@ def _no_reason(d: Document) -> None:
     "spoil",
     [
         *(_calm, _advice, _minority, _size, _late, _softer, _healthy, _untold, _sum, _unmoved, _moment),
-        *(_not_judged, _lasting, _in_both, _two_remedies, _other_act, _no_reason),
+        *(_not_judged, _lasting, _in_both, _two_remedies, _other_act, _no_reason, _logged_already),
     ],
 )
 def test_a_spoilt_result_is_seen(result: tuple[Document, Columns], spoil: Callable[[Document], None]) -> None:

@@ -128,6 +128,7 @@ def _still_asked(questions: int) -> str:
 
 def _contradictions(signals: Signals, machine: Machine) -> tuple[tuple[str, ...], tuple[str, ...], bool]:
     """What turns contradict of the places of wheels and axles, doubts about sizes and units, and whether the openings' unit is one."""
+    from diagnosis.response.body import witnesses_of
     from diagnosis.results.machine_words import machine_words
     from replay.setup.body_scale import scale_doubts
     from replay.setup.places import place_doubts
@@ -142,7 +143,7 @@ def _contradictions(signals: Signals, machine: Machine) -> tuple[tuple[str, ...]
     openings = opening_doubt(line, signals.items, machine)
     words = machine_words(machine, signals.items)
     of_openings = () if openings is None else (words.fill(f"{openings.text}; {openings.act}"),)
-    speeds = speed_doubt(line, signals.items, machine)
+    speeds = speed_doubt(line, signals.items, machine, lambda: witnesses_of(line))
     of_speeds = () if speeds is None else (f"{speeds.text.partition(':')[0]}; {speeds.act}",)
     doubts = (*of_openings, *of_speeds, *scale_doubts(line, machine, wheels))
     return place_doubts(line, machine), doubts, openings is not None

@@ -61,7 +61,7 @@ def summary_parts(audited: Audited, found: Discovery, output: Path) -> list[Rend
     verdicts: Counter[str | None] = Counter(end.verdict for end in ends)
     states: Counter[str] = Counter(end.state for end in ends)
     counted = [
-        Text.assemble(f"{v.short.lower()}: ", (str(verdicts[v]), verdict_style(v))) for v in _VERDICTS if verdicts[v]
+        Text.assemble(f"{v.group.lower()}: ", (str(verdicts[v]), verdict_style(v))) for v in _VERDICTS if verdicts[v]
     ]
     counted += [text(f"{s.words}: {states[s]}") for s in ENDS if s not in READ and states[s]]
     parts += [section("Missions"), Text(" · ").join(counted)]

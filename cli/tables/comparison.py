@@ -32,9 +32,10 @@ _COLUMNS = {"new": (0, 1, 3), "not_seen_again": (0, 1, 2), "resolved": (0, 1, 2)
 def comparison_parts(found: Comparison) -> list[RenderableType]:
     """Headline, the two missions, faults by what became of them, coverage, figures, and what to bear in mind."""
     words = words_of({"words": found.words})
+    several = any(len(f.ids) > 1 for c in found.faults for f in (c.older, c.newer) if f is not None)
     label, style = ("WORSE", "bold white on #b63a00") if found.worse else ("NOT WORSE", "bold white on #1d7a63")
     parts: list[RenderableType] = [
-        Text.assemble((f" {label} ", style), "  ", text(headline(found.counts), "bold")),
+        Text.assemble((f" {label} ", style), "  ", text(headline(found.counts, several=several), "bold")),
         "",
         key_values([("older", _mission(found.older)), ("newer", _mission(found.newer))]),
     ]

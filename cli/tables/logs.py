@@ -9,7 +9,8 @@ from rich.text import Text
 
 from cli.tables.layout import bullets, section, text
 from cli.terminal.dates import shown_moment
-from diagnosis.results.document import ClockRow, FileRow, ReportDocument
+from diagnosis.results.document import ReportDocument
+from diagnosis.results.log_rows import ClockRow, FileRow
 from replay.signals.unsure_names import NOT_USED
 
 

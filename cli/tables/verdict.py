@@ -12,11 +12,11 @@ from rich.text import Text
 from cli.tables.layout import bullets, section, table, text
 from cli.tables.logs import log_parts
 from cli.tables.looks import mode_text, severity_text, verdict_title
-from diagnosis.comparison.words import OUTCOMES, headline
+from diagnosis.comparison.words import OUTCOMES, are_several, headline
 from diagnosis.report.confidence import headline as verdict_words
 from diagnosis.report.confidence import sure_of
 from diagnosis.report.tables import clearing_sentences, merged_caveats, other_caveats
-from diagnosis.results.candidates import label_of
+from diagnosis.results.candidates import label_of, symbol_of
 from diagnosis.results.comparison_document import FaultChangeRow, PreviousRow
 from diagnosis.results.document import PAPER_DEFAULTS, ActionRow, IntervalRow, MachineRow, ReportDocument
 from diagnosis.results.fault_rows import mode_words
@@ -86,7 +86,9 @@ def _previous(found: PreviousRow, words: MachineWords) -> list[RenderableType]:
     mission = found["mission"]
     which = "later" if found["order"] == "later" else "previous"
     logs = " + ".join(mission["files"]) or "no log named"
-    parts: list[RenderableType] = [text(f"{headline(found['counts'])} ({which} mission: {logs})")]
+    parts: list[RenderableType] = [
+        text(f"{headline(found['counts'], several=are_several(found['faults']))} ({which} mission: {logs})")
+    ]
     worth_saying = ("new", "worse", "resolved", "not_seen_again")
     named = [c for c in found["faults"] if (c["trend"] or c["status"]) in worth_saying]
     parts += [bullets([_became(c, words) for c in named[:_SHOWN]])] if named else []
@@ -157,7 +159,7 @@ def _fault(fault: IntervalRow, words: MachineWords, bounds: bool) -> tuple[objec
     return (
         text(fault["id"], "dim"),
         words.part_words(fault["kind"], fault["component"], fault["side"]),
-        mode_text(fault["mode"], label_of(fault).lower()),
+        mode_text(symbol_of(fault), label_of(fault).lower()),
         f"{fault['start_s']:.{digits}f}–{fault['stop_s']:.{digits}f}",
         _epsilon(fault["epsilon"], bounds),
         _sat(fault["sat"], words),

@@ -91,13 +91,19 @@ def _habit(others: Array, length: float, usual: float, *, steps: bool = False) -
     """
     ranked = np.r_[np.sort(others)[::-1][: 1 if steps else _FREEZES + 1], usual]
     found = None
-    for k, longest in enumerate(ranked):
-        if steps and k:
-            break
-        parted = k == 0 or ranked[k - 1] >= max(_LEAST_S, _PARTED * longest)
-        if parted and length >= (_LONGER if k == 0 else _PARTED) * max(longest, usual):
-            found = float(max(longest, usual))
+    for k in (0,) if steps else (0, *(1 + gaps_in(ranked, _PARTED, _LEAST_S))):
+        longest = float(max(ranked[k], usual))
+        if length >= (_LONGER if k == 0 else _PARTED) * longest:
+            found = longest
     return found
+
+
+def gaps_in(ranked: Array, times: float, least: float) -> NDArray[np.intp]:
+    """Places behind which lengths [s], the longest first, leave a gap: it is so many `times` the next one, and no less than `least` [s].
+
+    Shape (gaps,), increasing.
+    """
+    return np.flatnonzero(ranked[:-1] >= np.maximum(times * ranked[1:], least))
 
 
 def _usual(starts: NDArray[np.intp], stops: NDArray[np.intp], steps: int) -> float:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import jinja2
 
-from diagnosis.comparison.words import CHANGES, OUTCOMES, SIGNS, coverage_words, headline, times
+from diagnosis.comparison.words import CHANGES, OUTCOMES, SIGNS, are_several, coverage_words, headline, times
 from diagnosis.pages import labels
 from diagnosis.pages.environment import POLICY, environment, plain_style
 from diagnosis.pages.svg import icon
@@ -61,7 +61,7 @@ def build_compare_page(document: ComparisonDocument) -> str:
         "css": plain_style(_HERE / "compare.css"),
         "csp": POLICY,
         "worse": document["worse"],
-        "headline": headline(document["counts"]),
+        "headline": headline(document["counts"], several=are_several(document["faults"])),
         "missions": [_mission("older", document["older"]), _mission("newer", document["newer"])],
         "groups": groups,
         "coverage": [_coverage(c, machine_words) for c in document["coverage"]],

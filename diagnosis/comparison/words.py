@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
-from diagnosis.results.comparison_document import Change, CoverageChangeRow, SideCoverageRow
+from diagnosis.results.comparison_document import Change, CoverageChangeRow, FaultChangeRow, SideCoverageRow
 from diagnosis.results.durations import seconds_words
 from diagnosis.results.vocabulary import Tier
 
@@ -35,10 +35,16 @@ CHANGES: dict[Change, str] = {
 }
 
 
-def headline(counts: Mapping[str, int]) -> str:
-    """How many faults became what, in words."""
+def headline(counts: Mapping[str, int], *, several: bool = False) -> str:
+    """How many faults became what, in words; `several`: some stand for more than one of a mission, which count as one."""
     found = [f"{counts[name]} {words}" for name, words in OUTCOMES.items() if counts.get(name)]
-    return "Faults: " + ", ".join(found) if found else "No fault in either mission"
+    once = ", each part and kind once" if several else ""
+    return f"Faults{once}: " + ", ".join(found) if found else "No fault in either mission"
+
+
+def are_several(faults: Iterable[FaultChangeRow]) -> bool:
+    """Whether some rows of a comparison stand for more than one fault of a mission."""
+    return any(len(f["ids"]) > 1 for c in faults for f in (c["older"], c["newer"]) if f is not None)
 
 
 def times(count: int, seconds: float) -> str:

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 
-from diagnosis.decision.explained import explaining
+from diagnosis.decision.explained import Explanation, When, explaining
 from diagnosis.decision.open_checks import open_words
 from diagnosis.decision.severity import halved_words, often_dead, unanswered
 from diagnosis.decision.short import main_reason, main_state, short_parts, unjudged_axles
@@ -64,6 +64,8 @@ class Reservations:
         The commonest state of each part that is no judgement, while driving.
     uncommanded : bool
         Whether no command of any wheel is in the log.
+    twice : frozenset[Part]
+        Parts of which a second measurement is in the log.
     """
 
     short: tuple[Part, ...] = ()
@@ -80,6 +82,7 @@ class Reservations:
     words: MachineWords = HYDRAULIC
     open_state: Mapping[Part, State] = field(default_factory=dict)
     uncommanded: bool = False
+    twice: frozenset[Part] = frozenset()
 
 
 def smallest_loads(assessments: Mapping[Part, Assessment], words: MachineWords) -> tuple[str, ...]:
@@ -143,6 +146,11 @@ def _from_size(name: str, sizes: Sequence[float | None]) -> str:
     )
 
 
+def _named(by: Explanation, parts: Collection[Part]) -> bool:
+    """Whether the part of the fault that explains a check is among some."""
+    return (by.faults[0].component, by.faults[0].side.value) in parts
+
+
 def doubt_of(watch: Sequence[FaultInterval], against: Reservations) -> str:
     """Why a mission with faults to watch is not cleared; empty where it is."""
     by_part: dict[tuple[str, str], tuple[FaultInterval, str]] = {}
@@ -165,10 +173,13 @@ def doubt_of(watch: Sequence[FaultInterval], against: Reservations) -> str:
         out.append("the machine's settings do not fit the log")
     out += [cut.text for cut in against.scope]
     out += dict.fromkeys(event.doubt for event in against.events)
-    own = [c for c in against.open if (by := explaining(c, watch)) is None or not by.of_another]
-    if own:
-        out.append(open_words(own))
-    elif against.open:
+    why = {c: explaining(c, watch) for c in against.open}
+    own = [c for c, by in why.items() if by is None or not by.of_another]
+    # what a part that is named is off at another time goes with its fault
+    rest = [c for c in own if not ((by := why[c]) is not None and by.when is When.APART and _named(by, by_part))]
+    if rest:
+        out.append(open_words(rest))
+    elif against.open and not own:
         others = join_words(list(dict.fromkeys(c.component for c in against.open)))
         out.append(f"beside a fault nothing shows whether {others} {'are' if ' and ' in others else 'is'} healthy")
     return join_words(out[:_REASONS]) + (MORE if len(out) > _REASONS else "")

@@ -73,6 +73,7 @@ def _one(chain: Sequence[Finding], dt: float) -> Finding | None:
     more = f" and {len(chain) - _NAMED} more" if len(chain) > _NAMED else ""
     longest = max(chain, key=lambda f: f.stop - f.start)
     said = f"{len(chain)} pieces that touch look like {_count(chain)} rows in turn ({pieces}{more}): rather one fault that none of them describes."
+    of = f"What follows is of the longest of them, {longest.start * dt:.1f}–{longest.stop * dt:.1f} s."
     return replace(
         longest,
         start=chain[0].start,
@@ -82,7 +83,7 @@ def _one(chain: Sequence[Finding], dt: float) -> Finding | None:
         hypotheses=tuple(sorted((Hypothesis(*row, p) for row, p in rows.items()), key=lambda h: -h.p)),
         epsilon=None if FaultMode(best[1]).total else _size(chain),
         sat=None,
-        evidence=(said, *longest.evidence),
+        evidence=(said, of, *longest.evidence),
         course=(),
         detected=min(known) if known else None,
     )

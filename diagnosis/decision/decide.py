@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -16,18 +16,18 @@ from diagnosis.decision.caveats import (
     limits_of,
     smallest_loads,
 )
+from diagnosis.decision.decided import Decision
 from diagnosis.decision.endings import endings_of
 from diagnosis.decision.open_checks import open_words, stands_out
 from diagnosis.decision.sensors_alone import TITLES, sensors_alone
 from diagnosis.decision.severity import advised
-from diagnosis.decision.short import SAID_S, ToClear, beside_nothing, exempt_axles
+from diagnosis.decision.short import SAID_S, beside_nothing, exempt_axles
 from diagnosis.decision.to_clear import to_clear
 from diagnosis.decision.wording import actions_of, count_faults, join_words, misplaced_words, sentence_of
 from diagnosis.results.assessed import Cut, is_judged
 from diagnosis.results.assessment import STATES, Assessment
 from diagnosis.results.clearing import Check, Checked
 from diagnosis.results.detectability import Detectable
-from diagnosis.results.document import ActionRow, VerdictRow
 from diagnosis.results.durations import seconds_words
 from diagnosis.results.ending import Ending
 from diagnosis.results.left_out import only_left_out
@@ -48,56 +48,6 @@ _MOSTLY = 0.5
 _NO_YAW = "An offset of a steering sensor that is there from start to end, or grows slowly, does not show in this log; a yaw rate (imu.yaw_rate) would show it."
 
 _BESIDE_NOTHING = "No second speed to compare with"
-
-
-@dataclass(frozen=True)
-class Decision:
-    """The verdict and what to do.
-
-    Attributes
-    ----------
-    status : Verdict
-        The verdict.
-    title, text : str
-        Heading and sentence.
-    caveats : tuple[str, ...]
-        Sentences on what limits it.
-    actions : tuple[ActionRow, ...]
-        One for each part with a fault, most urgent first.
-    cleared : bool
-        Whether the machine may go out: ``ready``, or faults to watch in a mission that is ``ready`` but for them.
-    not_cleared : str
-        Why ``watch`` gives no such leave, to follow *not cleared:*; empty otherwise.
-    scope : tuple[Cut, ...]
-        Why what was judged is not the whole mission.
-    to_clear : tuple[ToClear, ...]
-        What stands against ``ready`` beside the faults, and what would clear it.
-    """
-
-    status: Verdict
-    title: str
-    text: str
-    caveats: tuple[str, ...] = ()
-    actions: tuple[ActionRow, ...] = ()
-    cleared: bool = False
-    not_cleared: str = ""
-    scope: tuple[Cut, ...] = ()
-    to_clear: tuple[ToClear, ...] = ()
-
-    def row(self, more_caveats: Sequence[str] = ()) -> VerdictRow:
-        """The same for ``report.json``, with caveats that do not come from the judgement."""
-        return {
-            "status": self.status,
-            "cleared": self.cleared,
-            "not_cleared": self.not_cleared,
-            "title": self.title,
-            "text": self.text,
-            "scope": [cut.text for cut in self.scope],
-            "cuts": [cut.row() for cut in self.scope],
-            "caveats": [*self.caveats, *more_caveats],
-            "actions": list(self.actions),
-            "to_clear": [x.row() for x in self.to_clear],
-        }
 
 
 def decide(
@@ -182,6 +132,7 @@ def decide(
         misplaced=tuple(misplaced),
         open_state=open_state or {},
         uncommanded=not commanded,
+        twice=frozenset(twice),
     )
     open_points = to_clear(against, assessments, decided_s, driven, axles, limits, intervals)
     found = _with_faults(intervals, against, endings_of(intervals, assessments, end_s)) or _without_faults(

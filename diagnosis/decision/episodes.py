@@ -109,7 +109,13 @@ def joined(findings: Sequence[Finding], sides: Mapping[str, Assessment], dt: flo
             groups[-1].append(f)
         else:
             groups.append([f])
-    return tuple(group[0] if len(group) == 1 else _episode(group, dt) for group in groups)
+    return tuple(group[0] if len(group) == 1 else _episode(group, dt, looks=_looks(group, sides)) for group in groups)
+
+
+def _looks(group: Sequence[Finding], sides: Mapping[str, Assessment]) -> bool:
+    """Whether anything between the pieces of one fault looks healthy."""
+    known = [sides[s.value].states for s in group[0].side.sides if s.value in sides]
+    return any(bool(np.any(x[a.stop : b.start] == CODE[State.HEALTHY])) for a, b in pairwise(group) for x in known)
 
 
 def _with_edges(findings: Sequence[Finding], dt: float) -> list[Finding]:
@@ -255,8 +261,8 @@ def _same_value(a: Finding, b: Finding) -> bool:
     return a.sat.low - spare <= b.sat.high and b.sat.low - spare <= a.sat.high
 
 
-def _episode(group: Sequence[Finding], dt: float) -> Finding:
-    """One finding for several, with what the longest shows and the course of all."""
+def _episode(group: Sequence[Finding], dt: float, *, looks: bool) -> Finding:
+    """One finding for several, with what the longest shows and the course of all; `looks`: something between them looks healthy."""
     length = np.array([f.stop - f.start for f in group], dtype=np.float64)
     longest = group[int(np.argmax(length))]
     best = max(group, key=lambda f: f.probability)
@@ -264,11 +270,13 @@ def _episode(group: Sequence[Finding], dt: float) -> Finding:
     spans = [f"{f.start * dt:.1f}–{f.stop * dt:.1f} s{'' if one_size else _lost(f)}" for f in group[:_NAMED]]
     more = f" and {len(group) - _NAMED} more" if len(group) > _NAMED else ""
     between = (
-        "hardly anything changed, as would show it"
+        "between them hardly anything changed, as would show it"
         if _late_s(longest) > 0.0
-        else "nothing healthy was seen of this part"
+        else "what looks healthy between them is too brief, or would show too little of it, to make several of it"
+        if looks
+        else "between them nothing healthy was seen of this part"
     )
-    course = f"It shows in {len(group)} stretches ({', '.join(spans)}{more}); between them {between}: one fault."
+    course = f"It shows in {len(group)} stretches ({', '.join(spans)}{more}); {between}: one fault."
     known = [f.detected for f in group if f.detected is not None]
     return replace(
         longest,

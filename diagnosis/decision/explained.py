@@ -23,6 +23,7 @@ class When(Enum):
     MISSION = ("In a mission with", "")
     DURING = ("At the time of", ", at {its} time")
     AFTER = ("Just after", ", just after {it}")
+    APART = ("Of the same part as", ", at another time")
 
     @property
     def before(self) -> str:
@@ -74,7 +75,8 @@ class Explanation:
 def explaining(check: Checked, faults: Sequence[FaultInterval]) -> Explanation | None:
     """What may explain why a check deviates: a fault of the same component before others, and of others all; None where nothing does.
 
-    A fault lasts for a good part of the check's window, or ended just before; what an axle's angle jumps by has no such aftermath.
+    A fault lasts for a good part of the check's window, or ended just before; what an axle's angle jumps by has no such aftermath. What a part
+    is off its own second measurement by at another time goes with its fault, which is to be checked anyway.
     """
     start, stop = check.start_s, check.stop_s
     counted = [f for f in faults if f.severity is not Severity.INFO and _may(check, f)]
@@ -87,6 +89,11 @@ def explaining(check: Checked, faults: Sequence[FaultInterval]) -> Explanation |
     counted = [f for f in counted if share[f.id] >= MAY_EXPLAIN]
     if check.check is Check.JUMP:
         counted = [f for f in counted if lasts_in(start, stop, (f.start_s, f.stop_s))]
+    if not counted and check.check is Check.SECOND_MEASUREMENT:
+        own = [f for f in faults if f.component == check.component and check.side in f.side.sides]
+        own = [f for f in own if f.severity is not Severity.INFO]
+        near = min(own, key=lambda f: max(f.start_s - stop, start - f.stop_s), default=None)
+        return None if near is None else Explanation((near,), False, When.APART)
     counted.sort(key=lambda f: (f.component == check.component, _compared(check, f), share[f.id]), reverse=True)
     return _of(check, counted) if counted else None
 

@@ -12,8 +12,9 @@ from diagnosis.channels.noise import rounding_step
 from diagnosis.decision.missing import applies, cost_of_missing
 from diagnosis.decision.scale import Scale
 from diagnosis.results.assessment import Assessment
-from diagnosis.results.document import ClockRow, MissingRow, QualityRow, SignalRow
+from diagnosis.results.document import MissingRow, QualityRow, SignalRow
 from diagnosis.results.left_out import is_left_out
+from diagnosis.results.log_rows import ClockRow
 from diagnosis.results.machine_words import MachineWords
 from diagnosis.results.wheel_model import WheelModelFit
 from replay.arrays.blocks import blocks, release

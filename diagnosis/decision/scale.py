@@ -62,11 +62,19 @@ class Scale(NamedTuple):
         What sensors of the body say; empty where none does.
     assumed : bool
         Whether the diameter is the paper's machine's, as no machine file gave this one's.
+    by : float
+        What the first speeds were multiplied by beside the second ones, before they were judged [1].
     """
 
     diameter: float | None
     found: tuple[Scaled, ...]
     assumed: bool = False
+    by: float = 1.0
+
+    @property
+    def explained(self) -> bool:
+        """Whether what contradicts it is what the second speeds said already."""
+        return self.by != 1.0 and all(agrees(s.factor / self.by) for s in self.wrong)
 
     @property
     def wrong(self) -> tuple[Scaled, ...]:
@@ -76,7 +84,7 @@ class Scale(NamedTuple):
     @property
     def gross(self) -> str:
         """A sentence where the contradiction is beyond any slip, and may be the machine file's; else empty."""
-        return self.sentence if self._gross and not self._turn else ""
+        return self.sentence if self._gross and not self._turn and not self.explained else ""
 
     @property
     def _gross(self) -> bool:
@@ -195,9 +203,9 @@ def scale_of(cells: Cells, units: Collection[str], *, factor: float = 1.0) -> Sc
     found: tuple[Scaled, ...] = ()
     if np.isfinite(speeds).any():
         found = tuple(_straight(cells, speeds))
-        found = (*found, *_turning(cells, speeds, factor, tuple(s.by for s in found if _agrees(s.factor * factor))))
+        found = (*found, *_turning(cells, speeds, factor, tuple(s.by for s in found if agrees(s.factor * factor))))
     found = tuple(s._replace(factor=s.factor * factor) for s in found)
-    return Scale(diameter, found, assumed="geometry" in machine.assumed)
+    return Scale(diameter, found, "geometry" in machine.assumed, factor)
 
 
 def _straight(cells: Cells, speeds: Array) -> Iterator[Scaled]:
@@ -215,7 +223,8 @@ def _straight(cells: Cells, speeds: Array) -> Iterator[Scaled]:
             yield Scaled(body.name, factor, "")
 
 
-def _agrees(factor: float) -> bool:
+def agrees(factor: float) -> bool:
+    """Whether a factor [1] is none, but for what tyres slip and wear by."""
     return abs(float(np.log(factor))) < _SLIPS
 
 

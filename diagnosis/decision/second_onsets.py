@@ -20,6 +20,7 @@ Part = tuple[str, str]
 _NEEDED = ("residual", "threshold", "expected")
 _AROUND_S = {Tier.DIRECT: 0.0}  # second measurements show an onset to the sample; models, by seconds
 _AROUND_BY_MODELS_S = 1.5
+_AT_THE_EDGE = 2  # samples: an onset so near the first of the readings that are stepped over is rather before them
 _MOST = 40  # findings of a mission, the surest first: what is computed again here costs time
 
 
@@ -97,14 +98,25 @@ def _said(asked: _Around, found: Second | None, dt: float) -> str:
             "A second filter (filterpy), stepped over the readings around the onset, sees none there that stands out."
         )
     off = (first + found.place * stride - start) * dt
+    if off < 0 and first > 0 and found.place <= _AT_THE_EDGE:
+        return (
+            f"A second filter (filterpy), stepped over the readings around it, sees no onset among them: by its models those of {_size(off)} before it fit "
+            "the fault better than a healthy part already."
+        )
     when = (
         f"A second filter (filterpy), stepped over the readings around it, sees the onset at {start * dt + off:.3f} s"
     )
     if abs(off) < 0.5 * dt * stride:
         return f"{when}: the same {'sample' if stride == 1 else 'moment'}."
-    size = f"{1e3 * abs(off):.0f} ms" if abs(off) < 1.0 else f"{abs(off):.1f} s"
     fit = "a healthy part better than the fault" if off > 0 else "the fault better than a healthy part"
-    return f"{when}: {size} {'later' if off > 0 else 'earlier'}, for by its models the readings between fit {fit}."
+    return (
+        f"{when}: {_size(off)} {'later' if off > 0 else 'earlier'}, for by its models the readings between fit {fit}."
+    )
+
+
+def _size(off: float) -> str:
+    """A time [s] in words, without its sign."""
+    return f"{1e3 * abs(off):.0f} ms" if abs(off) < 1.0 else f"{abs(off):.1f} s"
 
 
 def _steps(a: Assessment, first: int, last: int) -> tuple[Array, ...] | None:

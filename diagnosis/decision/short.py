@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from diagnosis.decision.short_advice import act_of_axle, act_of_wheel, lack_of, steering_signals
 from diagnosis.decision.wording import join_words
 from diagnosis.results.assessed import is_judged, needed_s
 from diagnosis.results.assessment import STATES, Assessment, Lack
@@ -22,8 +23,6 @@ Part = tuple[str, str]
 SAID_S = 0.05  # of judged driving: less is nothing
 #: Why a part was not judged where a finding leaves it as probable that it is healthy.
 AS_WELL_HEALTHY = "what was found there may as well be no fault"
-_OPENING_UNIT = "correct the unit of {kind}.{{c}}.u and {kind}.{{c}}.u_applied under [signals] in a machine file"
-_WITH_COMMAND = "record again, with wheel.{c}.u (the {valve} command) in the log all the time"
 
 
 @dataclass(frozen=True)
@@ -101,9 +100,9 @@ def short_parts(
         state = (open_state or {}).get(part) or main_state(assessments[part])
         reason = _why_short(assessments[part], driven.get(part), limits, state)
         act = (
-            _act(part, assessments[part], driven.get(part), limits, words, state)
+            act_of_wheel(part, assessments[part], driven.get(part), limits, words, state)
             if kind is Kind.WHEEL
-            else _act_of_axle(part[1], state, _lack(assessments[part], state))
+            else act_of_axle(part[1], state, lack_of(assessments[part], state))
         )
         alike.setdefault((reason, act, decided_s.get(part, 0.0) < SAID_S), []).append(part)
     out = []
@@ -140,22 +139,15 @@ def unjudged_axles(axles: Sequence[Part], assessments: Mapping[Part, Assessment]
     first = assessments[axles[0]]
     state = main_state(first)
     reason = main_reason(first, state)
-    lack = _lack(first, state)
+    lack = lack_of(first, state)
     act = (
-        _act_of_axle(axles[0][1], state, lack).replace("{c}", _components(axles))
+        act_of_axle(axles[0][1], state, lack).replace("{c}", _components(axles))
         if lack is Lack.OPENING_UNIT
-        else f"log {_steering_signals(lack, words)}, and steer from stop to stop twice while driving"
+        else f"log {steering_signals(lack, words)}, and steer from stop to stop twice while driving"
         if lack in (Lack.SIGNALS, Lack.COMMAND)
         else "steer from stop to stop twice at standstill and several times while driving, with the log running"
     )
     return ToClear(f"Not judged: {who} ({reason}).", act, tuple(axles), why=reason)
-
-
-def _steering_signals(lack: Lack, words: MachineWords) -> str:
-    """What to log of a steering of which nothing is judged: where its angle is there, what turns it alone."""
-    if lack is not Lack.COMMAND:
-        return "steer.*.phi and steer.*.u"
-    return words.fill("steer.*.u (the command of its {valve}) or steer.*.u_applied")
 
 
 def exempt_axles(
@@ -221,11 +213,6 @@ def main_reason(assessment: Assessment, state: State | None) -> str:
     return "" if state is None else assessment.reasons.get(state, "")
 
 
-def _lack(assessment: Assessment, state: State | None) -> Lack | None:
-    """What is missing where a state is no judgement."""
-    return None if state is None else assessment.lacks.get(state)
-
-
 def main_state(assessment: Assessment) -> State | None:
     """The commonest state that is no judgement; a machine at rest is one only where nothing else is."""
     best, most = None, 0.0
@@ -242,81 +229,4 @@ def main_state(assessment: Assessment) -> State | None:
 
 def beside_nothing(assessment: Assessment) -> bool:
     """Whether a side was not judged because nothing in the log shows what it should read, rather than for too short."""
-    return _lack(assessment, main_state(assessment)) in (Lack.SECOND, Lack.BESIDE)
-
-
-def _act(
-    part: Part, assessment: Assessment, driven: float | None, limits: Limits, words: MachineWords, state: State | None
-) -> str:
-    """What somebody does to have a part judged; ``{who}`` and ``{c}`` are filled in by the parts that it holds for."""
-    sensor, tier, lack = part[1] == Side.SENSOR, assessment.tier, _lack(assessment, state)
-    if lack is Lack.OPENING_UNIT:
-        return _OPENING_UNIT.format(kind="wheel")
-    faster = f"faster than {limits.driving_speed:.3g} {words.speed_unit}"
-    if driven is not None and driven < limits.min_assessed and tier is not Tier.NONE:
-        return f"move {words.parts_moved} {faster} for at least {limits.min_assessed:g} s, and diagnose that log"
-    if tier is Tier.NONE:
-        return _of_silent(sensor, state, lack)
-    by_state = {
-        State.NO_DATA: _WITH_COMMAND
-        if lack is Lack.COMMAND
-        else "record again, with wheel.{c}.v and its command in the log all the time",
-        State.NOT_EXCITED: f"move {words.parts_moved} {faster} for at least {limits.min_assessed:g} s",
-        State.MASKED: words.fill("repair the {wheel.sensor} first, then record a mission again"),
-        State.SLIP: "drive straight ahead on ground with grip for at least 10 s",
-    }
-    if state in by_state:
-        return words.fill(by_state[state])
-    second = "wheel.{c}.v_true (a second speed)"
-    by_tier = {
-        Tier.DIRECT: "log both measurements by one clock, with finer steps"
-        if sensor
-        else words.fill("hold each {valve} command for a second or longer, or log at a higher rate"),
-        Tier.DRIVE: "run `mfhca fit` on healthy missions of this machine, and diagnose with the file that it writes (-m)",
-        Tier.RESPONSE: f"log {second}"
-        if sensor
-        else words.fill(
-            "lift the machine, run each drive alone at one speed for 10 s, and compare their currents; or log the command of the "
-            "{valve} itself (wheel.{c}.u), or name it under [signals] if it is logged"
-        ),
-        Tier.TRACKING: f"log the commands (/cmd_vel of a ROS robot; cmd.v or wheel.{{c}}.v_ref) or {second}"
-        if lack is Lack.BESIDE
-        else words.fill("log wheel.{c}.u (the {valve} command) or ") + second,
-    }
-    if lack is Lack.DRIVE:
-        return words.fill(
-            "look whether the {wheel} has a {valve} at all: one that has is without power, or its effort is not logged"
-        )
-    if lack is Lack.ECHO:
-        return words.fill("record what the {wheels} measure (/joint_states, encoder counts) as wheel.{c}.v")
-    if lack is Lack.ANSWER:
-        return f"drive for a minute and longer with several speeds, turns and stops, and diagnose that log; or log {second}"
-    if lack is Lack.UNIT:
-        return "correct the unit or the channel of wheel.{c}.v and of its command under [signals] in a machine file"
-    if tier in by_tier:
-        return by_tier[tier]
-    if lack is Lack.COMMAND:
-        return words.fill(_WITH_COMMAND)
-    other = second if sensor else f"wheel.{{c}}.u_applied (the {words.position})"
-    return f"log {other}; without it, drive straight at three steady speeds for 10 s each"
-
-
-def _act_of_axle(side: str, state: State | None, lack: Lack | None) -> str:
-    """What somebody does to have a part of an axle judged."""
-    if state is State.MASKED:
-        return "repair the steering sensor first, then record a mission again"
-    if lack is Lack.OPENING_UNIT:
-        return _OPENING_UNIT.format(kind="steer")
-    if lack is Lack.SECOND:
-        second = (
-            "phi_true (a second angle)" if side == Side.SENSOR else "u_applied (the second measurement of its command)"
-        )
-        return f"steer from stop to stop several times while driving, or log steer.{{c}}.{second}"
-    return "steer from stop to stop several times while driving"
-
-
-def _of_silent(sensor: bool, state: State | None, lack: Lack | None) -> str:
-    """What to log for a part of which nothing is judged."""
-    if state is State.NO_DATA or lack is Lack.COMMAND:
-        return "log wheel.{c}.v" if sensor else "log wheel.{c}.u"
-    return "log wheel.{c}.u or wheel.{c}.v_ref" if sensor else "log wheel.{c}.v"
+    return lack_of(assessment, main_state(assessment)) in (Lack.SECOND, Lack.BESIDE)

@@ -6,6 +6,7 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 
 from diagnosis.decision.caveats import Reservations, doubts_of
+from diagnosis.decision.check_advice import COMPARE, STEER, TURNED, act_of
 from diagnosis.decision.explained import Explanation, explaining
 from diagnosis.decision.open_checks import furthest_first
 from diagnosis.decision.short import Part, ToClear, short_parts, sides_of, unjudged_axles
@@ -21,9 +22,6 @@ from replay.faults import Side, State
 from replay.machine.config import Limits
 
 _NAMED = 2  # open checks
-_STEER = "steer from stop to stop twice at standstill, and watch whether the axle follows"
-_STEERED = (Check.STILL, Check.RATE, Check.LASTING_RATE)
-_TURNED = (Check.YAW, Check.LASTING_YAW)
 
 
 def to_clear(
@@ -76,6 +74,7 @@ def to_clear(
     # of a faulty part the fault is what is to be checked, unless it was judged too briefly alone
     short = [p for p in against.short if p not in blamed_parts] or against.short
     out += short_parts(short, assessments, decided_s, driven, limits, words, open_state=against.open_state)
+    twice = against.twice | {part for part, a in assessments.items() if a.tier is Tier.DIRECT}
     if against.unexplained:
         for kind, second in (
             (Kind.WHEEL, "wheel.*.v_true (a second speed)"),
@@ -85,17 +84,16 @@ def to_clear(
             if not parts:
                 continue
             who = words.listed(kind, [(c, Side.SENSOR_OR_ACTUATOR) for c in sorted(parts)])
-            logged = all(
-                p in assessments and assessments[p].tier is Tier.DIRECT for p in ((c, "actuator") for c in parts)
-            )
-            asked = words.drive == "valve" and kind is Kind.WHEEL and not logged
-            other = " or wheel.*.u_applied (the valve position)" if asked else ""
+            asked = words.drive == "valve" and kind is Kind.WHEEL and not all((c, "actuator") in twice for c in parts)
+            wanted = [] if all((c, "sensor") in twice for c in parts) else [second]
+            wanted += ["wheel.*.u_applied (the valve position)"] if asked else []
+            act = f"log {' or '.join(wanted)}" if wanted else COMPARE
             out.append(
                 ToClear(
                     f"{who}: no single fault explains the residual.",
-                    f"log {second}{other}: parts fail one at a time, so that what several {_several(kind, words)} leave unexplained is rather the model's"
+                    f"{act}: parts fail one at a time, so that what several {_several(kind, words)} leave unexplained is rather the model's"
                     if len(parts) > 1
-                    else f"inspect these parts, and log {second}{other}",
+                    else f"inspect these parts, and {act}",
                     sides_of((c, Side.SENSOR_OR_ACTUATOR) for c in sorted(parts)),
                 )
             )
@@ -148,18 +146,20 @@ def to_clear(
     out += _of_doubts(faults, words)
     at_rest = {k for k, state in against.open_state.items() if state is State.NOT_EXCITED}  # exempt: its checks count
     brief = [k for k in steered if k not in {*unjudged, *at_rest} and _brief(k, decided_s, driven, limits)]
-    twice = {c for (c, side), a in assessments.items() if a.tier is Tier.DIRECT and side == Side.SENSOR}
+    seen_twice = {c for c, side in twice if side == Side.SENSOR}
     blamed = {k: by for k, c in enumerate(against.open) if (by := explaining(c, faults)) is not None}
     deviating = _of_faults([(against.open[k], by) for k, by in blamed.items()], faults, words)
     told = {component for component, _ in (*unjudged, *brief)}  # what has them judged lets their checks pass
     left = [c for k, c in enumerate(against.open) if k not in blamed and not _waits_for_unit(c, assessments)]
-    deviating += _of_checks([c for c in left if c.component not in told or not _asks_for_steering(c, twice)], twice)
+    deviating += _of_checks(
+        [c for c in left if c.component not in told or not _asks_for_steering(c, seen_twice)], seen_twice
+    )
     ranks = {check: k for k, check in enumerate(furthest_first(against.open))}
     out += [point for _, point in sorted(deviating, key=lambda d: ranks[d[0]])]
     out += short_parts(brief, assessments, decided_s, driven, limits, words, Kind.STEER, open_state=against.open_state)
     out += [] if first else dark
     open_for_steering = {
-        c.component for c in left if _asks_for_steering(c, twice)
+        c.component for c in left if _asks_for_steering(c, seen_twice)
     }  # which has the parts judged as well
     at_rest -= {k for k in at_rest if k[0] in open_for_steering}
     rested = [k for k in steered if k in at_rest and k not in unjudged and _brief(k, decided_s, driven, limits)]
@@ -182,7 +182,7 @@ def _waits_for_unit(check: Checked, assessments: Mapping[Part, Assessment]) -> b
 
 def _asks_for_steering(check: Checked, twice: Collection[str]) -> bool:
     """Whether a check is open for want of steering alone: nothing deviates, and steering would let it pass."""
-    return check.worst is None and _act(check, twice) == _STEER
+    return check.worst is None and act_of(check, twice) == STEER
 
 
 def _brief(part: Part, decided_s: Mapping[Part, float], driven: Mapping[Part, float], limits: Limits) -> bool:
@@ -255,12 +255,12 @@ def _of_checks(checks: Sequence[Checked], twice: Collection[str]) -> list[tuple[
     alike: dict[str, list[Checked]] = {}
     same: dict[str, list[Checked]] = {}
     for first in worst.values():
-        act = _act(first, twice)
+        act = act_of(first, twice)
         same.setdefault(act, []).append(first)
         told = alike.setdefault(act, [])
         if first.check is Check.LASTING_RATE and told:
             continue  # one axle against the other: said of the one is said of both
-        turned = told if first.check in _TURNED else []
+        turned = told if first.check in TURNED else []
         twin = next((k for k, c in enumerate(turned) if replace(c, component=first.component).text == first.text), None)
         if twin is None:
             told.append(first)
@@ -283,44 +283,6 @@ def _some(texts: Sequence[str]) -> str:
     """The first reasons, and how many more there are."""
     rest = len(texts) - _NAMED
     return "; ".join([*texts[:_NAMED], *([f"and {count_words(rest, 'more check')}"] if rest > 0 else [])])
-
-
-def _act(check: Checked, twice: Collection[str]) -> str:
-    """What shows whether a part is sound that a check does not clear."""
-    words: MachineWords = check.words
-    if check.check in _TURNED:
-        return "set the axles straight, compare their angles with the marks on the machine, and drive ten seconds straight ahead"
-    if check.check is Check.ANGLE_SCALE:
-        return words.fill(
-            f"log steer.{check.component}.u (the {{valve}} command), steer.{check.component}.phi_true (a second angle) or imu.yaw_rate"
-        )
-    if check.check is Check.PLANT_RATE and check.worst is None:
-        return (
-            "run `mfhca fit` on healthy missions, and diagnose with the file that it writes (-m), or log "
-            f"steer.{check.component}.phi_true and .u_applied (second measurements)"
-        )
-    if check.check in _STEERED or check.kind == Kind.STEER:
-        return _STEER
-    if check.check is Check.CARRIED:
-        return (
-            f"log wheel.*.u_applied (the {words.drive}'s own measurement), or lift the machine, give every {words.part} the same "
-            "command for 10 s, and diagnose that log"
-        )
-    if check.check is Check.BEHIND:
-        return (
-            f"lift the machine, release the brakes and turn every {words.part} by hand; no log of these "
-            "signals clears this"
-        )
-    if check.check is Check.SECOND_MEASUREMENT and check.worst is not None:
-        return "compare both measurements at one steady speed with a third one, such as a hand tachometer, then repair or rescale the one that is off"
-    if check.check is Check.ROUGHNESS and check.worst is not None:
-        return words.fill(
-            "check the connector, the cable and the target of the {wheel.sensor}, and drive the same again"
-        ) + ("" if check.component in twice else "; a log with wheel.*.v_true (a second speed) settles it")
-    if check.worst is None:
-        return f"move all {words.parts} together at one steady speed for at least 10 s, and diagnose that log"
-    lifted = f"lift the machine, give every {words.part} the same command for 10 s, and compare their speeds with a hand tachometer"
-    return lifted if check.component in twice else f"{lifted}; a log with wheel.*.v_true (a second speed) settles it"
 
 
 def _sentence(text: str) -> str:

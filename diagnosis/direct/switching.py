@@ -9,12 +9,15 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
+from numpy.typing import NDArray
 
 from diagnosis.channels.sample_status import PAIR
 from diagnosis.direct.identification import IdentifiedPair
 from diagnosis.direct.low_speed import left_open
 from diagnosis.results.assessment import Assessment, Finding
 from replay.faults import FaultMode
+
+Array = NDArray[np.float64]
 
 _SPIKES, _OUTLIER, _EXPLAINED = 0.15, 6.0, 0.8  # of the samples; times the usual deviation; of the power
 _ALIKE, _VALVES = 2.0, 2  # times as large at most; so many
@@ -84,14 +87,9 @@ def _at_one_opening(one: IdentifiedPair, f: Finding) -> bool:
     use = (status == PAIR) & np.isfinite(y) & np.isfinite(x)
     if f.mode is not FaultMode.NOISY or not use.any():
         return False
-    off, asked = (y - x)[use], x[use]
-    centred = off - np.median(off)
-    spikes = np.abs(centred) > max(_OUTLIER * 1.4826 * float(np.median(np.abs(centred))), 1e-9)
-    if not spikes.any():
-        return False
-    explained = float(np.sum(centred[spikes] ** 2)) > _EXPLAINED * float(np.sum(centred**2))
-    sizes = np.abs(centred[spikes])
-    if not explained or float(np.max(sizes)) > _ALIKE * float(np.min(sizes)):
+    asked = x[use]
+    sizes, spikes, explained = _outliers((y - x)[use])
+    if not explained or float(np.max(sizes[spikes])) > _ALIKE * float(np.min(sizes[spikes])):
         return False
     low, high = (float(z) for z in (np.min(asked[spikes]), np.max(asked[spikes])))
     there = float(np.mean((asked >= low) & (asked <= high)))
@@ -102,11 +100,15 @@ def _spikes(one: IdentifiedPair, f: Finding) -> float | None:
     """Size of the spikes that make a position's noise [unit]; None where it is no such noise."""
     y, x, status, *_ = one.samples.part(f.start, f.stop)
     use = (status == PAIR) & np.isfinite(y) & np.isfinite(x)
-    off = (y - x)[use]
-    if not off.size:
+    if not use.any():
         return None
-    centred = np.abs(off - np.median(off))
-    spikes = centred > max(_OUTLIER * 1.4826 * float(np.median(centred)), 1e-9)
-    few = 0 < np.count_nonzero(spikes) <= _SPIKES * off.size
-    explained = few and np.sum(centred[spikes] ** 2) > _EXPLAINED * np.sum(centred**2)
-    return float(np.median(centred[spikes])) if explained else None
+    sizes, spikes, explained = _outliers((y - x)[use])
+    few = np.count_nonzero(spikes) <= _SPIKES * sizes.size
+    return float(np.median(sizes[spikes])) if few and explained else None
+
+
+def _outliers(off: Array) -> tuple[Array, NDArray[np.bool_], bool]:
+    """How far deviations lie from their median, which of them are spikes, each of shape (n,), and whether these make up nearly all of it."""
+    sizes = np.abs(off - np.median(off))
+    spikes = sizes > max(_OUTLIER * 1.4826 * float(np.median(sizes)), 1e-9)
+    return sizes, spikes, bool(spikes.any() and np.sum(sizes[spikes] ** 2) > _EXPLAINED * np.sum(sizes**2))

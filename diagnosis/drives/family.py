@@ -7,7 +7,7 @@ import numpy as np
 from diagnosis.drives.assess import assess_drive
 from diagnosis.drives.inputs import DriveData, drive_data
 from diagnosis.evidence import ACTUATOR, SENSOR, Contribution, MissionView, Part
-from diagnosis.results.assessment import Assessment, unassessed
+from diagnosis.results.assessment import Assessment, Lack, unassessed
 from diagnosis.results.vocabulary import Tier
 from replay.faults import State
 
@@ -27,7 +27,7 @@ class DriveEvidence:
             if mission.machine.geometry is not None and wheel not in mission.machine.drives:
                 # wheels of one body under one pump push each other: alone, none of them can be told from the others
                 why = "no model of the {wheels} could be found in this mission"
-                both = (unassessed(mission.timeline.size, State.NOT_ASSESSED, why),) * 2
+                both = (unassessed(mission.timeline.size, State.NOT_ASSESSED, why, Lack.ANSWER),) * 2
             else:
                 both = assess_drive(drive, mission.machine.limits)
             parts[wheel, SENSOR], parts[wheel, ACTUATOR] = both

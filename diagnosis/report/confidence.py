@@ -11,7 +11,7 @@ from diagnosis.results.document import IntervalRow, ReportDocument, VerdictRow
 from diagnosis.results.fault_rows import state_label
 from diagnosis.results.limited import MOST_CLAIMED
 from diagnosis.results.machine_words import words_of
-from diagnosis.results.vocabulary import Kind, Leave, Severity, Tier, Verdict
+from diagnosis.results.vocabulary import NOT_CLEARED, Kind, Leave, Severity, Tier, Verdict
 from replay.faults import Side, State
 
 _WORDS = ((0.99, "Practically certain"), (0.9, "Very likely"), (0.7, "Likely"))
@@ -185,7 +185,7 @@ def _label(report: ReportDocument) -> str:
     """Words of a verdict: where every part of a wheel was judged, it is not that which is missing."""
     status, wheels = Verdict(report["verdict"]["status"]), _wheel_sides(report)
     judged_all = bool(wheels) and all(s.long_enough for s in wheels)
-    return "Not cleared" if status is Verdict.NOT_ASSESSED and judged_all else status.label
+    return NOT_CLEARED if status is Verdict.NOT_ASSESSED and judged_all else status.label
 
 
 def going_out(report: ReportDocument) -> tuple[str, str]:

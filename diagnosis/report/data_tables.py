@@ -7,21 +7,16 @@ from typing import Any
 
 from diagnosis.pages.labels import bounded, grouped, number
 from diagnosis.report.judged_parts import kind_of
+from diagnosis.report.units import DEGREES, on_page
 from diagnosis.results.clearing import MAY_EXPLAIN, Check, lasts_in, share_covered, size_words
 from diagnosis.results.clearing_rows import ClearingRow
-from diagnosis.results.document import (
-    FileRow,
-    IntervalRow,
-    MissingRow,
-    ReportDocument,
-    SignalRow,
-)
+from diagnosis.results.document import IntervalRow, MissingRow, ReportDocument, SignalRow
 from diagnosis.results.fault_rows import state_label
+from diagnosis.results.log_rows import FileRow
 from diagnosis.results.loop_rows import LoopRow, MetricsRow
 from diagnosis.results.machine_words import MachineWords, words_of
 from diagnosis.results.vocabulary import Severity
 from replay.faults import FAULT_STATES, UNDECIDED, Side, State
-from replay.machine.quantities import OPENING
 
 #: What the template is given.
 Context = dict[str, Any]
@@ -148,7 +143,8 @@ _SHARES = ("min_probability", "clear_at")
 def limit_rows(report: ReportDocument, words: MachineWords) -> list[tuple[str, str]]:
     """Limits of the machine file with their units."""
     out = []
-    angles = ", of angles in rad" if report["machine"]["axles"] else ""
+    min_sat = report["limits"]["min_sat"]
+    angles = f", of angles {number(DEGREES * min_sat)}°" if report["machine"]["axles"] else ""
     for key, value in report["limits"].items():
         unit = _LIMIT_UNITS.get(key, "").replace("{speed}", words.speed_unit).replace("{angles}", angles)
         size = value if isinstance(value, float) else float("nan")
@@ -173,9 +169,8 @@ def loop_tables(metrics: MetricsRow, words: MachineWords) -> Context:
 
 def signal_row(signal: SignalRow, words: MachineWords) -> Context:
     """One signal as the table shows it."""
-    unit, recorded, missing, step = signal["unit"], signal["recorded_unit"], signal["missing_share"], signal["lsb"]
-    if unit in (OPENING, words.unit(OPENING)):
-        unit, step = words.percent.strip(), None if step is None else 100 * step
+    recorded, missing, step = signal["recorded_unit"], signal["missing_share"], signal["lsb"]
+    unit, scale = on_page(signal["unit"], words)
     return {
         "name": signal["name"],
         "channel": signal["channel"] or "–",
@@ -184,7 +179,7 @@ def signal_row(signal: SignalRow, words: MachineWords) -> Context:
         "samples": grouped(signal["samples"]),
         "gaps": f"{signal['gaps']}, longest {number(signal['longest_gap_s'])} s" if signal["gaps"] else "none",
         "missing": "–" if missing is None else f"{100 * missing:.2g} %",
-        "lsb": f"{number(step)} {unit}" if step else "–",
+        "lsb": f"{number(scale * step)} {unit}" if step else "–",
         "found": "guessed" if signal["guessed"] else "given",
         "poor": missing is not None and missing > 0.01,
     }

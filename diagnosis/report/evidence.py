@@ -10,6 +10,7 @@ from markupsafe import Markup
 from diagnosis.pages.labels import clock, grouped, number
 from diagnosis.report.compared_channels import Pair, pair_of, rests_on, shape_sentence
 from diagnosis.report.edges import edge_of, edge_words, time_words
+from diagnosis.report.momentary import momentary_words
 from diagnosis.report.panels import course_picture, edge_picture
 from diagnosis.report.plot_rows import course_rows
 from diagnosis.report.rows import Columns, Row
@@ -50,6 +51,8 @@ class Evidence:
         Pictures of onset and end, and of the whole fault.
     note : str
         What keeps the pictures from showing every recorded sample.
+    momentary : str
+        Which row is the most probable from moment to moment, where that is not the stated one; else empty.
     """
 
     rests: str
@@ -59,6 +62,7 @@ class Evidence:
     edges: tuple[Panel, ...]
     course: tuple[Panel, ...]
     note: str
+    momentary: str = ""
 
 
 def evidence_of(
@@ -109,6 +113,7 @@ def evidence_of(
             edges,
             course,
             note,
+            momentary_words(fault, columns, axis, per),
         )
     return out
 

@@ -12,7 +12,7 @@ from markupsafe import Markup
 from diagnosis.pages.labels import span
 from diagnosis.pages.svg import badge, text
 from diagnosis.report.standing import Standing, standings_of
-from diagnosis.results.candidates import label_of
+from diagnosis.results.candidates import label_of, symbol_of
 from diagnosis.results.document import IntervalRow, ReportDocument, WheelPlace
 from diagnosis.results.machine_words import HYDRAULIC, MachineWords, words_of
 from diagnosis.results.vocabulary import Kind, Severity
@@ -77,7 +77,7 @@ def condition(
         )
         heading = name[0].upper() + name[1:]
         title = f"{component}: {name} {label}, {length}{''.join(f', {x}' for x in more)}"
-        return Condition(worst["mode"], (heading, label, length, *more), worst["id"], title)
+        return Condition(symbol_of(worst), (heading, label, length, *more), worst["id"], title)
     own = {words.part_name(kind, side): how for (c, side), how in standings.items() if c == component}
     open_ = {name: how for name, how in own.items() if how is not Standing.CLEARED}
     if own and not open_:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from diagnosis.pages.labels import number
 from diagnosis.pages.svg import badge, text
+from diagnosis.results.candidates import symbol_of
 from diagnosis.results.document import IntervalRow
 
 _MARKS = 24
@@ -80,7 +81,7 @@ def path_picture(
             Markup(
                 '<g class="mark {m}" data-f="{id}" role="button" tabindex="0" aria-label="{id} on the path"'
                 ' transform="translate({x:.1f},{y:.1f})"><circle class="area" r="20"/><circle class="ring" r="12"/><text y="3.6">{id}</text>{b}</g>'
-            ).format(m=fault["mode"], id=fault["id"], x=cx, y=cy, b=badge(fault["mode"], 10, -9, 11))
+            ).format(m=symbol_of(fault), id=fault["id"], x=cx, y=cy, b=badge(symbol_of(fault), 10, -9, 11))
         )
     first, last = np.flatnonzero(good)[[0, -1]].tolist()
     ends = [(float(px[k]), float(py[k])) for k in (first, last)]

@@ -34,7 +34,7 @@ from diagnosis.report.edges import time_words
 from diagnosis.report.fault_times import times_words
 from diagnosis.report.judged_parts import judged_sides
 from diagnosis.report.second_measurements import JOINT, by_position, second_of
-from diagnosis.results.candidates import label_of
+from diagnosis.results.candidates import UNCLEAR, candidates_of, label_of, symbol_of
 from diagnosis.results.document import (
     PAPER_DEFAULTS,
     ActionRow,
@@ -104,7 +104,10 @@ def context(report: ReportDocument, duration: float) -> Context:
         "limits": limit_rows(report, words),
         "tool": f"{tool['name']} {tool['version']}",
         "schema": report["schema"],
-        "modes": [(m, mode_legend(m)) for m in FaultMode],
+        "modes": [
+            *((m, mode_legend(m)) for m in FaultMode),
+            *([("warning", UNCLEAR.capitalize())] if any(candidates_of(f) for f in report["intervals"]) else []),
+        ],
         "lines": (State.HEALTHY, *(s for s in UNDECIDED if words.part == "wheel" or s is not State.SLIP)),
         "open_loop": log["open_loop"],
         "assumed": report["machine"]["assumed"],
@@ -151,6 +154,7 @@ def _fault(fault: IntervalRow, words: MachineWords, logged: Container[str]) -> C
     return {
         **fault,
         "label": label_of(fault),
+        "symbol": symbol_of(fault),
         "tier": JOINT
         if by_position(fault)
         else words.evidence(Tier(fault["tier"]), Kind(fault["kind"]), second_of(fault, logged)),
@@ -243,7 +247,7 @@ def _action(action: ActionRow, intervals: Mapping[str, IntervalRow], report: Rep
         "text": action["text"].removeprefix(action.get("lead", "")),
         "check": action.get("check", ""),
         "faults": faults,
-        "state": first["mode"] if first else "warning",
+        "state": symbol_of(first) if first else "warning",
         "severity": action["severity"],
         "sure": sure_of(first, report) if first else "",
         "of": f" of {first['id']}" if first and len(faults) > 1 else "",

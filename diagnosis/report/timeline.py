@@ -12,7 +12,7 @@ import numpy as np
 from diagnosis.pages.labels import clock, fault_title, span
 from diagnosis.report.judged_parts import kind_of
 from diagnosis.report.standing import Standing, standings_of
-from diagnosis.results.candidates import label_of
+from diagnosis.results.candidates import label_of, symbol_of
 from diagnosis.results.document import IntervalRow, PhaseRow, ReportDocument
 from diagnosis.results.fault_rows import state_label
 from diagnosis.results.machine_words import MachineWords, words_of
@@ -152,7 +152,7 @@ def _bar(fault: IntervalRow, duration: float, words: MachineWords, cause: str = 
     times = f"{clock(fault['start_s'], 2)} to {clock(fault['stop_s'], 2)}"
     title = f"{fault['id']}: {fault_title(fault, words)}, {times}" + (f"; may follow from {cause}" if cause else "")
     slight = fault["severity"] == Severity.INFO
-    return Bar(fault["id"], fault["mode"], left, width, label, title, bool(cause), slight)
+    return Bar(fault["id"], symbol_of(fault), left, width, label, title, bool(cause), slight)
 
 
 def side_by_side(bars: Iterable[Bar]) -> tuple[Bar, ...]:
@@ -278,7 +278,7 @@ def _faulty_lane(
     share = 100 * total / duration if duration > 0 else 0.0
     words = f"{share:.1f} %" if share >= 0.05 else span(total) if painting else "remark"
     name = machine_words.part_name(faults[0]["kind"], side)
-    state = painting[0]["mode"] if painting else beside
+    state = symbol_of(painting[0]) if painting else beside
     return Lane(component, name, state, _lines(spans, side, duration), drawn, words, first, side)
 
 

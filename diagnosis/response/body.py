@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from diagnosis.body.positions import Positions, news
 from diagnosis.body.sources import body_sensors
+from replay.signals.speed_doubts import Witness
 from replay.signals.timeline import Timeline
 
 Array = NDArray[np.float64]
@@ -94,6 +95,20 @@ def body_speeds(timeline: Timeline, width: int) -> tuple[BodySpeed, ...]:
         if found is not None:
             out.append(found)
     return tuple(out)
+
+
+def witnesses_of(timeline: Timeline) -> tuple[Witness, ...]:
+    """What measures the body's speed by itself: no odometry, which may be made of the wheels' speeds.
+
+    Parameters
+    ----------
+    timeline : Timeline
+        The mission.
+    """
+    from diagnosis.response.inputs import cell_of
+
+    width = cell_of(timeline.dt)
+    return tuple(Witness(b.name, np.abs(b.speed), width) for b in body_speeds(timeline, width) if b.name != "odometry")
 
 
 def _of_positions(name: str, fixes: Positions, blocks: int, block_s: float) -> BodySpeed | None:

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from diagnosis.channels.one_value import gaps_in
 from diagnosis.response.machine import Judged
 
 Array = NDArray[np.float64]
@@ -34,7 +35,7 @@ def usual_hold(wheel: str, holds: Mapping[str, Array]) -> float:
     mine = np.r_[holds[wheel], 0.0]
     own = float(mine[min(_OWN, mine.size - 1)])
     if len(holds) > 1:
-        gaps = np.flatnonzero(mine[:-1] >= _GAP * np.maximum(mine[1:], max(others, _LEAST_S)))
+        gaps = gaps_in(mine, _GAP, _GAP * max(others, _LEAST_S))
         own = min(own, float(mine[gaps[-1] + 1])) if gaps.size else own
     return max(own, others)
 

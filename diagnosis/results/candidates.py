@@ -51,6 +51,11 @@ def label_of(fault: IntervalRow) -> str:
     return UNCLEAR.capitalize() if candidates_of(fault) else state_label(fault["mode"], fault["side"])
 
 
+def symbol_of(fault: IntervalRow) -> str:
+    """Mode whose symbol and colour a fault has; ``warning`` where its kind is unclear, for a symbol is a word, too."""
+    return "warning" if candidates_of(fault) else fault["mode"]
+
+
 def unclear_words(side: str, modes: Sequence[str]) -> str:
     """Candidates in words, to follow *was*: ``faulty, kind unclear (stuck or inefficient)``."""
     words = [mode_words(side, mode) for mode in modes]

@@ -58,6 +58,11 @@ class Verdict(StrEnum):
         """Words for lists, where many verdicts are beside each other: ``Ready``."""
         return _VERDICT_WORDS[self][2]
 
+    @property
+    def group(self) -> str:
+        """Words for all missions of this verdict, in legends and counts: some that are not assessed were judged, and not cleared."""
+        return f"{self.short} or {NOT_CLEARED.lower()}" if self is Verdict.NOT_ASSESSED else self.short
+
 
 _VERDICT_RANK = {member: i for i, member in enumerate(Verdict)}
 _VERDICT_WORDS = {
@@ -66,6 +71,10 @@ _VERDICT_WORDS = {
     Verdict.WATCH: ("Faults to watch", "inefficient", "Faults to watch"),
     Verdict.STOP: ("Stop and repair", "stuck", "Stop and repair"),
 }
+
+
+#: Words for *not assessed* where every part of a wheel was judged, which is not what is missing.
+NOT_CLEARED = "Not cleared"
 
 
 class Leave(StrEnum):

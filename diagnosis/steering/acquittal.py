@@ -20,9 +20,9 @@ from diagnosis.results.assessment import Finding
 from diagnosis.steering.blocks import SteeringBlocks
 from diagnosis.steering.denied import shaken_power, usual_power
 from diagnosis.steering.driven import driven_by
-from diagnosis.steering.findings import SideFindings
 from diagnosis.steering.inputs import AxleInputs
 from diagnosis.steering.plant import SteeringPlant
+from diagnosis.steering.side_findings import SideFindings, span_of
 from replay.faults import FaultMode, Side
 
 Array = NDArray[np.float64]
@@ -122,7 +122,7 @@ def acquitted(
         Whether the axle moves as its model says, so that the model is believed where nothing is measured twice.
     """
     apart, by, moved = _apart(side, inputs, blocks)
-    spans = [(f.start // blocks.length, -(-f.stop // blocks.length)) for f in found.findings]
+    spans = [span_of(f, blocks.length) for f in found.findings]
     usual = apart**2
     for a, b in spans:
         usual[a:b] = np.nan
@@ -218,7 +218,7 @@ def _shaken(finding: Finding, found: SideFindings, blocks: SteeringBlocks) -> bo
     if finding.side is not Side.SENSOR or finding.mode is not FaultMode.NOISY:
         return False
     usual = usual_power(found, blocks)
-    span = finding.start // blocks.length, -(-finding.stop // blocks.length)
+    span = span_of(finding, blocks.length)
     known = bool((blocks.count[slice(*span)] > 0).any())
     return known and 0.0 < _FAR_MORE * usual < shaken_power(blocks, *span)
 

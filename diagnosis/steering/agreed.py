@@ -7,8 +7,8 @@ from collections.abc import Mapping
 import numpy as np
 
 from diagnosis.results.assessment import Finding
-from diagnosis.steering.findings import SideFindings
 from diagnosis.steering.inputs import AxleInputs
+from diagnosis.steering.side_findings import SideFindings, span_of
 from replay.faults import FaultMode, Side
 
 _AGREE = 2.0  # times what is usual between both angles
@@ -39,8 +39,7 @@ def without_agreed(found: Mapping[Side, SideFindings], inputs: AxleInputs) -> di
         return out
     out[Side.SENSOR] = sensor._replace(findings=tuple(f for f in sensor.findings if f not in agreed))
     if not inputs.valve_redundant:
-        n = inputs.blocks.length
-        spans = [(f.start // n, -(-f.stop // n)) for f in agreed]
+        spans = [span_of(f, inputs.blocks.length) for f in agreed]
         out[Side.ACTUATOR] = valve._replace(unexplained=(*valve.unexplained, *spans))
     return out
 

@@ -10,8 +10,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from diagnosis.results.assessment import Finding
-from diagnosis.steering.findings import SideFindings
 from diagnosis.steering.inputs import AxleInputs
+from diagnosis.steering.side_findings import SideFindings
 from replay.faults import Side
 
 _LEAST_RAD, _FEW = 0.06, 10  # a share is known of so large an angle, and so many readings
@@ -41,9 +41,7 @@ def not_scaled_together(
         sensor = found[name][Side.SENSOR]
         others = [a for other, a in twice.items() if other != name]
         alike = [f for f in sensor.findings if not f.mode.total and _alike(f, own, others, clear_at)]
-        kept = tuple(f for f in sensor.findings if not any(f is x for x in alike))
-        spans = [(f.start // length, -(-f.stop // length)) for f in alike]
-        out[name][Side.SENSOR] = sensor._replace(findings=kept, unexplained=(*sensor.unexplained, *spans))
+        out[name][Side.SENSOR] = sensor.left_open(alike, length)
     return out
 
 

@@ -21,7 +21,7 @@ from diagnosis.steering.denied import not_denied
 from diagnosis.steering.driven import driven_by
 from diagnosis.steering.evidence import evidence_columns, path_angle
 from diagnosis.steering.filter_state import SteeringPath
-from diagnosis.steering.findings import SideFindings, apart, findings_of
+from diagnosis.steering.findings import apart, findings_of
 from diagnosis.steering.followed import assessed, stays
 from diagnosis.steering.inputs import AxleInputs, Counts, axle_inputs
 from diagnosis.steering.measured_twice import of_one_cause
@@ -35,6 +35,7 @@ from diagnosis.steering.plant import SteeringPlant
 from diagnosis.steering.prior import plant_before
 from diagnosis.steering.reliability import commanded, lost_by_model, paired, told_from_none, weighed
 from diagnosis.steering.rests_together import not_resting_together
+from diagnosis.steering.side_findings import SideFindings
 from diagnosis.steering.states import REASONS, states_of
 from diagnosis.steering.together import less_sure_all_along, not_shaken_together, not_starved, not_together
 from replay.arrays.processors import each

@@ -14,9 +14,9 @@ from diagnosis.results.assessment import Finding
 from diagnosis.results.limited import limited
 from diagnosis.steering.between_readings import between_readings
 from diagnosis.steering.blocks import SteeringBlocks
-from diagnosis.steering.findings import SideFindings
 from diagnosis.steering.inputs import AxleInputs
 from diagnosis.steering.jumps import as_sensors, of_sensor
+from diagnosis.steering.side_findings import SideFindings, span_of
 from replay.faults import FaultMode, Side
 
 _SHAKEN = 2.0  # times the usual power of what changes from reading to reading
@@ -69,20 +69,20 @@ def not_denied(
             f
             for f in sensor.findings
             if (
-                f.mode is FaultMode.NOISY and shaken_power(blocks, *_span(f, blocks)) < max(_SHAKEN * usual, _TREMOR**2)
+                f.mode is FaultMode.NOISY
+                and shaken_power(blocks, *span_of(f, blocks.length)) < max(_SHAKEN * usual, _TREMOR**2)
             )
             or (f.mode.total and _trembles(f, inputs))
         ]
-        kept = tuple(f for f in sensor.findings if f not in denied)
-        kept = tuple(limited(f, _HABIT, _ENDS) if _ends_at_stop(f, inputs, max_steer) else f for f in kept)
-        out[Side.SENSOR] = SideFindings(kept, (*sensor.unexplained, *(_span(f, blocks) for f in denied)))
+        rest = sensor.left_open(denied, blocks.length)
+        kept = tuple(limited(f, _HABIT, _ENDS) if _ends_at_stop(f, inputs, max_steer) else f for f in rest.findings)
+        out[Side.SENSOR] = rest._replace(findings=kept)
     valve = _asked(valve, inputs, blocks)
     valve = valve._replace(findings=tuple(f for f in valve.findings if not between_readings(f, inputs)))
     out[Side.ACTUATOR] = valve
     if not inputs.valve_redundant:
-        obeyed = [f for f in valve.findings if f.mode.total and _denies(*_span(f, blocks), blocks, max_steer)]
-        kept = tuple(f for f in valve.findings if f not in obeyed)
-        valve = valve._replace(findings=kept, unexplained=(*valve.unexplained, *(_span(f, blocks) for f in obeyed)))
+        obeyed = [f for f in valve.findings if f.mode.total and _denies(*span_of(f, blocks.length), blocks, max_steer)]
+        valve = valve.left_open(obeyed, blocks.length)
         jumping = of_sensor(valve.findings, inputs.angle, inputs.fresh, inputs.timeline.dt)
         if jumping and not inputs.angle_redundant:
             valve = valve._replace(findings=tuple(f for f in valve.findings if f not in jumping))
@@ -100,9 +100,7 @@ def not_denied(
 
 def _asked(valve: SideFindings, inputs: AxleInputs, blocks: SteeringBlocks) -> SideFindings:
     """A valve's findings without those of times in which it rests about its middle, as it is told to."""
-    resting = [f for f in valve.findings if f.mode.total and _rests(f, inputs)]
-    kept = tuple(f for f in valve.findings if f not in resting)
-    return valve._replace(findings=kept, unexplained=(*valve.unexplained, *(_span(f, blocks) for f in resting)))
+    return valve.left_open([f for f in valve.findings if f.mode.total and _rests(f, inputs)], blocks.length)
 
 
 def _rests(f: Finding, inputs: AxleInputs) -> bool:
@@ -199,10 +197,6 @@ def _obeys(a: int, b: int, blocks: SteeringBlocks) -> bool:
     return False
 
 
-def _span(finding: Finding, blocks: SteeringBlocks) -> tuple[int, int]:
-    return finding.start // blocks.length, -(-finding.stop // blocks.length)
-
-
 def shaken_power(blocks: SteeringBlocks, a: int, b: int) -> float:
     """Mean power of what changes from reading to reading in blocks [a, b) [rad²]; infinite where there is none."""
     use = blocks.count[a:b] > 0
@@ -213,5 +207,5 @@ def usual_power(side: SideFindings, blocks: SteeringBlocks) -> float:
     """That power where the side has no fault [rad²]; 0 where too little is left."""
     use = np.asarray(blocks.count > 0)
     for f in side.findings:
-        use[slice(*_span(f, blocks))] = False
+        use[slice(*span_of(f, blocks.length))] = False
     return float(np.mean(blocks.power[use])) if np.count_nonzero(use) * blocks.dt >= _LEAST_USUAL_S else 0.0

@@ -25,12 +25,12 @@ from diagnosis.steering.model_bank import COLOURED, HEALTHY, NO_SIGNAL, NOISY, S
 from diagnosis.steering.onset import refined_sensor, refined_valve
 from diagnosis.steering.path import AxleFilter
 from diagnosis.steering.path_refinement import runs_of
+from diagnosis.steering.side_findings import SideFindings, span_of
 from replay.faults import FaultMode, Side, State
 from replay.machine.config import Limits
 
 #: A side and mode; None and None where the axle is healthy.
 Fault = tuple[Side | None, FaultMode | None]
-Span = tuple[int, int]
 
 _TEMPER = 0.35
 _MOST = 0.6  # of a mission: the longest fault of a valve whose opening nobody measures
@@ -39,24 +39,6 @@ _FRAGMENT_S = 2.0  # a row that holds for less beside another one is rather its 
 _BELIEVED_S = 4.0  # for how long before and after a motion that did not come a valve's fault is believed
 _LEAST_NAMED, _LEAST_LISTED = 0.005, 5e-4  # probabilities from which on another explanation is named in words, listed
 _NO_FAULT: Fault = (None, None)
-
-
-class SideFindings(NamedTuple):
-    """What was found on one side of an axle.
-
-    Attributes
-    ----------
-    findings : tuple[Finding, ...]
-        Faults, their ends at samples.
-    unexplained : tuple[tuple[int, int], ...]
-        Blocks in a faulty row of which no fault may be stated.
-    refuted : tuple[tuple[int, int], ...]
-        Blocks in a faulty row that a measurement of the same quantity refutes.
-    """
-
-    findings: tuple[Finding, ...]
-    unexplained: tuple[Span, ...]
-    refuted: tuple[Span, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -162,7 +144,7 @@ def apart(sensor: SideFindings, valve: SideFindings, length: int) -> SideFinding
     for f in valve.findings:
         shared = sum(max(0, min(f.stop, b.stop) - max(f.start, b.start)) for b in blurred)
         if 2 * shared > f.stop - f.start:
-            open_.append((f.start // length, -(-f.stop // length)))
+            open_.append(span_of(f, length))
         else:
             kept.append(f)
     return SideFindings(tuple(kept), tuple(open_))

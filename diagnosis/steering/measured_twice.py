@@ -17,10 +17,10 @@ from diagnosis.results.assessment import Finding
 from diagnosis.results.result import Epsilon, Hypothesis
 from diagnosis.results.sentence import About, is_about
 from diagnosis.results.sizes import amount
-from diagnosis.steering.findings import SideFindings
 from diagnosis.steering.inputs import AxleInputs
 from diagnosis.steering.openings import latest, off_command, opens_as_told
 from diagnosis.steering.redundancy import MOST_APART, most_lag
+from diagnosis.steering.side_findings import SideFindings, span_of
 from replay.faults import FaultMode, Side, State
 from replay.machine.quantities import OPENING
 
@@ -169,7 +169,7 @@ def _not_as_told(
 
 def _blocks_of(finding: Finding, inputs: AxleInputs) -> tuple[int, int]:
     length = 1 if inputs.blocks is None else inputs.blocks.length
-    return finding.start // length, -(-finding.stop // length)
+    return span_of(finding, length)
 
 
 def _as_it_opens(

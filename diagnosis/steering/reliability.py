@@ -18,8 +18,8 @@ from diagnosis.results.limited import limited
 from diagnosis.results.result import Hypothesis
 from diagnosis.results.vocabulary import Tier
 from diagnosis.steering.excitation import asked as moving
-from diagnosis.steering.findings import SideFindings
 from diagnosis.steering.path import AxleFilter
+from diagnosis.steering.side_findings import SideFindings, span_of
 from replay.faults import FaultMode, Side, State
 
 _WEIGHTS = (-4.46, 4.72, -2.24, -0.69, -0.99)  # constant, and of `features_of`
@@ -91,7 +91,7 @@ def commanded(valve: SideFindings, command: NDArray[np.float64], axle: AxleFilte
         asked = np.abs(command[f.start : f.stop])
         asked = asked[np.isfinite(asked)]
         lacks = f.mode in (FaultMode.NO_SIGNAL, FaultMode.INEFFICIENT)
-        blocks = f.start // length, -(-f.stop // length)
+        blocks = span_of(f, length)
         jitter_tells = bool(np.isfinite(share[slice(*blocks)]).any())
         moved = jitter_tells or (moving(axle, *blocks)[2] >= _MOVED_S and _travel(axle, *blocks) >= _LEAST_TRAVEL)
         if lacks and not (asked.size and float(np.quantile(asked, _PEAK)) >= _ASKED and moved):
@@ -134,7 +134,7 @@ def weighed(found: Mapping[Side, SideFindings], length: int, dt: float) -> dict[
             if mine.probability >= _LEAST:
                 kept.append(_or_sensor(mine) if f.tier is not Tier.SIGNAL else mine)
             else:
-                open_.append((f.start // length, -(-f.stop // length)))
+                open_.append(span_of(f, length))
         out[side] = SideFindings(tuple(kept), tuple(open_))
     return out
 
@@ -154,7 +154,7 @@ def lost_by_model(found: Mapping[Side, SideFindings], length: int, dt: float) ->
         for f in sensor.findings
         if f not in lost or (f.start, f.stop) in likely
     )
-    open_ = [(f.start // length, -(-f.stop // length)) for f in lost if (f.start, f.stop) not in likely]
+    open_ = [span_of(f, length) for f in lost if (f.start, f.stop) not in likely]
     return {**found, Side.SENSOR: sensor._replace(findings=kept, unexplained=(*sensor.unexplained, *open_))}
 
 

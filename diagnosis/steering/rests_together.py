@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from diagnosis.results.assessment import Finding
 from diagnosis.steering.dead_readings import LEAST_ASKED_S
 from diagnosis.steering.excitation import asked
-from diagnosis.steering.findings import SideFindings
 from diagnosis.steering.inputs import AxleInputs
 from diagnosis.steering.path import AxleFilter
+from diagnosis.steering.side_findings import SideFindings, span_of
 from replay.faults import Side
 
 _FEW, _MOSTLY = 5, 0.8  # readings; of them, that are one value
@@ -40,15 +40,13 @@ def not_resting_together(
         resting = [
             f for f in sensor.findings if _rests(f, filters[name], length) and any(_repeats(f, o) for o in others)
         ]
-        kept = tuple(f for f in sensor.findings if not any(f is x for x in resting))
-        spans = [(f.start // length, -(-f.stop // length)) for f in resting]
-        out[name][Side.SENSOR] = sensor._replace(findings=kept, unexplained=(*sensor.unexplained, *spans))
+        out[name][Side.SENSOR] = sensor.left_open(resting, length)
     return out
 
 
 def _rests(f: Finding, axle: AxleFilter, length: int) -> bool:
     """Whether nothing asks an axle to turn while its sensor is called dead."""
-    return f.mode.total and asked(axle, f.start // length, -(-f.stop // length))[2] < LEAST_ASKED_S
+    return f.mode.total and asked(axle, *span_of(f, length))[2] < LEAST_ASKED_S
 
 
 def _repeats(f: Finding, other: AxleInputs) -> bool:

@@ -11,10 +11,10 @@ from diagnosis.channels.sample_status import PAIR
 from diagnosis.results.assessment import CODE
 from diagnosis.steering.excitation import exercised
 from diagnosis.steering.filter_state import SteeringPath
-from diagnosis.steering.findings import SideFindings, Span
 from diagnosis.steering.inputs import AxleInputs
 from diagnosis.steering.model_bank import HEALTHY
 from diagnosis.steering.path import AxleFilter
+from diagnosis.steering.side_findings import SideFindings, Span
 from replay.faults import Side, State
 
 _ALONE_S, _BETWEEN_S = 4.0, 10.0

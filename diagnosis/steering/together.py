@@ -12,8 +12,8 @@ import numpy as np
 
 from diagnosis.results.assessment import Finding
 from diagnosis.results.limited import limited
-from diagnosis.steering.findings import SideFindings
 from diagnosis.steering.path import AxleFilter
+from diagnosis.steering.side_findings import SideFindings, span_of
 from replay.faults import FaultMode, Side
 
 _ENDS_S = 1.5  # within which both begin, or cease
@@ -51,9 +51,7 @@ def not_together(
         for side, one in sides.items():
             others = [f for name, of in found.items() if name != axle for f in of[side].findings]
             shared = [f for f in one.findings if any(_together(f, g, dt) for g in others)]
-            kept = tuple(f for f in one.findings if f not in shared)
-            spans = [(f.start // length, -(-f.stop // length)) for f in shared]
-            out[axle][side] = SideFindings(kept, (*one.unexplained, *spans))
+            out[axle][side] = one.left_open(shared, length)
     return out
 
 
@@ -80,9 +78,7 @@ def not_shaken_together(
     for axle, sides in found.items():
         others = [f for name, of in brief.items() if name != axle for f in of]
         shared = [f for f in brief[axle] if any(_together(f, g, dt) for g in others)]
-        kept = tuple(f for f in sides[side].findings if f not in shared)
-        spans = [(f.start // length, -(-f.stop // length)) for f in shared]
-        out[axle] = {**sides, side: sides[side]._replace(findings=kept, unexplained=(*sides[side].unexplained, *spans))}
+        out[axle] = {**sides, side: sides[side].left_open(shared, length)}
     return out
 
 
@@ -130,13 +126,9 @@ def not_starved(
     out: dict[str, dict[Side, SideFindings]] = {}
     for name, sides in found.items():
         sensor, length = sides[Side.SENSOR], axles[name].blocks.length
-        spans = {
-            f: (f.start // length, -(-f.stop // length)) for f in sensor.findings if f.mode is FaultMode.INEFFICIENT
-        }
-        starved = [f for f, span in spans.items() if _starved(name, span, axles)]
-        kept = tuple(f for f in sensor.findings if f not in starved)
-        open_ = (*sensor.unexplained, *(spans[f] for f in starved))
-        out[name] = {**sides, Side.SENSOR: sensor._replace(findings=kept, unexplained=open_)}
+        lost = [f for f in sensor.findings if f.mode is FaultMode.INEFFICIENT]
+        starved = [f for f in lost if _starved(name, span_of(f, length), axles)]
+        out[name] = {**sides, Side.SENSOR: sensor.left_open(starved, length)}
     return out
 
 

@@ -12,7 +12,6 @@ from replay.clocks.source_clock import SourceClock
 from replay.errors import LogError
 from replay.log.empty_log import silent_topics
 from replay.log.raw_log import Channel, RawLog
-from replay.log.source_options import SignalSource
 from replay.machine.config import Control, Machine, haulotte
 from replay.machine.geometry import Geometry
 from replay.setup.asked_columns import asked_columns, motions_of_body, where_commands_are
@@ -21,9 +20,10 @@ from replay.setup.contradictions import in_turn_with_commands, units_by_position
 from replay.setup.draft_notes import Draft
 from replay.setup.given import ask_about_odometry, given_signals, odometry, table_sources
 from replay.setup.lengths import largest_angle, limits_for, wheel_places, wheel_radius, with_speeds, without_size
-from replay.setup.motion import WheelMotion, backwards, wheel_motion
+from replay.setup.motion import WheelMotion, wheel_motion
 from replay.setup.numbered_wheels import ask_for_more_wheels, ask_for_numbers, ordered_by_turns
 from replay.setup.one_clock import lags
+from replay.setup.one_direction import in_one_direction
 from replay.setup.preset import Preset
 from replay.setup.read import options_of
 from replay.setup.robot_description import RobotDescription, parse_description
@@ -45,7 +45,6 @@ from replay.signals.possible_commands import possible_commands
 from replay.signals.signal import Signals
 from replay.signals.unfilled import unfilled, unfilled_note
 
-_SUPPOSED = "left and right turn against each other"
 _SPEEDS = ("v", "v_true", "v_ref")
 _SHOWN = 6  # names in a message
 
@@ -144,7 +143,7 @@ def draft_machine(logs: Sequence[RawLog], preset: Preset | None = None) -> Draft
         every = map_signals(logs, raw)
         found = _of_one_clock(every, clocks)
     motions = _motions(found, structure.wheels)
-    origins = _in_one_direction(draft, structure, found, motions)
+    origins = in_one_direction(draft, structure, found, motions)
     origins = {name: signal.origin for name, signal in every.items.items()} | origins
     _ask_for_what_is_missing(draft, every, channels)
     ask_for_more_wheels(draft, like_wheels({n: c for n, c in channels.items() if n not in empty}, origins))
@@ -277,51 +276,6 @@ def _ask_for_what_is_missing(draft: Draft, found: Signals, channels: Mapping[str
         asked, motions = asked_columns(channels, draft.machine, used), motions_of_body(channels, draft.machine)
         commands = possible_commands((c.topic, c.type_name) for c in channels.values())
         draft.ask("signals", where_commands_are(only, asked, commands, motions))
-
-
-def _in_one_direction(
-    draft: Draft, structure: Structure, found: Signals, motions: Mapping[str, WheelMotion]
-) -> dict[str, SignalSource]:
-    """Origins of all signals, those of wheels that count backwards with a negative gain."""
-    flipped: dict[str, str] = {}
-    for wheel in structure.wheels:
-        motion = motions.get(f"wheel.{wheel}.v")
-        if motion is not None:
-            if motion.gain < 0:
-                flipped[wheel] = "they turn against the command"
-        elif wheel in structure.joints and structure.joints[wheel].mirrored:
-            flipped[wheel] = "by the axes of their joints"
-    if not motions and not structure.joints:
-        flipped |= _by_signs(structure, found)
-    if flipped:
-        why = "; ".join(dict.fromkeys(flipped.values()))
-        draft.say("signals", f"Mirrored, written with a negative gain: {', '.join(flipped)} ({why}).")
-    if any(why.startswith(_SUPPOSED) for why in flipped.values()):
-        draft.ask(
-            "signals", "which side counts backwards? The log shows only that left and right count against each other."
-        )
-    origins = {}
-    for name, signal in found.items.items():
-        group, part, leaf = (*name.split("."), "", "")[:3]
-        against = part in flipped and leaf in ("v", "v_true", "v_position", "effort")
-        if leaf == "v_ref" and name in motions:
-            against = motions[name].gain < 0
-        origin = signal.origin
-        origins[name] = replace(origin, gain=-origin.gain) if group == "wheel" and against else origin
-    return origins
-
-
-def _by_signs(structure: Structure, found: Signals) -> dict[str, str]:
-    """Wheels of the right side, where they count against those of the left although the robot hardly turns."""
-    speeds = {w: found.items[f"wheel.{w}.v"] for w in structure.wheels if f"wheel.{w}.v" in found.items}
-    sides = structure.places or {}
-    left = [w for w in speeds if w in sides and sides[w].y > 0]
-    right = [w for w in speeds if w in sides and sides[w].y < 0]
-    if not left or not right:
-        return {}
-    side, sure = backwards(speeds[left[0]], speeds[right[0]], found.items.get("imu.yaw_rate"))
-    why = "by the measured yaw rate" if sure else f"{_SUPPOSED}; the right side is taken"
-    return dict.fromkeys({"left": left, "right": right}.get(side, []), why)
 
 
 def _control(found: Signals) -> Control:

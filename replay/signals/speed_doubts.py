@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -24,6 +24,8 @@ _LEAST, _LEAST_S = 60, 5.0  # samples, and time, of what a factor is taken from
 _PARTS = 3  # of a mission, in each of which the factor is the same
 _EVEN, _ALIKE = 0.12, 0.03  # ln; by how much it varies at a wheel, and from part to part and wheel to wheel
 _SOME, _FITS = np.log(1.08), 0.05  # ln; a factor that would be stated as a loss, and one that is none
+_SLIPS = 0.1  # ln; a speed of the wheels agrees with one of the body to so much: tyres slip
+_STRAIGHT = 0.1  # of the speed, by which wheels that go straight on may differ
 _WHEELS = 2
 _TURNING = ("rad/s", "rpm", "deg/s", "rev/s")
 _SECOND = "_true"
@@ -55,11 +57,35 @@ class SpeedDoubt(NamedTuple):
         return 1.0 if self.names[0].endswith(_SECOND) else self.factor
 
 
-def speed_doubt(timeline: Timeline, items: Mapping[str, Signal], machine: Machine) -> SpeedDoubt | None:
+class Witness(NamedTuple):
+    """What measures the speed of the body by itself.
+
+    Attributes
+    ----------
+    name : str
+        What it is, in words.
+    speed : Array, shape (b,)
+        Mean of each block, without its sign [m/s]; NaN where unknown.
+    width : int
+        Steps of a block.
+    """
+
+    name: str
+    speed: Array
+    width: int
+
+
+def speed_doubt(
+    timeline: Timeline,
+    items: Mapping[str, Signal],
+    machine: Machine,
+    witnesses: Callable[[], Sequence[Witness]] = tuple,
+) -> SpeedDoubt | None:
     """What speaks against the scale of all wheels' speeds, or of all second ones; None where nothing does.
 
     Two speeds of every wheel that differ by one factor from start to end differ by what all of them share: a wheel's size, a gear
-    or a unit. Which of both is wrong is told by the commanded speeds; without any, the first ones are taken.
+    or a unit. Which of both is wrong is told by what measures the body, where one of them agrees with that, else by the commanded speeds,
+    which a loop follows by the speed that it reads; without any, the first ones are taken.
 
     Parameters
     ----------
@@ -69,6 +95,8 @@ def speed_doubt(timeline: Timeline, items: Mapping[str, Signal], machine: Machin
         Its signals, for how each was recorded; samples are not looked at.
     machine : Machine
         Its wheels and sizes.
+    witnesses : Callable[[], Sequence[Witness]]
+        What measures the body, asked for only in doubt; none that is made of the wheels' speeds.
     """
     every = max(1, timeline.size // _MOST)
     pairs = [w for w in machine.wheels if {f"wheel.{w}.v", f"wheel.{w}.v{_SECOND}"} <= timeline.signals.keys()]
@@ -80,13 +108,20 @@ def speed_doubt(timeline: Timeline, items: Mapping[str, Signal], machine: Machin
     alike = int(np.count_nonzero(np.abs(logs - middle) < _ALIKE))
     if abs(middle) < _SOME or alike < _WHEELS or 2 * alike <= len(pairs) or np.any(np.abs(logs) < _FITS):
         return None
-    second = _second_is_wrong(timeline, pairs, every)
+    second, by = next(
+        (
+            (told, f", where by {w.name} the {'first' if told else 'second'} ones are right")
+            for w in witnesses()
+            if (told := _by(w, timeline, pairs)) is not None
+        ),
+        (_second_is_wrong(timeline, pairs, every), ""),
+    )
     leaf, factor = (f"v{_SECOND}", np.exp(middle)) if second else ("v", np.exp(-middle))
     wrong = [f"wheel.{w}.{leaf}" for w in pairs]
     names = tuple(wrong if second else [n for w in pairs for n in (f"wheel.{w}.v", f"wheel.{w}.v_position")])
     text = (
         f"The speeds of all {machine.part}s are {np.exp(middle):.2f} times their second speeds (such as {wrong[0].rsplit('.', 1)[0]}.v{_SECOND}) "
-        "throughout, which is no sensor's fault but a size or a unit in the machine file: they were judged as if it were right"
+        f"throughout{by}, which is no sensor's fault but a size or a unit in the machine file: they were judged as if it were right"
     )
     origins = {n: items[n].origin if n in items else SignalSource() for w in pairs for n in _both(w)}
     lines = _lines(wrong[0], origins, machine, float(factor))
@@ -118,6 +153,33 @@ def _of_wheel(timeline: Timeline, wheel: str, every: int) -> float | None:
 def _moves(x: Array) -> NDArray[np.bool_]:
     size = np.where(np.isfinite(x), np.abs(x), 0.0)
     return np.asarray(size > _MOVED * max(float(np.quantile(size, 0.99)), 1e-9))
+
+
+def _by(witness: Witness, timeline: Timeline, wheels: Sequence[str]) -> bool | None:
+    """Whether the second speeds are wrong by what measures the body, and the first are not; None where it agrees with neither or both."""
+    off = []
+    for leaf in ("v", f"v{_SECOND}"):
+        every = [np.asarray(timeline.signals[f"wheel.{w}.{leaf}"], dtype=np.float64) for w in wheels]
+        each = np.abs([_blocks(x, witness.width) for x in every])
+        speed = np.median(each, axis=0)
+        use = _moves(witness.speed) & _moves(speed)
+        with np.errstate(invalid="ignore"):  # in a turn no wheel goes as fast as the body
+            use &= np.ptp(each, axis=0) < _STRAIGHT * speed
+        if np.count_nonzero(use) * witness.width * timeline.dt < _LEAST_S:
+            return None
+        off.append(abs(float(np.median(np.log(speed[use] / witness.speed[use])))))
+    agree = [x < _SLIPS for x in off]
+    return agree[0] if agree[0] != agree[1] else None
+
+
+def _blocks(x: Array, width: int) -> Array:
+    """Mean of each block of so many steps, the last one of what there is, shape (b,)."""
+    first = np.arange(0, x.size, width)
+    known = np.isfinite(x)
+    count = np.add.reduceat(known.astype(np.float64), first)
+    return np.asarray(
+        np.where(count > 0, np.add.reduceat(np.where(known, x, 0.0), first) / np.maximum(count, 1.0), np.nan)
+    )
 
 
 def _second_is_wrong(timeline: Timeline, wheels: list[str], every: int) -> bool:

@@ -8,11 +8,12 @@ stand any more is ``resolved`` only where a mission assessed the part after the 
 
 from __future__ import annotations
 
+from diagnosis.audit.fleet.baseline_types import BaselineRow, CoverageChangeRow
 from diagnosis.audit.fleet.document import Fleet
 from diagnosis.audit.fleet.document_rows import bounds_row
 from diagnosis.audit.fleet.fault_types import FaultChange, FaultChangeRow, FaultStandingRow
-from diagnosis.audit.fleet.fleet_types import BaselineRow, CoverageChangeRow
-from diagnosis.audit.fleet.machines import FleetFault, Machine
+from diagnosis.audit.fleet.fleet_fault import FleetFault
+from diagnosis.audit.fleet.machines import Machine
 from diagnosis.audit.fleet.parts import PartKey
 from diagnosis.pages.labels import utc_moment
 from replay.faults import Side
@@ -45,10 +46,17 @@ def compare_fleets(older: Fleet, newer: Fleet) -> BaselineRow:
     names = [{m.name for m in fleet.missions} for fleet in (older, newer)]
     lost = sorted(names[0] - names[1]) if names[0] & names[1] else []  # of another period all are others
     missing = [before[k].label for k in before if k not in now]
+    new = names[1] - names[0]
     return {
         "worse": bool(lost or missing) or any(f["outcome"] in ("new", "worse") for f in faults),
         "counts": {name: sum(f["outcome"] == name for f in faults) for name in OUTCOMES},
-        "missions": {"older": len(names[0]), "newer": len(names[1]), "new": len(names[1] - names[0]), "missing": lost},
+        "missions": {
+            "older": len(names[0]),
+            "newer": len(names[1]),
+            "new": len(new),
+            "new_counted": sum(r.name in new for m in newer.machines for r in m.runs),
+            "missing": lost,
+        },
         "machines": {
             "new": [now[k].label for k in now if k not in before],
             "missing": missing,

@@ -9,17 +9,12 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from diagnosis.audit.fleet import words
+from diagnosis.audit.fleet.baseline_types import BaselineRow
 from diagnosis.audit.fleet.document_rows import bounds_row, mission_row, rounded, six_digits, trend_row
 from diagnosis.audit.fleet.fault_types import FleetFaultRow, Status
-from diagnosis.audit.fleet.fleet_types import (
-    SCHEMA,
-    BaselineRow,
-    CountsRow,
-    FleetDocument,
-    MachineRow,
-    PartRow,
-)
-from diagnosis.audit.fleet.machines import FleetFault, Machine
+from diagnosis.audit.fleet.fleet_fault import FleetFault
+from diagnosis.audit.fleet.fleet_types import SCHEMA, CountsRow, FleetDocument, MachineRow, PartRow
+from diagnosis.audit.fleet.machines import Machine
 from diagnosis.audit.fleet.news import news, since_runs
 from diagnosis.audit.fleet.read import Mission
 from diagnosis.audit.fleet.runs import sides_of
@@ -106,6 +101,7 @@ def fleet_document(fleet: Fleet, baseline: BaselineRow | None = None) -> FleetDo
             first.setdefault(mission.result.id, mission.name)
     results = {m.name: m.result.id if m.result is not None else -1 for m in fleet.missions}
     at = {mission.name: k for k, mission in enumerate(fleet.missions)}
+    judged = {result for m in fleet.machines for result in m.judged_all()}
     fast = [fast_losses(m, own) for m, own in zip(fleet.machines, fleet.trends, strict=True)]
     lost = [_lost(m, own) for m, own in zip(fleet.machines, fleet.trends, strict=True)]
     status, tag, title = words.headline(fleet.machines, len(fleet.unknown), lost)
@@ -148,6 +144,7 @@ def fleet_document(fleet: Fleet, baseline: BaselineRow | None = None) -> FleetDo
                 failed.get(m.name, owner.get(results[fleet.copies.get(m.name, m.name)])),
                 fleet.copies.get(m.name, first.get(results[m.name])),
                 fleet.first_runs.get(m.name),
+                judged=results[fleet.copies.get(m.name, m.name)] in judged,
             )
             for m in fleet.missions
         ],

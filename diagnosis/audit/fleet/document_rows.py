@@ -69,8 +69,10 @@ def _line(line: Line | None, now: float) -> LineRow | None:
     }
 
 
-def mission_row(m: Mission, owner: int | None, first: str | None, first_run: int | None) -> MissionRow:
-    """One mission of the machine at place `owner`; `first` names the first of its copies."""
+def mission_row(
+    m: Mission, owner: int | None, first: str | None, first_run: int | None, *, judged: bool = False
+) -> MissionRow:
+    """One mission of the machine at place `owner`; `first` names the first of its copies; `judged`: every part of a wheel was judged long enough."""
     r = m.result
     if r is None:
         return {
@@ -106,6 +108,7 @@ def mission_row(m: Mission, owner: int | None, first: str | None, first_run: int
         "version": r.version,
         "report": r.report,
         "first_run": first_run,
+        "judged": judged,
         "copy_of": None if first == m.name else first,
         "faults": [_fault(f) for f in faults],
     }

@@ -8,9 +8,10 @@ of other versions of the tool.
 
 from __future__ import annotations
 
-from typing import Literal, NotRequired, TypedDict
+from typing import NotRequired, TypedDict
 
-from diagnosis.audit.fleet.fault_types import FaultChangeRow, FleetFaultRow, MissionFaultRow
+from diagnosis.audit.fleet.baseline_types import BaselineRow
+from diagnosis.audit.fleet.fault_types import FleetFaultRow, MissionFaultRow
 from diagnosis.audit.fleet.trend_types import Axis, TrendRow
 from diagnosis.audit.store.outcome import MissionState
 from diagnosis.results.vocabulary import Verdict
@@ -201,6 +202,8 @@ class MissionRow(TypedDict):
         Folder of the report.
     first_run : int or None
         Audit run that judged it first; null: not known.
+    judged : bool
+        Whether every part of a wheel was judged long enough: of a mission without a verdict, that it did not clear its machine, and no less.
     copy_of : str or None
         Name of the mission that this one is a copy of.
     """
@@ -224,67 +227,8 @@ class MissionRow(TypedDict):
     version: NotRequired[str]
     report: NotRequired[str | None]
     first_run: NotRequired[int | None]
+    judged: NotRequired[bool]
     copy_of: NotRequired[str | None]
-
-
-class CoverageChangeRow(TypedDict):
-    """A part that was assessed in the last mission of one of two audits alone."""
-
-    machine: str
-    component: str
-    kind: str
-    side: str
-    change: Literal["lost", "gained"]
-
-
-class VerdictChangeRow(TypedDict):
-    """A machine with another verdict than in the earlier audit."""
-
-    machine: str
-    older: Verdict
-    newer: Verdict
-
-
-class MachineChangesRow(TypedDict):
-    """Labels of machines that are new and missing, and changed verdicts."""
-
-    new: list[str]
-    missing: list[str]
-    changed: list[VerdictChangeRow]
-
-
-class MissionChangesRow(TypedDict):
-    """Numbers of missions, and names that the later audit lacks where both hold some of the same missions."""
-
-    older: int
-    newer: int
-    new: int
-    missing: list[str]
-
-
-class BaselineRow(TypedDict):
-    """An audit against an earlier one; see `diagnosis.audit.fleet.compare`.
-
-    Attributes
-    ----------
-    worse : bool
-        Whether a fault is new or worse, or machines or missions are missing.
-    counts : dict[str, int]
-        Number of faults by `FaultChange`.
-    missions, machines
-        Which are new, missing or changed.
-    faults : list[FaultChangeRow]
-        Faults of either audit.
-    coverage : list[CoverageChangeRow]
-        Parts that are assessed no longer, or now.
-    """
-
-    worse: bool
-    counts: dict[str, int]
-    missions: MissionChangesRow
-    machines: MachineChangesRow
-    faults: list[FaultChangeRow]
-    coverage: list[CoverageChangeRow]
 
 
 class FleetDocument(TypedDict):

@@ -9,7 +9,8 @@ from functools import cache
 from typing import NamedTuple
 
 from diagnosis.audit.fleet.fault_types import Status
-from diagnosis.audit.fleet.machines import OPEN, STANDING, FleetFault, Machine
+from diagnosis.audit.fleet.fleet_fault import OPEN, STANDING, FleetFault
+from diagnosis.audit.fleet.machines import Machine
 from diagnosis.audit.fleet.owners import Owner, Owners
 from diagnosis.audit.fleet.read import FoundFault, Mission
 from diagnosis.audit.fleet.runs import Limits, Run, sides_of

@@ -11,8 +11,9 @@ from pathlib import Path
 
 import orjson
 
+from diagnosis.audit.fleet.fleet_fault import FleetFault
 from diagnosis.audit.fleet.fleet_types import FleetDocument
-from diagnosis.audit.fleet.machines import FleetFault, Machine
+from diagnosis.audit.fleet.machines import Machine
 from diagnosis.audit.fleet.read import Mission
 from diagnosis.results.vocabulary import Severity
 

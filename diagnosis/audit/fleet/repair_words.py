@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from diagnosis.audit.fleet.machines import FleetFault, Machine
+from diagnosis.audit.fleet.fleet_fault import FleetFault
+from diagnosis.audit.fleet.machines import Machine
 from diagnosis.audit.fleet.runs import sides_of
 from diagnosis.decision.wording import count_words, join_words
 from diagnosis.pages.labels import utc_moment

@@ -5,7 +5,8 @@ from __future__ import annotations
 import shlex
 from collections.abc import Sequence
 
-from diagnosis.audit.fleet.machines import FleetFault, Machine
+from diagnosis.audit.fleet.fleet_fault import FleetFault
+from diagnosis.audit.fleet.machines import Machine
 from diagnosis.audit.fleet.may_leave import leave_of
 from diagnosis.audit.fleet.repair_words import since_repair
 from diagnosis.audit.fleet.trend_types import Axis

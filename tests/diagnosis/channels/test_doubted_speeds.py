@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from diagnosis.pipeline import diagnose_signals
+from diagnosis.response.body import witnesses_of
 from diagnosis.results.document import ReportDocument
 from replay.faults import FaultMode, FaultSpec, Side
 from replay.log.source_options import SignalSource
@@ -111,3 +112,25 @@ def test_what_begins_in_the_middle_is_no_setting() -> None:
 def test_healthy_missions_and_faults_of_one_part_raise_no_doubt(seed: int) -> None:
     for fault in ((), (FaultSpec("RL", Side.SENSOR, FaultMode.INEFFICIENT, 0.0, LENGTH, 0.4),)):
         assert doubt(signals(simulated(*fault, seed=seed), {})) is None
+
+
+def test_a_loop_that_follows_the_speed_it_reads_is_no_witness_and_satellites_are() -> None:
+    """Where speeds and commands are off alike, the second speeds were to be written off, beside positions that agree with them."""
+    given = signals(simulated(), {**wrong(0.7), **wrong(0.7, "v_ref"), "cmd.v": 0.7}, unit="m/s")
+    made = simulated()
+    ground = np.abs(np.mean([made.columns[f"wheel.{w}.v_true"] for w in WHEELS], axis=0))
+    source = SignalSource(column="gnss.speed")
+    given.items["gnss.speed"] = Signal("gnss.speed", made.stamps, ground, source, "simulated", guessed=False)
+    line = align(given)
+    alone = speed_doubt(line, given.items, haulotte())
+    assert alone is not None
+    assert set(alone.names) == set(wrong(1.0, "v_true"))
+    found = speed_doubt(line, given.items, haulotte(), lambda: witnesses_of(line))
+    assert found is not None
+    assert set(found.names) == set(wrong(1.0))
+    assert "where by speed over ground the second ones are right" in found.text
+    assert found.factor == pytest.approx(1 / 0.7, rel=0.02)
+    report = judged(given)
+    assert report["intervals"] == []
+    said = [x["reason"] for x in report["verdict"]["to_clear"]]
+    assert not any("times as fast as by its wheels" in text for text in said)

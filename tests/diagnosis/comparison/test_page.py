@@ -79,3 +79,9 @@ def test_names_are_text_and_the_page_runs_and_fetches_nothing() -> None:
 def test_the_same_input_gives_the_same_page() -> None:
     pages = {page(report("FR", "M"), report("FR", "M", fault("FR"))) for _ in range(2)}
     assert len(pages) == 1
+
+
+def test_faults_that_count_as_one_are_said_to() -> None:
+    older, newer = report("FR", "HX-1", fault("FR"), {**fault("FR"), "id": "F2"}), report("FR", "HX-1", fault("FR"))
+    assert "Faults, each part and kind once: 1 unchanged" in words(page(older, newer))
+    assert "Faults: 1 unchanged" in words(page(newer, newer))

@@ -33,6 +33,7 @@ def test_pieces_of_many_rows_that_touch_are_one_fault_of_no_clear_row() -> None:
     assert one.probability == pytest.approx(0.36)
     assert sum(h.p for h in one.hypotheses) == pytest.approx(1.0)
     assert one.evidence[0].startswith("5 pieces that touch look like 4 rows in turn")
+    assert one.evidence[1] == "What follows is of the longest of them, 1.0–4.0 s."
     assert one.epsilon is not None
     assert one.epsilon.low <= one.epsilon.value <= one.epsilon.high
     assert np.count_nonzero(after.states == CODE[State.INEFFICIENT]) == 5 * 3_000

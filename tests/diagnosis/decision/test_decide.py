@@ -8,7 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from diagnosis.decision.decide import Decision, decide
+from diagnosis.decision.decide import decide
+from diagnosis.decision.decided import Decision
 from diagnosis.decision.intervals import intervals_of
 from diagnosis.decision.severity import advised
 from diagnosis.results.assessment import CODE, Assessment, Finding, unassessed

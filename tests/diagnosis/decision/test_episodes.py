@@ -49,7 +49,7 @@ def test_pieces_of_one_loss_are_one_fault(side: Side) -> None:
     assert (one.start, one.stop) == (1000, 6500)
     assert one.epsilon is not None
     assert one.epsilon.value == pytest.approx(0.25)
-    assert "3 stretches (1.0–1.5 s, 3.0–3.5 s, 6.0–6.5 s)" in one.course[-1]
+    assert "3 stretches (1.0–1.5 s, 3.0–3.5 s, 6.0–6.5 s); between them nothing healthy was seen" in one.course[-1]
 
 
 def test_the_onset_is_told_before_what_comes_later() -> None:
@@ -211,3 +211,5 @@ def test_nothing_stays_called_healthy_between_the_pieces_of_one_fault() -> None:
     assert len(out.findings) == 1
     assert set(out.states[3000:3200]) == {CODE[State.NOT_ASSESSED]}
     assert out.reasons[State.NOT_ASSESSED] == "a fault before and after it would hardly show"
+    (one,) = out.findings
+    assert "what looks healthy between them is too brief, or would show too little of it" in one.course[-1]

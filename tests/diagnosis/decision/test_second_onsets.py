@@ -4,11 +4,15 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
+from diagnosis.decision.second_onsets import with_second_onsets
 from diagnosis.decision.verified import verified
 from diagnosis.pipeline import diagnose_mission
+from diagnosis.results.assessment import Assessment
 from diagnosis.results.result import Closeups, MissionResult
+from diagnosis.results.vocabulary import Tier
 from replay.faults import FaultMode, FaultSpec, Side
 from replay.log.source_options import SignalSource
 from replay.machine.config import haulotte
@@ -17,6 +21,7 @@ from replay.signals.signal import Signal, Signals
 from replay.signals.timeline import align
 from replay.simulation.options import EvidenceLevel, SimulationOptions
 from replay.simulation.run import simulate_mission
+from tests.diagnosis.decision.findings import finding
 
 FAULTS = (
     FaultSpec("FR", Side.SENSOR, FaultMode.STUCK, 6.0, 9.0, 1.0, 0.2),
@@ -85,3 +90,15 @@ def test_what_is_not_kept_is_said(direct: MissionResult) -> None:
     assert all("--start" in v.why for v in verified(long))
     bare = replace(direct, columns={"t": direct.columns["t"]})
     assert all("no comparison" in v.why for v in verified(bare))
+
+
+def test_what_was_off_before_the_first_reading_that_is_looked_at_has_no_onset_there() -> None:
+    """The first of the readings was given as the onset, half a second before the stated one, of one fault after another."""
+    n, rng = 1000, np.random.default_rng(1)
+    expected = 1.0 + 0.2 * np.sin(np.arange(n) / 20.0)
+    residual = 0.4 + 0.01 * rng.standard_normal(n) - expected
+    columns = {"residual": residual, "threshold": np.full(n, 0.03), "expected": expected}
+    found = finding(Side.SENSOR, FaultMode.STUCK, 500, 800)
+    side = Assessment(np.zeros(n, np.int8), findings=(found,), tier=Tier.DIRECT, columns=columns)
+    ((told,),) = (a.findings for a in with_second_onsets({("FR", "sensor"): side}, 0.005).values())
+    assert "sees no onset among them: by its models those of 500 ms before it fit the fault better" in told.evidence[-1]

@@ -213,3 +213,55 @@ def test_a_faulty_part_is_not_listed_as_judged_too_briefly() -> None:
         assert {part for row in rows for part in row.parts} == named
     (row,) = to_clear(Reservations(short=(("FR", "sensor"),)), PARTS, {}, {}, [], Limits(), faults)
     assert row.parts == (("FR", "sensor"),)  # else nobody would be told what clears the machine
+
+
+def test_nobody_is_asked_to_log_what_is_in_the_log() -> None:
+    """All speeds at once leave what neither measurement decides."""
+    speeds = frozenset({("FR", "sensor"), ("FL", "sensor")})
+    for twice, asked in ((frozenset(), "v_true"), (speeds, "u_applied"), (frozenset(PARTS), "a third one")):
+        against = Reservations(unexplained=(("FR", "sensor"), ("FL", "sensor")), twice=frozenset(twice))
+        (one,) = told(against)
+        assert asked in one
+        assert ("v_true" in one) is (not twice)
+        check = Checked(Kind.WHEEL, "FR", Side.SENSOR_OR_ACTUATOR, Check.RESPONSE, 0.4, 0.1, 1.0, 4.0)
+        (open_,) = told(Reservations(open=(check,), twice=frozenset(twice)))
+        assert ("v_true" in open_) is (not twice)
+
+
+def test_a_valve_that_is_off_its_command_is_not_sent_to_a_tachometer() -> None:
+    for kind, part, side, asked in (
+        (Kind.WHEEL, "FR", Side.SENSOR, "hand tachometer"),
+        (
+            Kind.WHEEL,
+            "FR",
+            Side.ACTUATOR,
+            "give the valve a few steady commands and compare each with the valve position",
+        ),
+        (Kind.STEER, "front", Side.SENSOR, "protractor"),
+        (Kind.STEER, "front", Side.ACTUATOR, "compare each with the valve position"),
+    ):
+        check = Checked(kind, part, side, Check.SECOND_MEASUREMENT, 0.4, 0.1, 1.0, 4.0)
+        (row,) = to_clear(Reservations(open=(check,)), PARTS, {}, {}, [], Limits())
+        assert asked in row.act
+        assert ("tachometer" in row.act) is (asked == "hand tachometer")
+
+
+def test_what_a_faulty_part_is_off_at_another_time_goes_with_its_fault() -> None:
+    parts = {("RR", "actuator"): assessed(finding(Side.ACTUATOR, FaultMode.STUCK, 1000, 3000))}
+    faults = intervals_of(parts, haulotte(), HYDRAULIC, 0, 1_000_000)
+    check = Checked(Kind.WHEEL, "RR", Side.ACTUATOR, Check.SECOND_MEASUREMENT, 0.4, 0.1, 9.0, 12.0)
+    (row,) = to_clear(Reservations(open=(check,)), PARTS, {}, {}, [], Limits(), faults)
+    assert row.reason.startswith("Of the same part as F1, which may explain it: the RR drive valve is off its second")
+    assert row.act == "repair the RR drive valve (F1), then diagnose the next mission"
+    other = replace(check, side=Side.SENSOR)
+    (row,) = to_clear(Reservations(open=(other,)), PARTS, {}, {}, [], Limits(), faults)
+    assert "F1" not in row.reason + row.act
+
+
+def test_a_wheel_of_which_no_model_was_found_is_driven_more_and_its_command_is_not_asked_for() -> None:
+    silent = unassessed(N, State.NOT_ASSESSED, "no model of the wheels could be found in this mission", Lack.ANSWER)
+    parts = {("FR", "sensor"): silent, ("FR", "actuator"): silent}
+    for part, other in ((("FR", "sensor"), "v_true"), (("FR", "actuator"), "u_applied")):
+        (row,) = to_clear(Reservations(short=(part,)), parts, {}, dict.fromkeys(parts, 60.0), [], Limits())
+        assert row.act.startswith("drive for a minute and longer with several speeds")
+        assert f"or log wheel.FR.{other}" in row.act

@@ -348,3 +348,22 @@ def test_the_paper_s_numbers_are_said_in_the_verdict_behind_its_answer() -> None
     page = build_page({**report, "machine": machine}, columns)
     assert page.index('id="verdict"') < page.index("<h1>") < page.index("gear ratio 17.7") < page.index('class="facts"')
     assert f"{machine['name']} (assumed)" in page
+
+
+def test_a_fault_of_unclear_kind_has_the_symbol_of_none() -> None:
+    """A red square says *stuck*, of which the title would not speak with a probability of 0.23."""
+    report, columns = samples.one_wheel()
+    clear = build_page(report, columns)
+    assert "Faulty, kind unclear" not in clear
+    report["intervals"][0]["hypotheses"] = [
+        {"side": "sensor", "mode": "stuck", "p": 0.4},
+        {"side": "sensor", "mode": "no_signal", "p": 0.35},
+        {"side": "sensor", "mode": "noisy", "p": 0.25},
+    ]
+    text = build_page(report, columns)
+    row = text.partition('<tr class="fault"')[2].partition("</tr>")[0]
+    assert '<span class="ic warning"' in row
+    assert "Faulty, kind unclear" in row
+    assert 'class="fb warning' in text
+    assert 'class="fb warning' not in clear
+    assert "</svg></span>Faulty, kind unclear</span>" in text.partition('id="timeline"')[2].partition("</section>")[0]

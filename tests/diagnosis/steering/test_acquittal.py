@@ -14,9 +14,9 @@ from diagnosis.results.result import Epsilon, Sat
 from diagnosis.results.vocabulary import Tier
 from diagnosis.steering.acquittal import acquitted, moves_otherwise, scatter_of
 from diagnosis.steering.blocks import SteeringBlocks, blocks_of, without_growth
-from diagnosis.steering.findings import SideFindings
 from diagnosis.steering.plant import SteeringPlant
 from diagnosis.steering.redundancy import with_second_angle, with_valve_opening
+from diagnosis.steering.side_findings import SideFindings
 from diagnosis.steering.valve_map import ValveMap
 from replay.faults import FaultMode, Side
 

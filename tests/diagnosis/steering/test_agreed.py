@@ -11,7 +11,7 @@ import pytest
 from diagnosis.results.assessment import Finding
 from diagnosis.results.vocabulary import Tier
 from diagnosis.steering.agreed import without_agreed
-from diagnosis.steering.findings import SideFindings
+from diagnosis.steering.side_findings import SideFindings
 from replay.faults import FaultMode, Side
 
 DT, SIZE = 0.01, 4000

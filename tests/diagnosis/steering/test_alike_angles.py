@@ -11,7 +11,7 @@ import pytest
 from diagnosis.results.assessment import Finding
 from diagnosis.results.vocabulary import Tier
 from diagnosis.steering.alike_angles import not_scaled_together
-from diagnosis.steering.findings import SideFindings
+from diagnosis.steering.side_findings import SideFindings
 from replay.faults import FaultMode, Side
 
 SIZE, LENGTH = 2000, 4

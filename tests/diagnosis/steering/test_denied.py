@@ -14,7 +14,7 @@ from diagnosis.results.result import Hypothesis
 from diagnosis.results.vocabulary import Tier
 from diagnosis.steering.blocks import SteeringBlocks, blocks_of
 from diagnosis.steering.denied import not_denied
-from diagnosis.steering.findings import SideFindings
+from diagnosis.steering.side_findings import SideFindings
 from replay.faults import FaultMode, Side
 
 DT, SIZE = 0.01, 4000

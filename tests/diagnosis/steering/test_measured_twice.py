@@ -12,9 +12,9 @@ from diagnosis.estimation.lag import low_passed
 from diagnosis.results.assessment import Finding
 from diagnosis.results.result import Epsilon, Hypothesis
 from diagnosis.results.vocabulary import Tier
-from diagnosis.steering.findings import SideFindings
 from diagnosis.steering.inputs import AxleInputs
 from diagnosis.steering.measured_twice import of_one_cause
+from diagnosis.steering.side_findings import SideFindings
 from replay.faults import FaultMode, Side
 
 DT, SIZE, SPAN = 0.01, 3000, (1000, 1400)

@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 from diagnosis.results.assessment import Finding
 from diagnosis.results.result import Hypothesis
 from diagnosis.results.vocabulary import Tier
-from diagnosis.steering.findings import SideFindings
 from diagnosis.steering.measured_twice import of_one_cause
 from diagnosis.steering.openings import latest, opens_as_told
+from diagnosis.steering.side_findings import SideFindings
 from replay.faults import FaultMode, Side
 from tests.diagnosis.steering.test_measured_twice import axle
 

@@ -11,8 +11,8 @@ from numpy.testing import assert_allclose
 from diagnosis.results.assessment import Finding
 from diagnosis.results.result import Epsilon, Hypothesis
 from diagnosis.results.vocabulary import Tier
-from diagnosis.steering.findings import SideFindings
 from diagnosis.steering.reliability import features_of, lost_by_model, paired, told_from_none, weighed
+from diagnosis.steering.side_findings import SideFindings
 from replay.faults import FaultMode, Side
 
 DT, LENGTH = 0.01, 5

@@ -10,8 +10,8 @@ import pytest
 
 from diagnosis.results.assessment import Finding
 from diagnosis.results.vocabulary import Tier
-from diagnosis.steering.findings import SideFindings
 from diagnosis.steering.rests_together import not_resting_together
+from diagnosis.steering.side_findings import SideFindings
 from replay.faults import FaultMode, Side
 
 SIZE, LENGTH = 2000, 2

@@ -11,7 +11,7 @@ import pytest
 
 from diagnosis.results.assessment import Finding
 from diagnosis.results.vocabulary import Tier
-from diagnosis.steering.findings import SideFindings
+from diagnosis.steering.side_findings import SideFindings
 from diagnosis.steering.together import less_sure_all_along, not_shaken_together, not_starved, not_together
 from replay.faults import FaultMode, Side
 

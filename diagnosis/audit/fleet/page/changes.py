@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from diagnosis.audit.fleet.baseline_types import MissionChangesRow
 from diagnosis.audit.fleet.compare import OUTCOMES
 from diagnosis.audit.fleet.fault_types import FaultChange, FaultStandingRow
 from diagnosis.audit.fleet.page.shown import Context, ShownBaseline, ShownFaultChange
@@ -59,18 +60,25 @@ def changes_of(b: ShownBaseline | None, words: Mapping[str, MachineWords]) -> Co
     return {
         "worse": b["worse"],
         "missing": bool(lost),
-        "headline": lost + ("Faults: " + ", ".join(counted) if counted else "No fault in either audit"),
-        "missions": f"{count(m['newer'], 'mission')} now, {count(m['older'], 'mission')} then; {count(m['new'], 'mission')} new",
+        "headline": lost
+        + ("Faults that stand in either audit: " + ", ".join(counted) if counted else "No fault in either audit"),
+        "missions": f"{count(m['newer'], 'mission')} now, {count(m['older'], 'mission')} then; {_new_words(m)}",
         "groups": groups,
         "notes": notes,
         "coverage": coverage,
     }
 
 
+def _new_words(m: MissionChangesRow) -> str:
+    """How many missions are new, and how many of them have a report: ``7 missions new, 6 of them with a report``."""
+    counted = m.get("new_counted", m["new"])
+    return f"{count(m['new'], 'mission')} new" + (f", {counted} of them with a report" if counted != m["new"] else "")
+
+
 def _changed(f: ShownFaultChange, words: MachineWords) -> Context:
     return {
         "machine": f["machine"],
-        "symbol": labels.known(f["mode"]),
+        "symbol": "warning" if f.get("unclear") else labels.known(f["mode"]),
         "words": f"{words.part_words(f['kind'], f['component'], f['side'])} {UNCLEAR if f.get('unclear') else state_label(f['mode'], f['side']).lower()}",
         "older": _standing(f["older"]),
         "newer": _standing(f["newer"]),

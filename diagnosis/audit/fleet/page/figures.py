@@ -53,7 +53,11 @@ def kpis(document: ShownDocument) -> list[tuple[str, str, str]]:
             labels.grouped(c["missions"]),
             "missions",
             ", ".join([f"{labels.grouped(counted)} with a report", *unread, *rest])
-            + (f"; {labels.grouped(c['not_assessed'])} without a verdict" if c["not_assessed"] else ""),
+            + (
+                f"; {labels.grouped(c['not_assessed'])} {Verdict.NOT_ASSESSED.group.lower()}"
+                if c["not_assessed"]
+                else ""
+            ),
         ),
         (
             hours(c["driving_s"]),

@@ -195,10 +195,17 @@ def _environment() -> jinja2.Environment:
     made.filters |= {"state": state_label, "grouped": labels.grouped}
     made.globals |= {
         "mark": mark,
-        "legend": [(s, labels.mode_legend(FaultMode(s)) if s in set(FaultMode) else state_label(s)) for s in LEGEND],
-        "verdicts": [(v, v.short) for v in _FILTER],
+        "legend": [(s, _legend(s)) for s in LEGEND],
+        "verdicts": [(v, v.group) for v in _FILTER],
     }
     return made
+
+
+def _legend(symbol: str) -> str:
+    """What a symbol of a mission says: its worst fault, or its verdict where it has none."""
+    if symbol in set(FaultMode):
+        return labels.mode_legend(FaultMode(symbol))
+    return Verdict.NOT_ASSESSED.group if symbol == Verdict.NOT_ASSESSED.symbol else state_label(symbol)
 
 
 def _span(counts: CountsRow) -> str:
@@ -295,7 +302,7 @@ def _fault(f: FleetFaultRow, document: ShownDocument, directions: Mapping[tuple[
         notes.append(f"not in the {last_ones} that judged it")
     return {
         "machine": document["machines"][f["machine"]]["label"],
-        "symbol": labels.known(f["mode"]),
+        "symbol": rows.fault_symbol(f),
         "words": UNCLEAR.capitalize() if f.get("unclear") else state_label(f["mode"], f["side"]),
         "part": words_of(document["machines"][f["machine"]]).part_words(f["kind"], f["component"], f["side"]),
         "severity": f["severity"],

@@ -18,7 +18,7 @@ from diagnosis.results.candidates import UNCLEAR
 from diagnosis.results.fault_rows import state_label
 from diagnosis.results.machine_words import ANY_DRIVE, MachineWords, words_of
 from diagnosis.results.sizes import loss_known
-from diagnosis.results.vocabulary import Verdict
+from diagnosis.results.vocabulary import NOT_CLEARED, Verdict
 from replay.faults import SCALED
 
 STRIP = 14
@@ -38,8 +38,13 @@ def symbol(mission: ShownMission) -> str:
     if verdict is None:
         return "warning"
     if mission["faults"]:
-        return labels.known(mission["faults"][0]["mode"])
+        return fault_symbol(mission["faults"][0])
     return "warning" if verdict == Verdict.WATCH else Verdict(verdict).symbol
+
+
+def fault_symbol(fault: FleetFaultRow | MissionFaultRow) -> str:
+    """Symbol of a fault: its mode, or a warning where its kind is unclear."""
+    return "warning" if fault.get("unclear") else labels.known(fault["mode"])
 
 
 def fault_words(fault: FleetFaultRow | MissionFaultRow, machine_words: MachineWords) -> str:
@@ -64,8 +69,12 @@ def not_named(faults: Sequence[FleetFaultRow], named: int, machine: MachineRow) 
     return f" and {len(rest)} more" + (f", the newest {fault_words(newest, words_of(machine))}" if newer else "")
 
 
-def _verdict_words(verdict: Verdict | None) -> str:
-    return "" if verdict is None else verdict.short
+def _verdict_words(m: ShownMission) -> str:
+    """Verdict of a mission in few words, as its own report begins: one that judged every wheel and yet gives no leave is *not cleared*."""
+    verdict = m["verdict"]
+    if verdict == Verdict.NOT_ASSESSED and m.get("judged"):
+        return NOT_CLEARED
+    return "" if verdict is None else Verdict(verdict).short
 
 
 def day(start_ns: int | None) -> str:
@@ -90,7 +99,7 @@ def strip(missions: Sequence[ShownMission], machine: MachineRow, length: int = S
 def _cell(m: ShownMission, machine_words: MachineWords) -> Markup:
     state, address = symbol(m), m["address"]
     faults = m["faults"]
-    found = fault_words(faults[0], machine_words) if faults else m["state"].words or _verdict_words(m["verdict"])
+    found = fault_words(faults[0], machine_words) if faults else m["state"].words or _verdict_words(m)
     more = f" and {len(faults) - 1} more" if len(faults) > 1 else ""
     words = f"{day(m.get('start_ns'))}: {found}{more}"
     inner = Markup('<svg><use href="#g-{}"/></svg>').format(state)
@@ -171,7 +180,7 @@ def _row(m: ShownMission, machine_words: MachineWords) -> str:
         status = f"{mark('warning')}{m['state'].words.capitalize()}"
     else:
         kind = verdict.value
-        status = f"{mark(symbol(m))}{verdict.short}"
+        status = f"{mark(symbol(m))}{_verdict_words(m)}"
     kind += " degraded" if m["state"] is MissionState.DEGRADED else ""
     return (
         f'<tr class="{kind}"><td>{head}{note}</td><td>{labels.utc_mark(start, 16) if start is not None else "no date"}</td>'

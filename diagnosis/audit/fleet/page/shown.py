@@ -7,16 +7,14 @@ from pathlib import PurePosixPath
 from typing import NotRequired, TypedDict
 from urllib.parse import quote
 
+from diagnosis.audit.fleet.baseline_types import CoverageChangeRow, MachineChangesRow, MissionChangesRow
 from diagnosis.audit.fleet.fault_types import FaultChangeRow, FleetFaultRow
 from diagnosis.audit.fleet.fleet_types import (
     AuditRow,
     CountsRow,
-    CoverageChangeRow,
     FleetDocument,
     FleetVerdictRow,
-    MachineChangesRow,
     MachineRow,
-    MissionChangesRow,
     MissionRow,
 )
 from diagnosis.audit.fleet.trend_types import Axis

@@ -147,3 +147,14 @@ def test_the_own_store_is_no_baseline(tmp_path: Path, baseline: str) -> None:
     store = samples.write_store(tmp_path / "now/fleet.sqlite", [Sample("a")])
     with pytest.raises(ConfigError, match="is the store of this audit itself"):
         write_fleet(store, store.parent, baseline=store.parent / baseline)
+
+
+def test_a_log_that_could_not_be_read_is_new_and_does_not_count(tmp_path: Path) -> None:
+    """As the headline has it, which counts missions with a report."""
+    found = compared(tmp_path, [Sample("a")], [Sample("a"), Sample("b", day=1.0), Sample("c", state="crashed")])
+    told = changes_of(found, {})
+    assert told
+    assert told["missions"] == "3 missions now, 1 mission then; 2 missions new, 1 of them with a report"
+    told = changes_of(compared(tmp_path / "all", [Sample("a")], [Sample("a"), Sample("b", day=1.0)]), {})
+    assert told
+    assert told["missions"] == "2 missions now, 1 mission then; 1 mission new"

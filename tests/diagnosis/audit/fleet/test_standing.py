@@ -295,7 +295,7 @@ def test_a_copy_adds_nothing_to_what_was_not_assessed_and_the_figures_add_up(tmp
     )
     assert d["counts"]["not_assessed"] == 1
     assert any("1 mission found no fault, but did not clear its machine." in line for line in d["verdict"]["text"])
-    assert "2 with a report, 1 copy; 1 without a verdict" in build_fleet_page(d)
+    assert "2 with a report, 1 copy; 1 not assessed or not cleared" in build_fleet_page(d)
 
 
 def test_parts_that_the_last_mission_did_not_assess_are_named(tmp_path: Path) -> None:

@@ -190,3 +190,14 @@ def test_an_estimate_that_says_nothing_is_not_drawn_across_the_limit() -> None:
     assert len(heights(sure, wide, last)) == 2
     assert len(heights(last, sure, last)) == 2
     assert len(heights(sure, sure, last)) == 3
+
+
+@pytest.mark.parametrize(("blind", "words"), [((), "Not cleared"), ([("FR", "sensor")], "Not assessed")])
+def test_a_mission_that_judged_every_wheel_and_gives_no_leave_is_not_cleared(
+    tmp_path: Path, blind: list[tuple[str, str]], words: str
+) -> None:
+    """As its own report begins: *not assessed* stood beside *no fault found, not cleared*."""
+    page = build_fleet_page(document(tmp_path, Sample("a", verdict="not_assessed", blind=blind)))
+    row = re.search(r'<tr class="not_assessed">.*?</tr>', page, flags=re.DOTALL)
+    assert row
+    assert re.search(rf">{words}</span>", row[0])
