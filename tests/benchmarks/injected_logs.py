@@ -1,9 +1,10 @@
 """Faults written into real logs of robots, ten into each; run as `python tests/benchmarks/injected_logs.py LOG [LOG ...] --seed 2001`.
 
 The machine file is drafted from each log as `mfhca config init` does. A wheel drawn at random is dead, frozen at its value, reads 0.5, 0.8 or 1.3,
-is noisy (15 % of the usual top speed) or has spikes (3 % of the readings, five times it) for ten seconds of driving; and is dead or reads 0.8 or 1.3
+is noisy (15 % of the usual top speed) or has spikes (3 % of the readings and four at least, five times it) for ten seconds of driving; and is dead or reads 0.8 or 1.3
 from start to end. Its position reads the same of scales and deaths with `--both`. Printed are each log's own verdict with its alarms, every fault that no finding on its wheel
-names, and by kind: found, on the right wheel, another one beside it, cleared, and for how long the sensor was healthy meanwhile.
+names, and by kind: found, on the right wheel, told (or by the verdict, as a wheel that contradicts what others make of the motion, or that reads nothing), another
+wheel named beside it, cleared, and those that are not told and called healthy for over three seconds of it.
 
 The logs are those of other people and no part of the project.
 """
@@ -36,11 +37,14 @@ from replay.setup.read import read_everything
 
 Array = NDArray[np.float64]
 
+COUNTED = ("n", "found", "right", "told", "beside", "cleared", "healthy")
 KINDS = ("dead", "frozen", "x0.5", "x0.8", "x1.3", "noise", "spikes", "all x0.8", "all x1.3", "all dead")
 SPELL_S, MARGIN_S = 10.0, 4.0
 NOISE, SPIKES, SPIKE = 0.15, 0.03, 5.0  # of the usual top speed; of the readings; times that speed
+#: Of titles that say so without a fault of one part.
+CONTRADICTS = "contradicts", "contradict", "another share", "reads nothing"
 MOVES, PLACES = 0.25, 60  # of the usual top speed, in the median of a spell; tries
-HEALTHY_S = 3.0
+HEALTHY_S, LEAST_SPIKES = 3.0, 4
 
 
 def injected(y: Array, kind: str, part: slice, fresh: NDArray[np.bool_], rng: np.random.Generator) -> Array:
@@ -61,7 +65,9 @@ def injected(y: Array, kind: str, part: slice, fresh: NDArray[np.bool_], rng: np
         if name == "noise":
             added = rng.normal(0.0, NOISE * top, new.size)
         else:
-            added = np.where(rng.random(new.size) < SPIKES, SPIKE * top * rng.choice([-1.0, 1.0], new.size), 0.0)
+            wild = rng.choice(new.size, min(new.size, max(LEAST_SPIKES, round(SPIKES * new.size))), replace=False)
+            added = np.zeros(new.size)
+            added[wild] = SPIKE * top * rng.choice([-1.0, 1.0], wild.size)
         at = np.searchsorted(new, steps, side="right") - 1  # what is held repeats its reading
         y[part] += np.where(at >= 0, added[np.maximum(at, 0)] if added.size else 0.0, 0.0)
     return y
@@ -109,6 +115,7 @@ def case(mission: Mission, machine: Machine, kind: str, both: bool, rng: np.rand
     faults = faults_of(report)
     hits = [i for i in faults if i["start_s"] < stop and i["stop_s"] > start]
     right = [i for i in hits if i["component"] == wheel and i["side"] in ("sensor", "sensor_or_actuator")]
+    told = any(words in report["verdict"]["title"] for words in CONTRADICTS)
     well = healthy_s(report, wheel, start, stop)
     if not right:
         said = "; ".join(f"{i['component']} {i['side']} {i['mode']} p {i['probability']:.2f}" for i in faults[:3])
@@ -122,6 +129,7 @@ def case(mission: Mission, machine: Machine, kind: str, both: bool, rng: np.rand
         right=bool(right),
         beside=any(i["component"] != wheel for i in faults),
         cleared=report["verdict"]["cleared"],
+        told=bool(right) or told,
         healthy=not right and well > HEALTHY_S,
     )
 
@@ -150,8 +158,8 @@ def main() -> None:
     every: Counter[str] = Counter()
     for kind, one in totals.items():
         every += one
-        print(f"{kind:<9}", ", ".join(f"{k} {one[k]}" for k in ("n", "found", "right", "beside", "cleared", "healthy")))
-    print("together ", ", ".join(f"{k} {every[k]}" for k in ("n", "found", "right", "beside", "cleared", "healthy")))
+        print(f"{kind:<9}", ", ".join(f"{k} {one[k]}" for k in COUNTED))
+    print("together ", ", ".join(f"{k} {every[k]}" for k in COUNTED))
 
 
 if __name__ == "__main__":
