@@ -193,7 +193,8 @@ def fitted(apart: Array, yaw: Array, sound: NDArray[np.bool_], part: float = 0.8
         off = np.abs(yaw - columns @ weights)
         kept = sound & (off <= np.quantile(off[sound], part))
     noise = 1.48 * float(np.quantile(off[sound], min(0.5, 0.625 * part)))
-    if noise > _FITS * float(np.std(weights[0] * apart[sound])):
+    made = float(np.std(weights[0] * apart[sound]))
+    if noise > _FITS * made or made == 0.0:  # a yaw rate that is one value has nothing of the wheels
         return None
     return float(weights[0]), float(weights[1]), noise
 
