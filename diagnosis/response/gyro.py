@@ -150,10 +150,10 @@ def _constant(about: _Spread, part: slice, use_of: tuple[Flags, Flags, Flags], b
     helps = not turns.any() or float(np.mean((apart[turns] - constant) ** 2)) < float(np.mean(apart[turns] ** 2))
     rest, other = stands[part], stands.copy()
     other[part] = False
-    shows = min(np.count_nonzero(rest), np.count_nonzero(other)) * block_s >= _RESTS_S
+    shows = bool(min(np.count_nonzero(rest), np.count_nonzero(other)) * block_s >= _RESTS_S)
     if shows:
         here, there = (float(np.median((about.measured - about.made)[x])) for x in (_only(stands, part), other))
-        shows = abs(here - constant) < _FITS * abs(constant) and abs(there) < _FITS * abs(constant)
+        shows = bool(max(abs(here - constant), abs(there)) < _FITS * abs(constant))
     if (
         abs(constant) <= max((_ASIDE_AT_REST if shows else _ASIDE) * about.usual, _OFF * about.noise)
         or left > _FITS * abs(constant)
