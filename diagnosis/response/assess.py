@@ -37,11 +37,8 @@ from diagnosis.response.joint import rolling
 from diagnosis.response.joint_gain import scaled_channels, told_gain, without_gains
 from diagnosis.response.late import late_neighbour, late_wheels, left_open, smallest_delay
 from diagnosis.response.machine import Judged, lasting_losses, otherwise, paused, standstills, unexplained, unlike
-from diagnosis.response.models import (
-    BLOCK_S,
-    Beside,
-    Blocks,
-)
+from diagnosis.response.models import BLOCK_S, Beside, Blocks
+from diagnosis.response.motionless import motionless, not_moving
 from diagnosis.response.nearer import nearer_to_its_command
 from diagnosis.response.pairs import by_leaps
 from diagnosis.response.power import powers_of, unshown
@@ -58,7 +55,7 @@ from diagnosis.response.sideways import crossed, goes_sideways
 from diagnosis.response.spells import until_back, where_asked
 from diagnosis.response.states import judge
 from diagnosis.response.turning import turning_of, turns_other_way, turns_with, unasked_turn, wrong_yaw_rate
-from diagnosis.response.unlike import unlike_in_motion
+from diagnosis.response.unlike import contradicting, unlike_in_motion
 from diagnosis.response.uphill import lower_by_a_load
 from diagnosis.response.witness import witness_of, witnessed
 from diagnosis.response.wound_up import after_a_fault
@@ -89,7 +86,7 @@ _EXCHANGED = (
 class Judgement:
     """Both sides of each wheel that could be judged, and what happened to the machine as a whole, to its gyro, to all speeds and to those of one side, a sentence each.
 
-    `unrelated` says that speeds and commands are of sizes that nothing relates.
+    `apart` says which wheels read another share of the motion than the others, or nothing, all through; `unrelated` says that speeds and commands are of sizes that nothing relates.
     """
 
     parts: Mapping[str, tuple[Assessment, Assessment]]
@@ -98,6 +95,7 @@ class Judgement:
     unshown: tuple[str, ...] = ()
     unrelated: tuple[str, ...] = ()
     scaled: tuple[str, ...] = ()
+    apart: tuple[str, ...] = ()
 
 
 def assess_response(
@@ -253,11 +251,16 @@ def assess_response(
     remarks = (*astray, *left_notes, *((_TURNED,) if any(turned.values()) else ()))
     doubts = {w: Reason(j.odd) for w, j in judged.items() if j.odd and not any(side.findings for side in parts[w])}
     doubts |= {w: j.joint.unlike for w, j in judged.items() if j.joint is not None and j.joint.unlike}
-    doubts |= unlike_in_motion(judged, mates, sideways=sideways) | unlike(judged)
+    apart, none_read = (
+        unlike_in_motion(judged, mates, sideways=sideways),
+        motionless(judged, limits.driving_speed, width * dt),
+    )
+    doubts |= apart | unlike(judged) | none_read
     if other_way:
         doubts = dict.fromkeys(judged, Reason(_EXCHANGED)) | doubts
     for w, why in doubts.items():
         parts[w] = doubted(parts[w][0], [slice(None)], why), parts[w][1]
+    parts |= {w: not_moving(*parts[w], why) for w, why in none_read.items()}
     disputed = disputed_steps(judged, width * dt)
     parts |= {w: (unproved(parts[w][0], one, DISPUTED), parts[w][1]) for w, one in disputed.items()}
     lasting = lasting_losses(judged)
@@ -285,7 +288,8 @@ def assess_response(
     scaled = told(sought, turning, width * dt)
     parts |= {w: told_gain(parts[w], data[w].name, gain) for w, gain in scales.items() if w in parts}
     told_of_it = tuple(x.text for x in gyro)
-    return Judgement(parts, (*stood, *(astray if lasts else ())), told_of_it, said, ignored, scaled)
+    events = (*stood, *(astray if lasts else ()))
+    return Judgement(parts, events, told_of_it, said, ignored, scaled, contradicting(apart, none_read))
 
 
 def _turned_by(wheel: str, found: Mapping[str, Judged]) -> bool:

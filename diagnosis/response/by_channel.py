@@ -33,8 +33,11 @@ _LEAST_TURNING = 100  # readings of a turning wheel
 _BREAKS_OFF_P = 0.85, 0.93  # that something is wrong, by one end of it that comes at once and by both
 
 
-def spikes_of(wheel: Wheel, y: Array, driving_speed: float) -> list[Finding]:
+def spikes_of(wheel: Wheel, y: Array, driving_speed: float, others: Sequence[Array] = ()) -> list[Finding]:
     """Findings of wild readings that come again and again, or that no wheel can make; none where those of the other wheels do, too.
+
+    Where all wheels have some, as taps of a joystick read ten times a second make them, those count that are far beyond all else that is read, unless other
+    wheels read as much.
 
     Parameters
     ----------
@@ -44,10 +47,13 @@ def spikes_of(wheel: Wheel, y: Array, driving_speed: float) -> list[Finding]:
         Its readings, the wild ones too [m/s].
     driving_speed : float
         Speed from which a wheel drives [m/s].
+    others : Sequence[Array], each of shape (n,)
+        Readings of the other wheels [m/s].
     """
-    if not wheel.spiky or once_a_turn(wheel.samples, y, wheel.dt):
+    wild = wheel.samples.wild if wheel.spiky else _far(wheel, y, driving_speed, others)
+    if not wild.any() or once_a_turn(wheel.samples, y, wheel.dt):
         return []
-    places = wheel.samples.step[wheel.samples.wild]
+    places = wheel.samples.step[wild]
     beyond = _impossible(wheel, y, driving_speed)
     groups = np.split(places, np.flatnonzero(np.diff(places) * wheel.dt > SPIKE_GAP_S) + 1) if places.size else []
     out = []
@@ -66,6 +72,15 @@ def spikes_of(wheel: Wheel, y: Array, driving_speed: float) -> list[Finding]:
         )
         out.append(sensor_finding(int(group[0]), int(group[-1]) + 1, FaultMode.NOISY, p, None, None, (text,)))
     return out
+
+
+def _far(wheel: Wheel, y: Array, driving_speed: float, others: Sequence[Array]) -> Flags:
+    """Wild readings far beyond all others of a wheel, shape (m,); none where another wheel reads as much."""
+    samples, value = wheel.samples, np.abs(y[wheel.samples.step])
+    least = _BEYOND * max(float(np.nanmax(np.abs(samples.value), initial=0.0)), driving_speed)
+    if any(bool((np.abs(np.nan_to_num(x)) > least).any()) for x in others):
+        return np.zeros_like(samples.wild)
+    return np.asarray(samples.wild & (value > least))
 
 
 def once_a_turn(samples: Samples, y: Array, dt: float) -> bool:

@@ -128,7 +128,7 @@ def scaled_sides(
 
 def _sides(judged: Mapping[str, Judged], faults: Mapping[str, Sequence[Spell]], turning: Turning) -> _Sides:
     right, left = (
-        np.mean([j.wheel.blocks.mean for w, j in judged.items() if turning.sides[w] == side], axis=0)
+        np.mean([j.wheel.blocks.mean for w, j in judged.items() if turning.sides.get(w) == side], axis=0)
         for side in (1.0, -1.0)
     )
     sound = np.isfinite(right) & np.isfinite(left) & np.isfinite(turning.yaw)

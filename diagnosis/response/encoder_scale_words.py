@@ -54,6 +54,8 @@ def by_the_gyro(
         Steps in which the gyro may be wrong, or either side.
     """
     one = judged[wheel]
+    if turning is not None and wheel not in turning.sides:  # a steered one, of which the yaw rate says nothing
+        sought, turning = Sought(), None
     if not one.response.answered:
         untold = not np.isfinite(one.data.asked).any() and len(judged) > 1
         return replace(sensor, hidden=_UNTOLD) if untold else sensor

@@ -25,6 +25,7 @@ from diagnosis.results.machine_event import (
     not_shown,
     one_side_otherwise,
     turns_otherwise,
+    wheels_apart,
 )
 from diagnosis.results.vocabulary import Tier
 from replay.machine.config import Machine
@@ -71,6 +72,7 @@ class ResponseEvidence:
             *map(not_shown, judged.unshown),
             *map(one_side_otherwise, judged.scaled),
             *map(gyro_or_slip, judged.gyro),
+            *wheels_apart(judged.apart),
             *(turns_otherwise(t.text) for t in turns),
         )
         return Contribution(parts, events=events)

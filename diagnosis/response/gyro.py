@@ -30,6 +30,7 @@ _FITS = 0.3  # of a deviation: what a gain, or a constant, may leave of it
 _STILL = 0.05  # of the usual yaw rate: a spread below that is one value
 _NOTHING = 0.1  # of what the wheels make
 _SAME, _ASIDE = 0.2, 0.15  # of one: a gain that is as before; of the usual yaw rate: a constant that matters
+_ASIDE_AT_REST = 0.05  # of the usual yaw rate: a constant that rests of the machine show to come and go
 _SOUND = 0.55  # of the mission, in which the gyro is sound
 _STRAIGHT_S, _RESTS_S, _STANDS = (
     6.0,
@@ -118,7 +119,7 @@ def wrong_gyro(
             found_in[start, stop] = _kind(about, slice(start, stop), sound[start:stop], block_s)
     for start, stop in _spans(off & straight, straight):
         if not any(start < last and first < stop for (first, last), what in found_in.items() if what):
-            found_in[start, stop] = _constant(about, slice(start, stop), straight, sound, block_s)
+            found_in[start, stop] = _constant(about, slice(start, stop), (straight, sound, stands), block_s)
     out = []
     for (start, stop), what in sorted(found_in.items()):
         if heading is not None and agree(turning.yaw - offset, heading, about.made, slice(start, stop)):
@@ -132,8 +133,13 @@ def wrong_gyro(
     return tuple(out)
 
 
-def _constant(about: _Spread, part: slice, straight: Flags, sound: Flags, block_s: float) -> str:
-    """The constant that the yaw rate has beside what the wheels make, by the times in which these hardly turn the machine; empty where none."""
+def _constant(about: _Spread, part: slice, use_of: tuple[Flags, Flags, Flags], block_s: float) -> str:
+    """The constant that the yaw rate has beside what the wheels make, by the times in which these hardly turn the machine; empty where none.
+
+    `use_of`: blocks nearly straight ahead, sound ones, and those of a machine that stands. A constant that shows at rest as well, and at no other rest, may be
+    smaller.
+    """
+    straight, sound, stands = use_of
     use, all_of = straight[part], sound[part]
     apart = about.measured[part] - about.made[part]
     if np.count_nonzero(use) * block_s < _STRAIGHT_S:
@@ -142,9 +148,26 @@ def _constant(about: _Spread, part: slice, straight: Flags, sound: Flags, block_
     left = float(np.std(apart[use] - constant))
     turns = all_of & ~use
     helps = not turns.any() or float(np.mean((apart[turns] - constant) ** 2)) < float(np.mean(apart[turns] ** 2))
-    if abs(constant) <= max(_ASIDE * about.usual, _OFF * about.noise) or left > _FITS * abs(constant) or not helps:
+    rest, other = stands[part], stands.copy()
+    other[part] = False
+    shows = bool(min(np.count_nonzero(rest), np.count_nonzero(other)) * block_s >= _RESTS_S)
+    if shows:
+        here, there = (float(np.median((about.measured - about.made)[x])) for x in (_only(stands, part), other))
+        shows = bool(max(abs(here - constant), abs(there)) < _FITS * abs(constant))
+    if (
+        abs(constant) <= max((_ASIDE_AT_REST if shows else _ASIDE) * about.usual, _OFF * about.noise)
+        or left > _FITS * abs(constant)
+        or not helps
+    ):
         return ""
     return f"reads {constant:+.2g} {GYRO_CONSTANT}"
+
+
+def _only(where: Flags, part: slice) -> Flags:
+    """Blocks of a part alone, shape (b,)."""
+    out = np.zeros_like(where)
+    out[part] = where[part]
+    return out
 
 
 def _spans(off: Flags, shows: Flags) -> list[tuple[int, int]]:

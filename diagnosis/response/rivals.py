@@ -55,8 +55,10 @@ def by_each_other(found: Mapping[str, Judged], block_s: float, rest: Mapping[str
             likewise = _ROUGHER * np.median([_usual_at(found[o].wheel.blocks, speed) for o in others], axis=0)
             mine = _usual_at(blocks, speed)
             shares = np.divide(likewise, mine, out=np.ones(mine.size), where=(mine > 0.0) & (likewise > 0.0))
+            quiet = quiet_level(blocks, j.driving, block_s, [found[o].wheel.blocks.rough for o in others])
             blocks = blocks._replace(
-                usual=np.clip(shares, 0.0, share) * blocks.usual, habitual=max(held[o] for o in others) > _ALSO_HELD
+                usual=np.minimum(np.clip(shares, 0.0, share) * blocks.usual, np.maximum(quiet, likewise / _ROUGHER)),
+                habitual=max(held[o] for o in others) > _ALSO_HELD,
             )
         elif not rest:
             blocks = blocks._replace(usual=quiet_level(blocks, j.driving, block_s))

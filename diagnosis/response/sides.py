@@ -77,7 +77,7 @@ def sides_of(
     (drives, late), (idle, together) = known, machine
     wheel, blocks, size = one.wheel, one.wheel.blocks, one.data.y.size
     width = -(-size // blocks.start.size) if blocks.start.size < 2 else int(blocks.start[1])
-    findings, doubtful = spikes_of(wheel, one.data.y, limits.driving_speed), one.posterior[:, HEALTHY] < 0.5
+    findings, doubtful = spikes_of(wheel, one.data.y, limits.driving_speed, one.others), one.posterior[:, HEALTHY] < 0.5
     doubtful = doubtful & ~((one.posterior.argmax(axis=1) == OTHER) & (one.speed is None) & one.calm)
     if one.speed is None:
         doubtful &= ~(together & (one.posterior.argmax(axis=1) != SILENT))

@@ -47,7 +47,7 @@ class Turning(NamedTuple):
     yaw : Array, shape (b,)
         Measured yaw rate [rad/s].
     sides : Mapping[str, float]
-        1 for wheels of the right, -1 for those of the left.
+        1 for wheels of the right, -1 for those of the left; of a machine that steers, those of the axle that it does not steer.
     """
 
     yaw: Array
@@ -59,7 +59,7 @@ def turning_of(judged: Mapping[str, Judged], geometry: Geometry | None, yaw: Arr
 
     `yaw` of shape (blocks,) [rad/s].
     """
-    sides = None if yaw is None else _sides(judged, geometry)
+    sides = None if yaw is None else _sides(judged, geometry) or _unsteered(judged, geometry)
     return None if yaw is None or sides is None else Turning(yaw, sides)
 
 
@@ -71,6 +71,14 @@ def _sides(judged: Mapping[str, Judged], geometry: Geometry | None) -> dict[str,
     if len(fixed) < len(judged) or len({p.y > 0.0 for p in fixed.values()}) < 2:
         return None
     return {w: -1.0 if p.y > 0.0 else 1.0 for w, p in fixed.items()}
+
+
+def _unsteered(judged: Mapping[str, Judged], geometry: Geometry | None) -> dict[str, float] | None:
+    """The same of the wheels that no steering turns, whose difference makes the yaw rate whatever the others do; None where that is no single pair."""
+    if geometry is None:
+        return None
+    fixed = {w: j for w, j in judged.items() if (p := geometry.wheels.get(w)) is not None and p.axle == "fixed"}
+    return _sides(fixed, geometry) if len(fixed) == _PAIR else None
 
 
 def unasked_turn(
@@ -133,7 +141,7 @@ def turns_with(wheel: str, spell: Spell, judged: Mapping[str, Judged], turning: 
     turning : Turning or None
         How the body is turned.
     """
-    if turning is None:
+    if turning is None or wheel not in turning.sides:
         return None
     one, part = judged[wheel], slice(spell.start, spell.stop)
     b = one.wheel.blocks
@@ -193,7 +201,8 @@ def fitted(apart: Array, yaw: Array, sound: NDArray[np.bool_], part: float = 0.8
         off = np.abs(yaw - columns @ weights)
         kept = sound & (off <= np.quantile(off[sound], part))
     noise = 1.48 * float(np.quantile(off[sound], min(0.5, 0.625 * part)))
-    if noise > _FITS * float(np.std(weights[0] * apart[sound])):
+    made = float(np.std(weights[0] * apart[sound]))
+    if noise > _FITS * made or made == 0.0:  # a yaw rate that is one value has nothing of the wheels
         return None
     return float(weights[0]), float(weights[1]), noise
 

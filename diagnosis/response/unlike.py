@@ -52,6 +52,11 @@ def unlike_in_motion(
     return out
 
 
+def contradicting(apart: Mapping[str, Reason], still: Mapping[str, Reason]) -> tuple[str, ...]:
+    """Sentences on wheels that read another share of the motion than others, or nothing at all, one for each; what is said of them by wheel."""
+    return tuple(f"{w} speed sensor: {why.text}." for found in (apart, still) for w, why in found.items())
+
+
 def _said(share: float, others: str) -> Reason:
     return Reason(
         f"over the whole mission it reads {share:.2f} × what {others} make of the same motion, and no command tells which of them is right: a scaled or "

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from diagnosis.results.machine_words import MachineWords
@@ -133,6 +134,19 @@ def one_side_otherwise(text: str) -> MachineEvent:
     return MachineEvent(
         "The gyro contradicts one side's speed", text, "the gyro contradicts the speed of one side", act
     )
+
+
+def wheels_apart(sentences: Sequence[str]) -> tuple[MachineEvent, ...]:
+    """Wheels that read another share of the motion than others make of it, or nothing, from start to end; a sentence each, one event at most."""
+    if not sentences:
+        return ()
+    one = len(sentences) == 1
+    act = (
+        "mark the {wheels}, let each make ten turns by its encoder and count them, measure the tyres, check the mapping of the speeds, and record the "
+        "commands as well (cmd.v, cmd.omega)"
+    )
+    title = "One {wheel} contradicts the others" if one else "The {wheels} contradict each other"
+    return (MachineEvent(title, " ".join(sentences), f"{title[0].lower()}{title[1:]} throughout", act),)
 
 
 def turns_otherwise(text: str) -> MachineEvent:

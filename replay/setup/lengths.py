@@ -243,10 +243,11 @@ def with_speeds(draft: Draft, machine: Machine, logs: Sequence[RawLog]) -> Machi
             s for s in (*filter(None, [found.get("cmd.v"), found.get("cmd.omega")]), *wheels) if _top(s) > _ANY_MACHINE
         ]
         slow = top * UNITS["mm/s"][1]
-        by_mm = _SLOW <= slow <= _STANDS_IN and not any(s.origin.unit for s in fast)
+        turns = bool(fast) and all(per_minute(s.origin.label) for s in fast)
+        by_mm = _SLOW <= slow <= _STANDS_IN and not turns and not any(s.origin.unit for s in fast)
         stands_in = slow if by_mm else _STANDS_IN
         hint = f" (in mm/s it would be {reached * UNITS['mm/s'][1]:.3g} m/s)" if by_mm else ""
-        if fast and all(per_minute(s.origin.label) for s in fast):  # and what they are multiplied by is a guess
+        if turns:  # and what they are multiplied by is a guess
             hint += '; their names speak of turns per minute: unit = "rpm", with the size of the wheels in wheel_diameter and gear_ratio'
         named = ", ".join(s.origin.label for s in fast) or "the speeds"
         draft.ask(

@@ -18,6 +18,7 @@ from replay.machine.quantities import SI_UNITS
 from replay.machine.signal_table import quantity_of
 from replay.machine.units import known_unit, si_factor
 from replay.signals.restarts import continued
+from replay.signals.uneven_times import evened
 
 LARGEST = 1e30
 _WIDE = 1.5
@@ -85,6 +86,8 @@ def convert(
 ) -> Converted:
     """Order stamps, continue positions over their restarts and differentiate where asked, convert: (recorded · gain + offset) · factor.
 
+    Speeds that were divided by uneven times are divided by the usual one.
+
     Numbers beyond `LARGEST` are damage, not readings: their squares and sums would overflow. They become missing.
 
     Parameters
@@ -130,6 +133,14 @@ def convert(
     release(stamps, recorded)
     if beyond:
         notes = (*notes, f"{beyond} numbers beyond {LARGEST:g} are no readings and were left out")
+    if (
+        not origin.derivative
+        and quantity_of(signal) == "speed"
+        and not signal.startswith("cmd.")
+        and not signal.endswith("_ref")
+    ):
+        values, uneven = evened(stamps, values)
+        notes = (*notes, *((uneven,) if uneven else ()))
     return Converted(stamps, values, notes)
 
 

@@ -143,6 +143,8 @@ def _fitting_speed(signal: str, peak: float, origin: SignalSource, machine: Mach
     joint = _JOINT.search(origin.field or "") is not None
     ways_to_try = (turns,) if joint else (turns, speeds) if rotation else (speeds + turns,)
     named = per_minute(origin.label)
+    if named and machine.wheel_radius is None:
+        return f"{signal_line(signal, replace(origin, unit='rpm'))} with [geometry] wheel_diameter"
     if named:
         ways_to_try = ([tried for tried in turns if tried.unit == "rpm"], *ways_to_try)
     for k, ways in enumerate(ways_to_try):

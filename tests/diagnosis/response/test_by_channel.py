@@ -7,10 +7,11 @@ import pytest
 from numpy.typing import NDArray
 
 from diagnosis.response.assess import assess_response
-from diagnosis.response.by_channel import once_a_turn
+from diagnosis.response.by_channel import once_a_turn, spikes_of
 from diagnosis.response.channel import samples_of
 from diagnosis.response.jumps import Jumps, jumps_of
 from diagnosis.response.models import Blocks
+from diagnosis.response.wheel import Wheel
 from replay.faults import FaultMode
 from replay.machine.config import Limits
 from tests.diagnosis.response.robot import DT, followers_of, geometry, speeds
@@ -82,3 +83,21 @@ def test_spikes_of_both_signs_are_spikes() -> None:
     y[at] += 30.0 * rng.choice([-1, 1], at.size)
     assert not once_a_turn(samples_of(y, np.ones(3000, np.bool_)), y, DT)
     assert not once_a_turn(samples_of(y[:90], np.ones(90, np.bool_)), y[:90], DT)
+
+
+def test_readings_far_beyond_all_others_count_although_every_wheel_has_wild_ones_unless_another_reads_as_much() -> None:
+    rng = np.random.default_rng(4)
+    y = 0.5 + rng.normal(0.0, 0.002, 3000)
+    at = np.array([500, 700, 900, 1100])
+    y[at] += 3.0 * np.array([1, -1, 1, 1])
+    samples = samples_of(y, np.ones(3000, np.bool_))
+    none = Blocks(np.zeros(0, np.intp), *(np.zeros(0) for _ in range(9)))
+    jumps = Jumps(np.zeros(0, np.intp), np.zeros(0))
+    wheel = Wheel("wheel.R.v", samples, none, jumps, DT, "", spiky=False)
+    other = np.full(3000, 0.5)
+    (found,) = spikes_of(wheel, y, 0.05, (other,))
+    assert (found.start, found.stop) == (500, 1101)
+    other[::100] = 4.0
+    assert spikes_of(wheel, y, 0.05, (other,)) == []
+    near = np.where(np.abs(y) > 1.0, np.sign(y) * 1.2, y)
+    assert spikes_of(wheel._replace(samples=samples_of(near, np.ones(3000, np.bool_))), near, 0.05) == []

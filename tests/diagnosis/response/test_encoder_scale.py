@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -90,3 +92,18 @@ def test_of_several_wheels_a_side_one_must_be_off_by_more() -> None:
     one, several = (float(next(iter(judged(1.0, WHOLE, wheels=w, wheel=w[1]).parts.values()))[0].hidden.split(" from ")[1].split()[0]) for w in (PAIR, four))  # fmt: skip
     assert several > one
     assert "the mean of FL and RL" in judged(1.8, LATER, wheel="FL", wheels=four).scaled[0]
+
+
+def test_a_car_is_held_against_the_yaw_rate_by_the_axle_that_it_does_not_steer() -> None:
+    measured, asked, body = speeds(3)
+    true = {w: y * (0.75 if w == "RL" else 1.0) for w, y in measured.items()}
+    noise = np.random.default_rng(3).normal(0.0, 0.01, body.shape[0])
+    car = geometry()
+    steered = {w: replace(p, axle="front") if w.startswith("F") else p for w, p in car.wheels.items()}
+    data, place = followers_of(measured, asked, body), replace(car, wheels=steered)
+    for speed, told in ((true, True), (measured, False)):
+        found = assess_response(data, place, (speed["RR"] - speed["RL"]) / TRACK + noise, Limits(), DT)
+        assert bool(found.scaled) is told
+        assert found.gyro == ()
+        assert np.mean(found.parts["FL"][0].states == CODE[State.HEALTHY]) > 0.5
+        assert bool(np.mean(found.parts["RL"][0].states == CODE[State.HEALTHY]) < 0.1) is told

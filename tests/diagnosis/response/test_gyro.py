@@ -49,6 +49,21 @@ def test_a_gyro_that_has_nothing_of_the_turns_is_told() -> None:
     n = speeds(3)[0]["FR"].size
     found = judged(np.random.default_rng(2).normal(0.0, 0.01, n))
     assert "another axis" in found.gyro[0]
+    assert "another axis" in judged(np.zeros(n)).gyro[0]
+
+
+def test_a_small_constant_is_told_where_rests_of_the_machine_show_that_it_comes_and_goes() -> None:
+    measured, asked, body = speeds(3)
+    for x in (*measured.values(), *asked.values(), body):
+        x[1300:1400] = 0.0
+        x[2000:2100] = 0.0
+    yaw = yaw_of(measured, 1)
+    usual = float(np.quantile(np.abs(yaw), 0.9))
+    assert assess_response(followers_of(measured, asked, body), geometry(), yaw, Limits(), DT).gyro == ()
+    yaw[FAULTY] += 0.1 * usual
+    (text,) = assess_response(followers_of(measured, asked, body), geometry(), yaw, Limits(), DT).gyro
+    assert "rad/s more than the" in text
+    assert text.endswith("where they rest as well.")
 
 
 def test_a_sound_gyro_is_not_told_whatever_a_wheel_does() -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -34,3 +36,24 @@ def test_noise_of_half_a_mission_is_found(first: float, last: float) -> None:
 def test_rougher_ground_and_a_channel_that_is_noisy_all_along_are_no_fault() -> None:
     assert modes(np.where(0.4 * N < AT, 0.015, 0.0)) == []
     assert modes(np.full(N, 0.05)) == []
+
+
+def of_four(noisy: tuple[str, ...], level: float, seed: int = 3) -> set[tuple[str, FaultMode]]:
+    measured, asked, body = speeds(seed)
+    n = body.shape[0]
+    rng = np.random.default_rng(seed)
+    for w in noisy:
+        measured[w] = measured[w] + np.where(np.arange(n) < 0.3 * n, level, 0.0) * rng.normal(size=n)
+    nothing = np.full(n, np.nan)
+    data = {
+        w: replace(d, commands=np.full_like(d.commands, np.nan), asked=nothing)
+        for w, d in followers_of(measured, asked, body).items()
+    }
+    parts = assess_response(data, geometry(), None, Limits(), DT).parts
+    return {(w, f.mode) for w, sides in parts.items() for a in sides for f in a.findings}
+
+
+def test_noise_of_one_of_several_wheels_without_commands_is_found_and_ground_that_shakes_all_is_none() -> None:
+    assert of_four(("RL",), 0.1) == {("RL", FaultMode.NOISY)}
+    assert of_four(("FR", "FL", "RR", "RL"), 0.1) == set()
+    assert of_four(("RL",), 0.005) == set()

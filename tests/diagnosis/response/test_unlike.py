@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from diagnosis.response.assess import Judgement, assess_response
 from diagnosis.response.inputs import FollowerData
 from diagnosis.results.assessment import CODE
+from diagnosis.results.machine_event import wheels_apart
 from replay.faults import State
 from replay.machine.config import Limits
 from tests.campaigns import campaign
@@ -91,3 +92,25 @@ def test_wheels_with_rollers_by_the_one_sum_that_is_always_zero(factor: float) -
     j = judged(measured, asked, body, told=False)
     assert (healthy(j, "RR") == 0.0) == (factor != 1.0)
     assert all(healthy(j, w) > 0.5 for w in ("FR", "FL", "RL"))
+
+
+def test_without_commands_the_wheel_that_contradicts_the_others_is_in_the_verdict() -> None:
+    (sentence, *_) = judged(*scaled(1, ("RL",), 0.8), told=False).apart
+    assert "what FL make of the same motion" in sentence or "what RL make of the same motion" in sentence
+    assert judged(*speeds(1), told=False).apart == ()
+    assert judged(*scaled(1, ("RL",), 0.8), told=True).apart == ()
+    assert [e.title for e in wheels_apart(("FL speed sensor: x.",))] == ["One {wheel} contradicts the others"]
+    assert wheels_apart(()) == ()
+
+
+def test_a_wheel_that_never_reads_anything_is_told_where_all_others_turn() -> None:
+    measured, asked, body = speeds(1)
+    dead = {**measured, "RL": np.zeros_like(measured["RL"])}
+    j = judged(dead, asked, body, told=False)
+    assert (
+        [s for s in j.apart if "it reads 0 from start to end" in s] == [s for s in j.apart if s.startswith("RL")] != []
+    )
+    assert all("it reads 0" in side.reasons[State.NOT_ASSESSED] for side in j.parts["RL"])
+    assert not any((side.states == CODE[State.NOT_EXCITED]).any() for side in j.parts["RL"])
+    still = {w: np.zeros_like(y) if w != "FR" else y for w, y in measured.items()}
+    assert judged(still, asked, body, told=False).apart == ()

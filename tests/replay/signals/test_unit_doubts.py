@@ -123,6 +123,10 @@ def test_turns_per_minute_are_offered_though_neither_speed_nor_size_is_known() -
     found = doubt("wheel.FR.v", values, SignalSource(column="MAIN.fbRad_VR.rDrehzahl_Ist"), machine)
     assert found is not None
     assert "rpm" in found.line
+    unknown = replace(machine, geometry=None)
+    found = doubt("wheel.FR.v", 10.0 * values, SignalSource(topic="/rpm", field="data"), unknown)
+    assert found is not None
+    assert 'unit = "rpm" } with [geometry] wheel_diameter' in found.line
 
 
 @pytest.mark.parametrize(("dead", "asked"), [(True, False), (False, True)])
