@@ -35,9 +35,8 @@ def moving_sum(x: NDArray[np.float64] | NDArray[np.bool_], width: int) -> Array:
     """
     width = min(width, x.size)
     if x.dtype == np.bool_:
-        upto = np.pad(np.cumsum(x), (width // 2 + 1, max(0, width - 1) // 2), mode="edge") if x.size else x
-        upto[: width // 2 + 1] = 0
-        return np.asarray(upto[width:] - upto[: x.size], dtype=np.float64)
+        upto = np.pad(np.concatenate(([0], np.cumsum(x))), (width // 2, max(0, width - 1) // 2), mode="edge")
+        return np.asarray(upto[width : width + x.size] - upto[: x.size], dtype=np.float64)
     sums = np.pad(np.asarray(x, dtype=np.float64), (width // 2, max(0, width - 1) // 2))
     out, start, length = np.zeros(x.size), 0, 1
     while length <= width:
