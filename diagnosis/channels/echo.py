@@ -23,6 +23,7 @@ _SAME = 1e-5  # of the largest command: single precision, and a product with the
 _NEARLY_ALL = 0.98  # of the readings in motion: a coarse sensor meets the command while it rests, and not in ramps
 _LEAST, _LEAST_CHANGES = 40, 2  # readings in motion; times that a command changes meanwhile
 _MANY = 5  # values of the command about one reading
+_LOOKED_AT = 1000  # readings or values at a time
 _FEW = 2  # speeds that are ever asked for: what is measured meets none of them for so long
 REASON = Reason(
     "its readings are the commanded speeds themselves, to the last digit and without a ramp: it publishes what was asked for, or a simulation does, "
@@ -50,14 +51,16 @@ def repeats_its_command(y: Array, fresh: NDArray[np.bool_], asked: Array, limits
     largest = float(np.max(np.abs(known), initial=0.0))
     if at.size < _LEAST or largest <= 0.0:
         return False
-    first = np.flatnonzero(np.diff(known, prepend=np.nan) != 0.0)  # of each value that the command has
+    changes = np.diff(known, prepend=np.nan) != 0.0
+    first = np.flatnonzero(changes)  # of each value that the command has
     if first.size <= _LEAST_CHANGES:
         return False
-    own = np.unique(known[np.abs(known) > limits.driving_speed])
+    own = known[first][np.abs(known[first]) > limits.driving_speed]
     if not own.size:
         return False
     if (
-        own.size <= _FEW
+        np.unique(own[:_LOOKED_AT]).size <= _FEW  # where these are not few, all are not
+        and (own := np.unique(own)).size <= _FEW
         and np.count_nonzero(np.diff(np.abs(y[fresh & np.isfinite(y)]) > limits.driving_speed)) >= _LEAST_CHANGES
     ):
         apart = np.min(
@@ -65,14 +68,20 @@ def repeats_its_command(y: Array, fresh: NDArray[np.bool_], asked: Array, limits
         )  # of whatever of them it was told: another command may be its own
         return bool(np.mean(apart <= _SAME * largest) >= _NEARLY_ALL)
     early, late = (np.clip(at + round(s / dt), 0, known.size - 1) for s in (-_BEFORE_S, _AFTER_S))
-    start, stop = (np.searchsorted(first, k, side="right") - 1 for k in (early, late))
+    value = np.cumsum(changes) - 1  # which of them holds at a step
+    start, stop = value[early], value[late]
     if np.median(stop - start) > _MANY and not _fine(y[at]):  # steps of both are the same, and any of them is met
         return False
-    meets = np.zeros(at.size, np.bool_)
-    for k in range(int((stop - start).max()) + 1):
-        there = np.minimum(start + k, stop)
-        meets |= np.abs(y[at] - known[first[there]]) <= _SAME * largest
-    return bool(np.mean(meets) >= _NEARLY_ALL)
+    met = at.size
+    for part in (slice(i, i + _LOOKED_AT) for i in range(0, at.size, _LOOKED_AT)):
+        meets = np.zeros(at[part].size, np.bool_)
+        for k in range(int((stop - start)[part].max()) + 1):
+            there = np.minimum(start[part] + k, stop[part])
+            meets |= np.abs(y[at[part]] - known[first[there]]) <= _SAME * largest
+        met -= int(np.count_nonzero(~meets))
+        if met / at.size < _NEARLY_ALL:
+            return False
+    return True
 
 
 def _fine(y: Array) -> bool:

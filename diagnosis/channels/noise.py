@@ -31,9 +31,12 @@ _HEALTHY_SHARE, _SOUND = 0.3, 10.0  # of the places; times their misfit
 def moving_sum(x: NDArray[np.float64] | NDArray[np.bool_], width: int) -> Array:
     """Sum over a centred window of `width` samples, shape (n,); the window is cut at the ends, and to n.
 
-    Sums of 1, 2, 4… samples are put together, so that an outlier reaches no sum beyond its window.
+    Sums of 1, 2, 4… samples are put together, so that an outlier reaches no sum beyond its window; counts need no such care.
     """
     width = min(width, x.size)
+    if x.dtype == np.bool_:
+        upto = np.pad(np.concatenate(([0], np.cumsum(x))), (width // 2, max(0, width - 1) // 2), mode="edge")
+        return np.asarray(upto[width : width + x.size] - upto[: x.size], dtype=np.float64)
     sums = np.pad(np.asarray(x, dtype=np.float64), (width // 2, max(0, width - 1) // 2))
     out, start, length = np.zeros(x.size), 0, 1
     while length <= width:

@@ -46,7 +46,7 @@ _LARGEST, _BEYOND = 0.999, 0.9  # of the largest reading; of the time
 _LESS, _SHOWN = 0.9, 0.1  # of the largest reading, and of all: as many are less, of a sensor that lives
 _HYSTERESIS, _RESTS_S = 0.025, 10.0  # of the span, off a healthy valve's command, for no longer than this
 _MIDDLE, _MOSTLY = 0.04, 0.98  # of the span: about its middle a valve opens nothing; of the time
-_OF_USUAL, _NEARLY_ALL = 2.0, 0.8  # times what it is off its command by, for so much of the mission: its own hysteresis
+_OF_USUAL = 2.0  # times what it is off its command by, nearly all of the mission: its own hysteresis
 _OPEN_S, _DOUBT, _FAR_OFF = 0.5, 0.05, 0.2  # s; probability that counts for nothing; of the span
 _MOST_HEALTHY = 0.35  # that bounds of a loss which was found leave to a healthy channel: it deviates all the same
 _GROWTH_S = 0.1  # a shorter time of growth is not worth a sentence
@@ -233,14 +233,7 @@ def _hysteresis(isolated: Isolated, found: IdentifiedPair) -> bool:
     brief = int(np.count_nonzero(seen.use)) * found.model.dt < _RESTS_S  # a channel may be slower than the timeline
     both = np.maximum(np.abs(seen.y[seen.use]), np.abs(seen.x[seen.use]))
     rests = float(np.nanquantile(both, _MOSTLY)) < _MIDDLE * pair.span
-    return rests or (brief and seen.deviation < min(_HYSTERESIS * pair.span, _usually_off(found)))
-
-
-def _usually_off(found: IdentifiedPair) -> float:
-    """By how much a channel may be off its reference for what it is off nearly all of the mission [unit]."""
-    y, x, status, *_ = found.samples
-    use = np.isin(status, (PAIR, BLIND)) & np.isfinite(y) & np.isfinite(x)
-    return _OF_USUAL * float(np.quantile(np.abs(y - x)[use], _NEARLY_ALL)) if use.any() else np.inf
+    return rests or (brief and seen.deviation < min(_HYSTERESIS * pair.span, _OF_USUAL * found.usually_off))
 
 
 def _at_its_end(isolated: Isolated, found: IdentifiedPair) -> bool:

@@ -39,6 +39,7 @@ _MOST_SPREAD = 0.1  # of a gain: as much may a healthy one vary; more of it is a
 _LEAST_SPREAD = 0.005  # of a gain: two instruments agree no better, however steady they are
 _OF_FEW = 1.6  # times as wide are 95 % bounds by four channels (Student's t) as by many
 _WHOLE = 0.25
+_NEARLY_ALL = 0.8  # of the mission
 _JUMP = 3.5  # times the noise
 _COARSE, _COARSE_COST = (
     0.3,
@@ -139,6 +140,13 @@ class IdentifiedPair:
     def own_spread(self) -> GainSpread | None:
         """The same over the whole mission, a fault's part of it included; None where it moves little."""
         return self._gains.spread(self.model.span)
+
+    @cached_property
+    def usually_off(self) -> float:
+        """By how much y is off its reference at most, nearly all of the mission [unit]; infinite where both are never known."""
+        y, x, status, *_ = self.samples
+        use = np.isin(status, (PAIR, BLIND)) & np.isfinite(y) & np.isfinite(x)
+        return float(np.quantile(np.abs(y - x)[use], _NEARLY_ALL)) if use.any() else np.inf
 
     @cached_property
     def _gains(self) -> GainWindows:

@@ -24,6 +24,7 @@ _LAGS_S, _SETTLED = (
     4.0,
 )  # time constants; times the longest, of what came before
 _USUAL = 0.9  # of the samples
+_ROUNDED = 1e-9  # of a sum: far more than rounding leaves of it
 _OWN = 1.5  # times the noise: a healthy channel's own deviation
 _LATER, _STARTS = 0.5, 11  # of a piece, within which a gain may begin to fade, and moments that are tried
 
@@ -162,12 +163,16 @@ def _late(words: str, seconds: float) -> Cause:
 
 def _least(trials: Iterable[tuple[float, Array]], y: Array, measured: Measured) -> tuple[float, Array]:
     """Time [s] and rest [unit], shape (k,), of what leaves least of y among references that come late."""
-    least, best, rest = np.inf, 0.0, y
+    least, best, rest, edge = np.inf, 0.0, y, np.inf
     for seconds, x in trials:
         behind = y - x
-        share = power(behind, measured)
+        if _surely_more(behind, least, edge, measured):
+            continue
+        squared = _ranked(behind)
+        share = _smaller(squared, measured)
         if share < least or (share == least and every_power(behind, measured) < every_power(rest, measured)):
             least, best, rest = share, seconds, behind
+            edge = float(squared[_most(squared.size)])
     return best, rest
 
 
@@ -227,9 +232,35 @@ def below_limit(cause: Cause, measured: Measured) -> bool:
 
 def power(off: Array, measured: Measured) -> float:
     """Mean square of a deviation, shape (k,), beyond what healthy noise has, but for its largest, which the timing of a move makes [unit²]."""
+    return _smaller(_ranked(off), measured)
+
+
+def _most(size: int) -> int:
+    """How many of so many squares are not among the largest."""
+    return int(_USUAL * size)
+
+
+def _ranked(off: Array) -> Array:
+    """Squares of a deviation, the largest of them at the end, shape (k,)."""
     squared = off**2
-    most = int(_USUAL * squared.size)
-    return max(float(np.mean(np.partition(squared, most)[:most])) - (_OWN * measured.noise) ** 2, 0.0)
+    return np.partition(squared, _most(squared.size))
+
+
+def _smaller(squared: Array, measured: Measured) -> float:
+    """The `power` of ranked squares, shape (k,)."""
+    return max(float(np.mean(squared[: _most(squared.size)])) - (_OWN * measured.noise) ** 2, 0.0)
+
+
+def _surely_more(off: Array, least: float, edge: float, measured: Measured) -> bool:
+    """Whether the `power` of a deviation, shape (k,), is more than `least` by a bound that takes no order of its squares.
+
+    The m smallest of k squares sum up to no less than all of them, each cut at an edge, less k − m times that edge [unit²].
+    """
+    most = _most(off.size)
+    if not np.isfinite(edge) or not most:
+        return False
+    bound = float(np.minimum(off**2, edge).sum()) - (off.size - most) * edge
+    return bound > (least + (_OWN * measured.noise) ** 2) * most + _ROUNDED * edge * off.size
 
 
 def every_power(off: Array, measured: Measured) -> float:

@@ -63,11 +63,16 @@ def _learned_noise(alpha: float, beta: float, nu: float, power: float) -> float:
 @njit(cache=True, error_model="numpy", inline="always")
 def _learn(m: int, gain: Array, total: float, innovation: float, z: Array, P: Array) -> None:
     """x += K·innovation, P −= K·gainᵀ with K = gain/total; what a model does not free has no gain and stays."""
+    g0, g1, g2, g3, g4, g5 = gain[0], gain[1], gain[2], gain[3], gain[4], gain[5]
     for i in range(STATES):
         share = gain[i] / total
         z[m, i] += share * innovation
-        for k in range(STATES):
-            P[m, i, k] -= share * gain[k]
+        P[m, i, 0] -= share * g0
+        P[m, i, 1] -= share * g1
+        P[m, i, 2] -= share * g2
+        P[m, i, 3] -= share * g3
+        P[m, i, 4] -= share * g4
+        P[m, i, 5] -= share * g5
 
 
 @njit(cache=True, error_model="numpy")

@@ -94,9 +94,22 @@ def most_probable(axle: AxleFilter) -> Models:
     return np.asarray(path)
 
 
-def follow_path(axle: AxleFilter, models: Models) -> SteeringPath:
-    """States along a given path. `models` of shape (m,), a model per block."""
+def follow_path(axle: AxleFilter, models: Models, known: SteeringPath | None = None) -> SteeringPath:
+    """States along a given path. `models` of shape (m,), a model per block.
+
+    Those of another path of the axle, `known`, hold up to the block where the two part; it is used up, for its columns are written anew
+    from there on.
+    """
     size = models.size
+    if known is not None:
+        parted = np.flatnonzero(models != known.model)
+        if not parted.size:
+            return known
+        path = known._replace(model=models.copy())
+        path_kernel.path_evidence(
+            axle.series, path.model, int(parted[0]), size, path, axle.first_angle, axle.constants, True
+        )
+        return path
     path = SteeringPath(
         model=models.copy(),
         mean=axle.blocks.store.zeros((size, STATES), np.float64),

@@ -52,14 +52,14 @@ def refine_path(axle: AxleFilter, models: Models) -> SteeringPath:
         if faulty:
             _unify(axle, known, models, a, b)
             _merge(axle, known, models, a, b)
-    known = follow_path(axle, models)
+    known = follow_path(axle, models, known)
     for side in (SENSOR, ACTUATOR):
         _join(axle, known, models, side)
     for _ in range(2):
-        known = follow_path(axle, models)
+        known = follow_path(axle, models, known)
         for c in (np.flatnonzero(np.diff(models.astype(np.int64))) + 1).tolist():
             _shift(axle, known, models, c)
-    return follow_path(axle, models)
+    return follow_path(axle, models, known)
 
 
 def _unify(axle: AxleFilter, known: SteeringPath, models: Models, a: int, b: int) -> None:

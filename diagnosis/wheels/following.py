@@ -16,6 +16,7 @@ from diagnosis.wheels.models import ODD, JointModel
 from diagnosis.wheels.run_kernel import RunEvidence, evidence_of_runs
 from diagnosis.wheels.runs import runs_of
 from diagnosis.wheels.settle import settled
+from replay.arrays.processors import each
 
 Array = NDArray[np.float64]
 
@@ -39,8 +40,9 @@ def follow(data: WheelsData, blocks: WheelBlocks, model: JointModel) -> tuple[Jo
     doubtful = np.zeros(n)
     steps = np.asarray(data.doubtful[:: blocks.width].any(axis=1), dtype=np.float64)[:n]
     doubtful[: steps.size] = steps
-    out = {}
-    for i, (models, entered) in traced.items():
+
+    def one(i: int) -> Following:
+        models, entered = traced[i]
         runs = runs_of(models, entered, blocks.quiet[:, i], blocks.status[:, i], blocks.dt)
         evidence = evidence_of_runs(blocks, model, done, i, runs)
         opening = blocks.u[:, i].reshape(n, blocks.width).mean(axis=1)
@@ -56,5 +58,6 @@ def follow(data: WheelsData, blocks: WheelBlocks, model: JointModel) -> tuple[Jo
             )
             for r in range(runs.model.size)
         ]
-        out[i] = Following(Followed(models, runs, np.array(rows), done.fault[:, i]), evidence)
-    return done, out
+        return Following(Followed(models, runs, np.array(rows), done.fault[:, i]), evidence)
+
+    return done, dict(zip(traced, each(one, traced, len(blocks.u)), strict=True))

@@ -19,6 +19,8 @@ from replay.arrays.numeric import uncounted
 
 Array = NDArray[np.float64]
 
+_AT_ONCE = 64  # frames whose features stay in the processor's cache while all trees look at them
+
 
 class Forest(NamedTuple):
     """Trees of one side.
@@ -59,18 +61,19 @@ class Look(NamedTuple):
     actuator: Forest
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", nogil=True)
 def _scores(x: NDArray[np.float32], forest: Forest, out: Array) -> None:
     """Add the leaves of every frame of x (frames, features) to its classes' scores, `out` (frames, classes)."""
     x, forest = uncounted(x), uncounted(forest)
-    classes = out.shape[1]
-    for t in range(forest.root.size):
-        c = t % classes
-        for n in range(x.shape[0]):
-            k = forest.root[t]
-            while k >= 0:
-                k = forest.left[k] if x[n, forest.feature[k]] <= forest.threshold[k] else forest.right[k]
-            out[n, c] += forest.value[-1 - k]
+    frames, classes = out.shape
+    for first in range(0, frames, _AT_ONCE):
+        for t in range(forest.root.size):
+            c = t % classes
+            for n in range(first, min(first + _AT_ONCE, frames)):
+                k = forest.root[t]
+                while k >= 0:
+                    k = forest.left[k] if x[n, forest.feature[k]] <= forest.threshold[k] else forest.right[k]
+                out[n, c] += forest.value[-1 - k]
 
 
 def log_probabilities(x: NDArray[np.float32], forest: Forest) -> Array:

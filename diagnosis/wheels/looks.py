@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,9 +11,11 @@ from numpy.typing import NDArray
 from diagnosis.wheels.forest import Forest, known_share, log_probabilities, looks
 from diagnosis.wheels.frames.features import Features
 from diagnosis.wheels.frames.said import said_features
+from replay.arrays.processors import each
 from replay.faults import Side
 
 Array = NDArray[np.float64]
+_T = TypeVar("_T")
 
 _STRANGE = 0.9  # share of known features below which nothing is concluded
 _IGNORANT = np.log(np.array([0.6, 0.1, 0.1, 0.1, 0.1]))  # which is called neither healthy nor faulty
@@ -28,13 +31,14 @@ def first_look(features: Features, measured: Sequence[bool]) -> dict[int, Array]
     measured : Sequence[bool]
         Per wheel: whether its valve's opening is measured, so that the valve is judged elsewhere.
     """
-    first, out = looks()[0], {}
-    for i, x in features.of.items():
-        both = [np.exp(log_probabilities(x, forest)) for forest in first]
-        if measured[i]:
-            both[1] = _healthy(len(x))
-        out[i] = np.concatenate(both, axis=1)
-    return out
+    first = looks()[0]
+
+    def look(i: int) -> Array:
+        x = features.of[i]
+        valve = _healthy(len(x)) if measured[i] else np.exp(log_probabilities(x, first.actuator))
+        return np.concatenate([np.exp(log_probabilities(x, first.sensor)), valve], axis=1)
+
+    return _each(look, features)
 
 
 def second_look(features: Features, measured: Sequence[bool], dt: float) -> dict[int, dict[Side, Array]]:
@@ -51,15 +55,23 @@ def second_look(features: Features, measured: Sequence[bool], dt: float) -> dict
     """
     first, second = looks()
     said = said_features(first_look(features, measured), features.hop * dt)
-    out: dict[int, dict[Side, Array]] = {}
-    for i, x in features.of.items():
-        seen, sides = np.concatenate([x, said[i]], axis=1), (Side.SENSOR, Side.ACTUATOR)
-        out[i] = {
-            side: _known(x, f, log_probabilities(seen, g)) for side, f, g in zip(sides, first, second, strict=True)
-        }
+
+    def look(i: int) -> dict[Side, Array]:
+        x = features.of[i]
+        seen = np.concatenate([x, said[i]], axis=1)
         if measured[i]:
-            out[i][Side.ACTUATOR] = np.log(np.maximum(_healthy(len(x)), 1e-12))
-    return out
+            valve = np.log(np.maximum(_healthy(len(x)), 1e-12))
+        else:
+            valve = _known(x, first.actuator, log_probabilities(seen, second.actuator))
+        return {Side.SENSOR: _known(x, first.sensor, log_probabilities(seen, second.sensor)), Side.ACTUATOR: valve}
+
+    return _each(look, features)
+
+
+def _each(look: Callable[[int], _T], features: Features) -> dict[int, _T]:
+    """What is said of each wheel, by wheel."""
+    frames = max((len(x) for x in features.of.values()), default=0)
+    return dict(zip(features.of, each(look, features.of, frames), strict=True))
 
 
 def _known(x: NDArray[np.float32], first: Forest, said: Array) -> Array:

@@ -78,7 +78,7 @@ def _enter_all(models: int, old: int, k: WheelConstants, z: Array, P: Array) -> 
         put_rows(fresh_P[old], hold_P)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", nogil=True)
 def _scan_runs(
     blocks: RunInput, runs: Runs, models: int, k: WheelConstants, z: Array, P: Array, out: RunEvidence
 ) -> None:

@@ -23,6 +23,8 @@ from replay.signals.timeline import Timeline
 
 Array = NDArray[np.float64]
 
+_FIRST_ROWS = 4096  # nearly always hold a number of every column that has any
+
 
 @dataclass(frozen=True)
 class Replay:
@@ -122,7 +124,7 @@ def replay_loop(timeline: Timeline, machine: Machine, bucket: int = 1) -> Replay
     phi = stack(timeline, [f"steer.{a}.phi" for a in machine.axles])
     v_ref, phi_ref = _commands(timeline, machine, phi, readings)
     geometry = machine.geometry
-    unfit = "" if any(np.isfinite(u[part]).any() for part in timeline.blocks()) else "no recorded valve command to fit"
+    unfit = "" if any_finite(u).any() else "no recorded valve command to fit"
     steer_recorded = stack(timeline, [f"steer.{a}.u" for a in machine.axles])
     if timeline.open_loop:  # the recorded commands answer to other measurements than these
         u, steer_recorded = (np.broadcast_to(np.nan, x.shape) for x in (u, steer_recorded))
@@ -222,12 +224,18 @@ def any_finite(values: Array) -> NDArray[np.bool_]:
     found = np.zeros(values.shape[1], np.bool_)
     if not any(values.strides):  # one number for all
         return np.isfinite(values[0]) if len(values) else found
+    if np.isfinite(values[:_FIRST_ROWS]).any(axis=0).all():
+        return np.ones_like(found)
     for part in blocks(len(values)):
         found |= np.isfinite(values[part]).any(axis=0)
         release(values)
         if found.all():
             break
     return found
+
+
+def _missing(shape: tuple[int, int]) -> Array:
+    return np.full(shape, np.nan)
 
 
 def _scan(
@@ -250,7 +258,8 @@ def _scan(
     scans = {i: scan_wheel(law, u[:, i], v[:, i], v_ref[:, i], dt, psi0[i], parts) for i in range(wheels) if usable[i]}
     columns = {name: store.column(np.float64, (wheels,), rows_of(len(v), bucket)) for name in names}
     for part in parts:
-        found = {name: np.full((part.stop - part.start, wheels), np.nan) for name in names}
+        room = np.empty if len(scans) == wheels else _missing
+        found = {name: room((part.stop - part.start, wheels)) for name in names}
         done = each(lambda scan: next(scan), scans.values(), len(v))
         for i, block in zip(scans, done, strict=True):
             for name in names[:-1]:

@@ -74,21 +74,24 @@ def scan_wheel(
     event = (np.nan, 0)
     half = round(_FORCING_S / dt) + 2
     for part in parts:
-        rho = mfhca.decay_rate(v[part], v_ref[part], law.xi, law.beta)
-        squared, bound = _implied(law, u[part], v[part], v_ref[part])
+        near = slice(max(0, part.start - half), part.stop + half)  # what the forcing of its ends is found from
+        inside = slice(part.start - near.start, part.stop - near.start)
+        u_near, v_near, v_ref_near = (np.ascontiguousarray(x[near]) for x in (u, v, v_ref))
+        rho_near = mfhca.decay_rate(v_near, v_ref_near, law.xi, law.beta)
+        squared_near, bound_near = _implied(law, u_near, v_near, v_ref_near)
+        free_near = np.where(bound_near, np.nan, squared_near)
+        rho, squared, speed, asked = (x[inside] for x in (rho_near, squared_near, v_near, v_ref_near))
         decay, total = mfhca.printed_decay(rho, dt, total, before)
         printed = psi = start * decay
         if law.psi == "implied":
             psi = np.sqrt(np.maximum(squared, 0.0))
         elif law.psi == "event_reset":
-            free = np.where(bound, np.nan, squared)
-            psi, _, event = mfhca.event_reset_psi(rho, free, dt, threshold, state=event, before=before)
+            psi, _, event = mfhca.event_reset_psi(rho, free_near[inside], dt, threshold, state=event, before=before)
         elif law.psi == "forced":
-            psi, forced = mfhca.forced_psi(rho, v[part] - v_ref[part], dt, law.zeta, forced, before, law.lead)
+            psi, forced = mfhca.forced_psi(rho, speed - asked, dt, law.zeta, forced, before, law.lead)
         before = float(mfhca.fill_forward(rho, before)[-1])
-        near = slice(max(0, part.start - half), part.stop + half)
-        forcing = _forcing(law, u[near], v[near], v_ref[near], dt)[part.start - near.start :][: rho.size]
-        command = mfhca.drive_command(law.law, v[part], v_ref[part], psi**2, law.lambda_, law.u_max)
+        forcing = mfhca.implied_forcing(free_near, rho_near, dt, _FORCING_S)[inside]
+        command = mfhca.drive_command(law.law, speed, asked, psi**2, law.lambda_, law.u_max)
         yield WheelBlock(printed, squared, forcing, psi, command)
         release(u, v, v_ref)
 
@@ -123,12 +126,6 @@ def decay_shapes(v: Array, v_ref: Array, dt: float, xi: float, beta: float) -> t
 
 def _implied(law: LoopLaw, u: Array, v: Array, v_ref: Array) -> tuple[Array, NDArray[np.bool_]]:
     return mfhca.implied_psi_squared(law.law, u, v, v_ref, law.lambda_, law.u_max)
-
-
-def _forcing(law: LoopLaw, u: Array, v: Array, v_ref: Array, dt: float) -> Array:
-    squared, bound = _implied(law, u, v, v_ref)
-    rho = mfhca.decay_rate(v, v_ref, law.xi, law.beta)
-    return mfhca.implied_forcing(np.where(bound, np.nan, squared), rho, dt, _FORCING_S)
 
 
 def _fitted_start(law: LoopLaw, u: Array, v: Array, v_ref: Array, dt: float) -> float:

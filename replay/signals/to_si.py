@@ -22,7 +22,7 @@ from replay.signals.uneven_times import evened
 
 LARGEST = 1e30
 _WIDE = 1.5
-_PEAK_SAMPLES = 1 << 18
+_PEAK_SAMPLES = 1 << 15
 
 
 @dataclass(frozen=True)

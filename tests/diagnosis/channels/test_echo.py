@@ -50,6 +50,15 @@ def test_a_copy_of_the_command_is_none(seed: int) -> None:
     assert echoes(np.asarray(command, np.float32).astype(np.float64), command)
 
 
+@pytest.mark.parametrize(("off", "echo"), [(38, True), (45, False)])
+def test_one_reading_in_fifty_may_meet_no_value_wherever_it_is(off: int, echo: bool) -> None:
+    command = np.repeat(np.round(np.random.default_rng(1).uniform(0.1, 0.8, 100), 2), 20)
+    for at in (slice(0, off), slice(command.size - off, None)):
+        y = command.copy()
+        y[at] += 1e-3
+        assert echoes(y, command) is echo
+
+
 @pytest.mark.parametrize("seed", campaign(range(6)))
 @pytest.mark.parametrize("step", [0.0, 0.01, 0.05])
 @pytest.mark.parametrize("noise", [0.0, 0.01])

@@ -157,6 +157,14 @@ def test_moving_sum_is_a_convolution_with_ones(values: list[float], width: int) 
     assert_allclose(moving_sum(x, width), expected, atol=1e-9)
 
 
+@given(st.lists(st.booleans(), max_size=60), st.integers(0, 80))
+def test_moving_counts_are_moving_sums(values: list[bool], width: int) -> None:
+    x = np.array(values, dtype=np.bool_)
+    found = moving_sum(x, width)
+    assert found.dtype == np.float64
+    assert_array_equal(found, moving_sum(x.astype(np.float64), width))
+
+
 def test_an_outlier_reaches_no_sum_beyond_its_window() -> None:
     x = white(1e-3)
     outlier = x.copy()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose
+from numpy.testing import assert_allclose, assert_array_equal
 
 from diagnosis.steering.blocks import SensorNoise, blocks_of
 from diagnosis.steering.driven import driven_by
@@ -66,6 +66,17 @@ def test_evidence_from_any_block_ends_in_the_state_of_the_whole_path(axle: AxleF
     for start, stop in ((0, 700), (850, 1000), (1300, known.model.size)):
         _, state = evidence_of(axle, known, known.model, start, stop)
         assert_allclose(state, known.mean[stop - 1], rtol=0, atol=0)
+
+
+@pytest.mark.parametrize("begin", [0, 1, 900, 1999])
+def test_states_from_where_two_paths_part_are_those_of_the_whole_path(axle: AxleFilter, begin: int) -> None:
+    first = most_probable(axle)
+    other = first.copy()
+    other[begin:] = np.where(other[begin:] == 0, 1, 0)
+    whole, resumed = follow_path(axle, other), follow_path(axle, other, follow_path(axle, first))
+    for a, b in zip(whole, resumed, strict=True):
+        assert_array_equal(a, b)
+    assert follow_path(axle, other, resumed) is resumed
 
 
 def test_evidence_of_a_path_is_that_of_its_parts(axle: AxleFilter) -> None:
