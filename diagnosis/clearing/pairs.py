@@ -9,6 +9,7 @@ from __future__ import annotations
 from itertools import combinations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from diagnosis.clearing.cells import Array, Cells
 from diagnosis.clearing.responses import Responses
@@ -51,7 +52,7 @@ def _in_spells(responses: Responses, cells: Cells) -> Array:
     out = np.full(count, np.nan)
     pairs = [p for p in combinations(range(count), 2) if _belong(cells, *p)]
     for way in (responses.ahead.all(axis=1), ~responses.ahead.any(axis=1)):
-        known = way & np.isfinite(own).all(axis=1)
+        known: NDArray[np.bool_] = np.asarray(way & np.isfinite(own).all(axis=1), np.bool_)
         if len(own) <= long or np.count_nonzero(known) < (1.0 + _OUT) * long:
             continue
         total = np.concatenate([np.zeros((1, count)), np.cumsum(np.where(known[:, np.newaxis], own, 0.0), axis=0)])

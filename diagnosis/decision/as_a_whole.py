@@ -8,14 +8,14 @@ What is so from start to end beside the body's sensors is a scale's, which `diag
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.clearing.cells import Array, Cells
 from diagnosis.clearing.yaw import turn_by_angles
-from diagnosis.response.body import body_speeds
+from diagnosis.decision.course import FEW, FLOOR, Course
+from diagnosis.decision.scale import bodies
 from diagnosis.results.machine_event import (
     MachineEvent,
     beyond_the_top,
@@ -35,11 +35,8 @@ _KNOWN = 0.5  # of a window
 _SPELL_S = (
     6.0  # for which the body is off without a break; healthy machines slip for up to four, of 34 + 20 tuning missions
 )
-_MANY, _CUTS = (
-    20,
-    60,
-)  # windows before and after a change, at least: ten seconds; moments at which it is looked for first
-_FEW, _FEW_CHANGE = 10, 1.5  # windows in turns, of which there are fewer, and times the change that counts
+_MANY = 20  # windows before and after a change, at least: ten seconds
+_FEW_CHANGE = 1.5  # times the change that counts, where there are few windows in turns
 _TURNS = 0.3  # of the usual yaw rate, root mean square over a window
 _DEAF, _WILD, _DEAF_S = (
     0.35,
@@ -52,79 +49,6 @@ _NEARLY, _BEHIND_S, _AGAIN_S = 0.85, 5.0, 15.0
 _BEYOND_TOP = 1.6  # times the top speed of the machine file, which no machine reaches
 _STANDS, _CLOSED, _CREEPS = 0.01, 0.03, 0.035  # of the top speed; of full opening; of the top speed
 _SETTLES_S, _CREEPS_S = 1.5, 1.0  # after a stop, in which a machine rolls out, and for which it moves on
-_NEARLY_ALL = 0.15, 0.85  # quantiles
-_FLOOR = 0.03  # of a share, for its logarithm
-
-
-class _Course(NamedTuple):
-    """What one size is of another in windows, and where in the mission it is something else.
-
-    Attributes
-    ----------
-    share : Array, shape (windows,)
-        The share [1]; NaN where nothing is known.
-    cells : Cells
-        The mission.
-    """
-
-    share: Array
-    cells: Cells
-
-    @property
-    def log(self) -> Array:
-        """ln of the share, of which hardly anything is as little as `_FLOOR`."""
-        return np.log(np.maximum(self.share, _FLOOR))
-
-    @property
-    def usual(self) -> float:
-        """Median of the share [1]; NaN where few windows are known."""
-        known = self.share[np.isfinite(self.share)]
-        return float(np.median(known)) if known.size >= _FEW else np.nan
-
-    def mostly(self, middle: float, counts: float) -> bool:
-        """Whether the share is not 1, by `middle` in its median and by `counts` nearly always the same way [ln]."""
-        known = self.share[np.isfinite(self.share)]
-        if known.size < _FEW:
-            return False
-        low, median, high = np.log(np.maximum(np.quantile(known, (*_NEARLY_ALL, 0.5)), _FLOOR))[[0, 2, 1]]
-        return bool(abs(median) >= middle and (high <= -counts or low >= counts))
-
-    def changes(self, what: str, counts: float, least: int) -> str:
-        """From when on its median is another one by `counts` [ln], as "0.98 times `what` up to 40 s, and 0.6 times from 43 s on".
-
-        Empty where it is not, or where fewer than `least` windows are known before and after.
-        """
-        at = np.flatnonzero(np.isfinite(self.share))
-        if at.size < 2 * least:
-            return ""
-        x, n = self.log[at], at.size
-
-        def left(k: int) -> float:
-            """What medians before and after a window leave."""
-            return float(sum(np.abs(part - np.median(part)).sum() for part in (x[:k], x[k:])))
-
-        step = max(1, n // _CUTS)
-        k = min(range(least, n - least + 1, step), key=left)
-        k = min(range(max(least, k - step + 1), min(n - least, k + step - 1) + 1), key=left)
-        one, other = float(np.median(x[:k])), float(np.median(x[k:]))
-        if abs(one - other) < counts:
-            return ""
-        last, first = self.span(int(at[k - 1]), int(at[k - 1]) + 1)[1], self.span(int(at[k]), n)[0]
-        middle = (last + first) / 2
-        last, first = min(last, middle), max(first, middle)
-        return f"{np.exp(one):.2f} times {what} up to {last:.0f} s, and {np.exp(other):.2f} times from {first:.0f} s on"
-
-    def span(self, first: int, last: int) -> tuple[float, float]:
-        """Time of windows [first, last) [s]."""
-        frame, dt = self.cells.frame, self.cells.dt
-        return first * frame.hop * dt, ((last - 1) * frame.hop + frame.length) * dt
-
-    def longest(self, flags: Flags, least_s: float) -> tuple[int, int] | None:
-        """First window of the longest run of `flags`, and the one behind it; None where none is longer than `least_s`."""
-        edges = np.flatnonzero(np.diff(np.r_[False, flags, False].astype(np.int8)))
-        runs = zip(edges[::2], edges[1::2], strict=True)
-        first, last = max(runs, key=lambda r: r[1] - r[0], default=(0, 0))
-        return (int(first), int(last)) if (last - first) * self.cells.frame.hop * self.cells.dt >= least_s else None
 
 
 def as_a_whole(cells: Cells) -> list[MachineEvent]:
@@ -169,14 +93,14 @@ def _usual(size: Array) -> float:
     return float(np.quantile(some, _USUAL)) if some.size else np.inf
 
 
-def _course(cells: Cells, of: Array, by: Array, use: Flags) -> _Course:
+def _course(cells: Cells, of: Array, by: Array, use: Flags) -> Course:
     """What one size is of another where both are used, each of shape (cells,)."""
     use = use & np.isfinite(of) & np.isfinite(by)
     frame = cells.frame
     enough = frame.sums(use.astype(np.float64)) >= _KNOWN * min(frame.length, frame.cells)
     part, whole = (frame.sums(np.where(use, x, 0.0)) for x in (of, by))
     enough &= whole > 0.0
-    return _Course(np.where(enough, part / np.where(enough, whole, 1.0), np.nan), cells)
+    return Course(np.where(enough, part / np.where(enough, whole, 1.0), np.nan), cells)
 
 
 def _beside_commands(cells: Cells) -> Iterator[MachineEvent]:
@@ -188,7 +112,7 @@ def _beside_commands(cells: Cells) -> Iterator[MachineEvent]:
     with np.errstate(invalid="ignore"):
         use = (asked > _MOVES * usual) & (np.abs(asked - before) < _SETTLED * usual)
     course, counts = _course(cells, v, asked, use), _counts(cells)
-    text = course.changes("what they are told", counts, _MANY)
+    text = course.changes("what they are told", _NEARLY * counts, _MANY)
     if not text and course.mostly(counts, counts):
         text = f"{course.usual:.2f} times what they are told throughout"
     text = text or _falls_behind(course, counts)
@@ -196,12 +120,12 @@ def _beside_commands(cells: Cells) -> Iterator[MachineEvent]:
         yield less_than_told(f"All {{wheels}} together make {text}")
 
 
-def _falls_behind(course: _Course, counts: float) -> str:
+def _falls_behind(course: Course, counts: float) -> str:
     """How much of their commands all wheels make for a while or again and again, and when; empty where that is what they usually make."""
     if not np.isfinite(course.usual):
         return ""
     at = np.flatnonzero(np.isfinite(course.share))
-    behind = course.log[at] - np.log(max(course.usual, _FLOOR)) <= -_NEARLY * counts
+    behind = course.log[at] - np.log(max(course.usual, FLOOR)) <= -_NEARLY * counts
     spell = course.longest(behind, _BEHIND_S)
     hop = course.cells.frame.hop * course.cells.dt
     if spell is not None:
@@ -255,12 +179,10 @@ def _beside_body(cells: Cells) -> Iterator[MachineEvent]:
         near = (np.abs(np.abs(speeds) - v[:, np.newaxis]) < _ALIKE * usual).sum(axis=1)
         use = (v > _MOVES * usual) & (near >= np.isfinite(speeds).sum(axis=1) / 2)
     counts = _counts(cells)
-    for body in body_speeds(cells.timeline, cells.width):
+    for body in bodies(cells):
         course = _course(cells, np.abs(body.speed), v, use)
         text = course.changes("as fast as by its {wheels}", counts, _MANY)
-        spell = course.longest(
-            np.abs(np.nan_to_num(course.log - np.log(max(course.usual, _FLOOR)))) >= counts, _SPELL_S
-        )
+        spell = course.longest(np.abs(np.nan_to_num(course.log - np.log(max(course.usual, FLOOR)))) >= counts, _SPELL_S)
         if not text and spell is not None:
             inside, (start, stop) = float(np.nanmedian(course.share[slice(*spell)])), course.span(*spell)
             text = f"{inside:.2f} times as fast as by its {{wheels}} at {start:.0f}–{stop:.0f} s, and {course.usual:.2f} times else"
@@ -279,13 +201,13 @@ def _beside_gyro(cells: Cells) -> Iterator[MachineEvent]:
     y, x = (np.where(known, z, 0.0) for z in (yaw, expected))
     power = frame.sums(x * x)
     turns = power >= (_TURNS * _usual(np.abs(x))) ** 2 * min(frame.length, frame.cells)
-    course = _Course(np.where(turns, frame.sums(x * y) / np.where(turns, power, 1.0), np.nan), cells)
+    course = Course(np.where(turns, frame.sums(x * y) / np.where(turns, power, 1.0), np.nan), cells)
     text = _turns_otherwise(course, _counts(cells))
     if text:
         yield gyro_otherwise(f"By the gyro (imu.yaw_rate) the machine {text}")
 
 
-def _turns_otherwise(course: _Course, counts: float) -> str:
+def _turns_otherwise(course: Course, counts: float) -> str:
     """How the machine turns by the gyro, and when, where that is another share by `counts` [ln]; empty where it is not."""
     what, share, usual = "as fast as steering angles and {wheel} speeds make it", course.share, course.usual
     if course.mostly(_FEW_CHANGE * counts, counts):
@@ -298,7 +220,7 @@ def _turns_otherwise(course: _Course, counts: float) -> str:
     if spell is not None:
         start, stop = course.span(*spell)
         return f"{_turning(float(np.median(share[slice(*spell)])))} {what} at {start:.0f}–{stop:.0f} s"
-    found = course.changes(what, counts, _MANY) or course.changes(what, _FEW_CHANGE * counts, _FEW)
+    found = course.changes(what, counts, _MANY) or course.changes(what, _FEW_CHANGE * counts, FEW)
     return found and f"turns {found}"
 
 

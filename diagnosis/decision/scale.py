@@ -14,7 +14,7 @@ import numpy as np
 from diagnosis.clearing.cells import Array, Cells
 from diagnosis.clearing.yaw import ends_of
 from diagnosis.decision.turn_scale import ANGLE, GYRO, Meant, factor_of, meant
-from diagnosis.response.body import body_speeds
+from diagnosis.response.body import BodySpeed, body_speeds
 from diagnosis.results.machine_event import MachineEvent, other_angle, other_turn, other_yaw_rate
 from replay.machine.geometry import Geometry
 from replay.machine.units import known_unit
@@ -208,6 +208,11 @@ def scale_of(cells: Cells, units: Collection[str], *, factor: float = 1.0) -> Sc
     return Scale(diameter, found, "geometry" in machine.assumed, factor)
 
 
+def bodies(cells: Cells) -> tuple[BodySpeed, ...]:
+    """What sensors of the body say of its speed, once for a mission."""
+    return cells.once("body speeds", lambda: body_speeds(cells.timeline, cells.width))
+
+
 def _straight(cells: Cells, speeds: Array) -> Iterator[Scaled]:
     """By speeds of the body while all wheels go alike: then each of them is the body's."""
     v, usual = _median(speeds)
@@ -217,7 +222,7 @@ def _straight(cells: Cells, speeds: Array) -> Iterator[Scaled]:
         & (alike >= min(2, speeds.shape[1]))
         & (np.abs(v) > _MOVES * usual)
     )
-    for body in body_speeds(cells.timeline, cells.width):
+    for body in bodies(cells):
         factor = factor_of(np.abs(body.speed), np.abs(v), straight, cells.dt)
         if factor is not None:
             yield Scaled(body.name, factor, "")

@@ -1,0 +1,88 @@
+"""What one size is of another in the windows of a mission, and where it is another share of it."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from diagnosis.clearing.cells import Array, Cells
+
+Flags = NDArray[np.bool_]
+
+FEW = 10  # windows, of which a usual share is known
+_CUTS = 60  # moments at which a change is looked for first
+FLOOR = 0.03  # of a share, for its logarithm
+_NEARLY_ALL = 0.15, 0.85  # quantiles
+
+
+class Course(NamedTuple):
+    """What one size is of another in windows, and where in the mission it is something else.
+
+    Attributes
+    ----------
+    share : Array, shape (windows,)
+        The share [1]; NaN where nothing is known.
+    cells : Cells
+        The mission.
+    """
+
+    share: Array
+    cells: Cells
+
+    @property
+    def log(self) -> Array:
+        """ln of the share, shape (windows,), of which hardly anything is as little as `FLOOR`."""
+        return np.log(np.maximum(self.share, FLOOR))
+
+    @property
+    def usual(self) -> float:
+        """Median of the share [1]; NaN where few windows are known."""
+        known = self.share[np.isfinite(self.share)]
+        return float(np.median(known)) if known.size >= FEW else np.nan
+
+    def mostly(self, middle: float, counts: float) -> bool:
+        """Whether the share is not 1, by `middle` in its median and by `counts` nearly always the same way [ln]."""
+        known = self.share[np.isfinite(self.share)]
+        if known.size < FEW:
+            return False
+        low, median, high = np.log(np.maximum(np.quantile(known, (*_NEARLY_ALL, 0.5)), FLOOR))[[0, 2, 1]]
+        return bool(abs(median) >= middle and (high <= -counts or low >= counts))
+
+    def changes(self, what: str, counts: float, least: int) -> str:
+        """From when on its median is another one by `counts` [ln], as "0.98 times `what` up to 40 s, and 0.6 times from 43 s on".
+
+        Empty where it is not, or where fewer than `least` windows are known before and after.
+        """
+        at = np.flatnonzero(np.isfinite(self.share))
+        if at.size < 2 * least:
+            return ""
+        x, n = self.log[at], at.size
+
+        def left(k: int) -> float:
+            """What medians before and after a window leave."""
+            return float(sum(np.abs(part - np.median(part)).sum() for part in (x[:k], x[k:])))
+
+        step = max(1, n // _CUTS)
+        k = min(range(least, n - least + 1, step), key=left)
+        k = min(range(max(least, k - step + 1), min(n - least, k + step - 1) + 1), key=left)
+        one, other = float(np.median(x[:k])), float(np.median(x[k:]))
+        if abs(one - other) < counts:
+            return ""
+        last, first = self.span(int(at[k - 1]), int(at[k - 1]) + 1)[1], self.span(int(at[k]), n)[0]
+        middle = (last + first) / 2
+        last, first = min(last, middle), max(first, middle)
+        return f"{np.exp(one):.2f} times {what} up to {last:.0f} s, and {np.exp(other):.2f} times from {first:.0f} s on"
+
+    def span(self, first: int, last: int) -> tuple[float, float]:
+        """Time of windows [first, last) [s]."""
+        frame, dt = self.cells.frame, self.cells.dt
+        return first * frame.hop * dt, ((last - 1) * frame.hop + frame.length) * dt
+
+    def longest(self, flags: Flags, least_s: float) -> tuple[int, int] | None:
+        """First window of the longest run of `flags`, shape (windows,), and the one behind it; None where none is as long as `least_s` [s]."""
+        edges = np.flatnonzero(np.diff(np.r_[False, flags, False].astype(np.int8)))
+        runs = zip(edges[::2], edges[1::2], strict=True)
+        first, last = max(runs, key=lambda r: r[1] - r[0], default=(0, 0))
+        return (int(first), int(last)) if (last - first) * self.cells.frame.hop * self.cells.dt >= least_s else None
