@@ -38,6 +38,7 @@ from replay.machine.config import Machine
 from replay.mission import Mission
 from replay.setup.places import place_doubts
 from replay.signals.like_wheels import WHICH
+from replay.signals.unit_conflicts import unit_conflict
 from replay.version import __version__
 
 _CUT_S = 0.5  # of a log, not judged
@@ -186,6 +187,12 @@ def _told_scale(judged: Judged) -> list[str]:
     return [scale.sentence] if scale is not None and scale.sentence and not told else []
 
 
+def _of_units(judged: Judged) -> tuple[str, ...]:
+    """That units of the machine file contradict those that the channels' own names state; empty where none does."""
+    text = unit_conflict((name, s.origin) for name, s in judged.mission.signals.items.items() if not s.guessed)
+    return (f"{text[0].upper()}{text[1:]}: correct the unit, or give a gain.",) if text else ()
+
+
 def _events(judged: Judged) -> tuple[MachineEvent, ...]:
     """What happened to the whole machine; what contradicts the turns by a factor throughout is said once, with what it may be."""
     scale, events = judged.scale, judged.found.events
@@ -214,7 +221,11 @@ def _decision(
         checks=judged.checks,
         scope=_scope(judged),
         events=_events(judged),
-        hints=(*(h.text for h in judged.hints), *([s.gross] if (s := judged.scale) is not None and s.gross else [])),
+        hints=(
+            *_of_units(judged),
+            *(h.text for h in judged.hints),
+            *([s.gross] if (s := judged.scale) is not None and s.gross else []),
+        ),
         misplaced=judged.places,
         open_state=open_state,
         shown=judged.detectable.rows,

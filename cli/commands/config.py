@@ -15,6 +15,7 @@ from replay.errors import ConfigError
 from replay.machine.questions import open_questions
 from replay.progress import Stage
 from replay.setup.preset import Preset
+from replay.signals.unit_conflicts import unit_conflict
 
 if TYPE_CHECKING:
     from replay.machine.config import Machine
@@ -109,6 +110,8 @@ def check(
         raise ConfigError(f"{file}: values of the log that cannot be with these units: {asked}")
     if against:
         raise ConfigError(f"{file}: the log contradicts it: {'; '.join(against)}")
+    if conflict := unit_conflict(machine.signals):
+        doubts = (*doubts, conflict)
     for doubt in doubts:
         terminal.note(f"to be checked: {doubt}")
     count = len(machine.signals)
