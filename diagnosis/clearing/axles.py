@@ -45,6 +45,7 @@ _ONE_AXLE = 0.75  # of the loss that counts: a change of the only axle, whose oi
 #: Of the loss that counts, and times the other axle's: a deviation of one axle alone in windows. Of 36 healthy tuning missions of nine machines
 #: the axles' largest ones were alike within a factor of 2.6.
 _BRIEF, _BRIEF_ALONE = 0.9, 3.0
+_SAME = 0.003  # of a channel that another one's share leaves, root mean square
 _FEW_S = 2.0  # in which an axle is steered, for its usual rate
 
 
@@ -60,7 +61,11 @@ def axle_checks(cells: Cells, clear_at: float) -> Iterator[Checked]:
     behind = off_commands(cells, opening, command, OPENING)
     place = np.minimum(np.arange(cells.frame.starts.size), len(rates.off) - 1)
     limit = answered(cells)
-    changes = [alone(rates.changes, j, share, _CHANGED * share, _ALONE, others=1) for j in range(len(rates.changes))]
+    joint = len(cells.machine.axles) > 1 and _one_joint(cells, 0, 1)
+    alone_by = [_ONE_AXLE * share if joint else None] * len(rates.changes)
+    changes = [
+        most or alone(rates.changes, j, share, _CHANGED * share, _ALONE, others=1) for j, most in enumerate(alone_by)
+    ]
     told = any((x or 0.0) > most for x, most in zip(rates.changes, changes, strict=True))  # which of them changes
     for j, axle in enumerate(cells.machine.axles):
         about = (Kind.STEER, axle)
@@ -81,10 +86,10 @@ def axle_checks(cells: Cells, clear_at: float) -> Iterator[Checked]:
             off = _alone(rates.off, j) if twice else np.abs(rates.off[:, j])
             deviates = worst(cells, (*about, either, Check.RATE), off[place], brief_limit(rates, j, share, twice=twice))
             changed = lasts(cells, (*about, either, Check.RATE), rates.changes[j], changes[j])
-            between = (1.0 if twice else _CHANGED if len(cells.machine.axles) > 1 else _ONE_AXLE) * share
+            between = (1.0 if twice else _CHANGED if len(cells.machine.axles) > 1 and not joint else _ONE_AXLE) * share
             parted = lasts(cells, (*about, either, Check.RATE), None if told else rates.parted[j], between)
             yield max([deviates, *(c for c in (changed, parted) if c.worst is not None)], key=times)
-            if len(cells.machine.axles) > 1:
+            if len(cells.machine.axles) > 1 and not joint:
                 yield lasts(cells, (*about, either, Check.LASTING_RATE), rates.apart[j], RATE[twice][1] * share)
             elif not twice:  # both sides of which are measured twice needs nothing to compare with
                 yield lasts(cells, (*about, either, Check.PLANT_RATE), rates.apart[j], RATE[twice][1] * share)
@@ -177,12 +182,13 @@ def rates_of(cells: Cells, rate: Array, opening: Array) -> Rates:
         whole = np.log(np.maximum(ahead.sum(axis=0) / opened.sum(axis=0), 1e-3))
     whole = np.where(steered.sum(axis=0) * cells.dt >= _FEW_S, whole, np.nan)
     apart: list[float | None] = [None] * len(whole)
-    if len(apart) == 1:
-        apart[0] = _by_plant(cells, ahead[:, 0], np.where(steered, opening, 0.0)[:, 0])
+    one = len(apart) == 1 or (len(apart) > 1 and _one_joint(cells, 0, 1))
+    if one:
+        apart = [_by_plant(cells, ahead[:, 0], np.where(steered, opening, 0.0)[:, 0])] * len(apart)
     for j in np.flatnonzero(np.isfinite(whole) & (ahead.sum(axis=0) <= 0.0)):
         apart[j] = _WRONG_WAY
     for a, b in pairwise(range(len(whole))):
-        if np.isfinite(whole[a]) and np.isfinite(whole[b]):
+        if np.isfinite(whole[a]) and np.isfinite(whole[b]) and not one:
             between = float(abs(whole[a] - whole[b]))
             apart[a], apart[b] = max(apart[a] or 0.0, between), max(apart[b] or 0.0, between)
     changes = [_changes(cells, frame, off, j) for j in range(len(whole))]
@@ -218,13 +224,28 @@ def _changes(cells: Cells, frame: Frame, off: Array, j: int) -> float | None:
     own = np.where(cells.explained(name, frame), np.nan, off[:, j])
     if np.count_nonzero(np.isfinite(own)) < _LEAST_WINDOWS:
         return None
-    apart = [own, *(own - off[:, k] for k in range(off.shape[1]) if k != j)]
+    apart = [own, *(own - off[:, k] for k in range(off.shape[1]) if k != j and not _one_joint(cells, j, k))]
     every = [np.ones(own.size, np.bool_)]
     return min(
         max(largest_change(x, every), growth(x, every))
         for x in apart
         if np.count_nonzero(np.isfinite(x)) >= _LEAST_WINDOWS
     )
+
+
+def _one_joint(cells: Cells, j: int, k: int) -> bool:
+    """Whether two axles have one angle and one command, each a share of the other's: a joint in the middle of the machine is both, and no witness of itself."""
+    return all(_share_of(x[:, j], x[:, k]) for x in (cells.axles("phi"), cells.axles("u")))
+
+
+def _share_of(x: Array, y: Array) -> bool:
+    """Whether one channel is a share of another one, each of shape (cells,)."""
+    known = np.isfinite(x) & np.isfinite(y)
+    power = float(x[known] @ x[known])
+    if power <= 0.0:
+        return False
+    rest = y[known] - float(x[known] @ y[known]) / power * x[known]
+    return float(rest @ rest) <= _SAME**2 * float(y[known] @ y[known])
 
 
 def _off(
