@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from diagnosis.clearing.cells import Array, Cells
 from diagnosis.clearing.yaw import turn_by_angles
+from diagnosis.decision.common_response import common_change
 from diagnosis.decision.course import FEW, FLOOR, Course
 from diagnosis.decision.scale import bodies
 from diagnosis.results.machine_event import (
@@ -23,6 +24,7 @@ from diagnosis.results.machine_event import (
     gyro_otherwise,
     less_than_told,
     not_at_rest,
+    other_response,
 )
 
 Flags = NDArray[np.bool_]
@@ -46,6 +48,7 @@ _DEAF, _WILD, _DEAF_S = (
 #: Of the change that counts; s without a break, and in all: of 17 + 20 healthy missions (tuning, a user's) none was so far behind for more than 2 s, a loader
 #: that drives into its heap for 4.
 _NEARLY, _BEHIND_S, _AGAIN_S = 0.85, 5.0, 15.0
+_GEAR = 0.62  # ln: what changes by more is another gear
 _BEYOND_TOP = 1.6  # times the top speed of the machine file, which no machine reaches
 _STANDS, _CLOSED, _CREEPS = 0.01, 0.03, 0.035  # of the top speed; of full opening; of the top speed
 _SETTLES_S, _CREEPS_S = 1.5, 1.0  # after a stop, in which a machine rolls out, and for which it moves on
@@ -63,7 +66,8 @@ def as_a_whole(cells: Cells) -> list[MachineEvent]:
         return beyond
     beside_body = list(_beside_body(cells))
     # speeds that are in doubt make the turns by them doubtful as well
-    return [*_beside_commands(cells), *_at_rest(cells), *(beside_body or _beside_gyro(cells))]
+    beside_commands = list(_beside_commands(cells)) or list(_beside_openings(cells))
+    return [*beside_commands, *_at_rest(cells), *(beside_body or _beside_gyro(cells))]
 
 
 def _counts(cells: Cells) -> float:
@@ -118,6 +122,16 @@ def _beside_commands(cells: Cells) -> Iterator[MachineEvent]:
     text = text or _falls_behind(course, counts)
     if text:
         yield less_than_told(f"All {{wheels}} together make {text}")
+
+
+def _beside_openings(cells: Cells) -> Iterator[MachineEvent]:
+    """All wheels make another speed of the same openings from some moment on."""
+    found = common_change(cells)
+    if found is not None and _counts(cells) <= abs(found[0]) <= _GEAR:
+        yield other_response(
+            f"All {{wheels}} together make at least {np.exp(abs(found[0])):.2f} times {'more' if found[0] > 0 else 'less'} speed of the same {{valve}} "
+            f"openings from about {found[1]:.0f} s on, as fast as they are driven before it"
+        )
 
 
 def _falls_behind(course: Course, counts: float) -> str:

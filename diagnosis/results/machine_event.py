@@ -171,6 +171,14 @@ def less_than_told(text: str) -> MachineEvent:
     return MachineEvent("The {wheels} make another share of their commands for a time", text + more, doubt, act)
 
 
+def other_response(text: str) -> MachineEvent:
+    """All wheels make another speed of the same openings from some moment on; `text` without its stop."""
+    more = ": what supplies or loads them all, or the gear, has changed, or all their speeds read otherwise; no part is blamed for it."
+    act = "look for what all {wheels} share (supply, oil, load, gear), and record a mission under one load and in one gear"
+    doubt = "all {wheels} make another speed of the same openings for a part of the mission"
+    return MachineEvent("The {wheels} answer otherwise for a part of the mission", text + more, doubt, act)
+
+
 def beyond_the_top(text: str) -> MachineEvent:
     """All wheels are faster than the machine can be; `text` without its stop."""
     more = ": unit or scale of the speeds, or max_speed in the machine file, is wrong."
