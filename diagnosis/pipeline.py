@@ -17,7 +17,7 @@ from diagnosis.channels.recording_gaps import recording_gaps, without_gaps
 from diagnosis.channels.resting_position import with_zeroed_positions
 from diagnosis.channels.shared_gain import without_shared_gain
 from diagnosis.channels.silence import with_silent_sensors
-from diagnosis.clearing.backwards import without_claims
+from diagnosis.clearing.backwards import all_mirrored, axles_in_doubt, without_claims, without_mirrored
 from diagnosis.clearing.beside import (
     less_sure_beside_dead_sensors,
     less_sure_beside_dead_valves,
@@ -227,20 +227,23 @@ def _outside_gaps(found: ComponentResult, axles: tuple[str, ...], timeline: Time
 
 def _without_backwards(judged: Judged) -> Judged:
     """The same without what models claim of parts whose channel counts backwards, or is another one's."""
-    found = judged.found
+    found, axles, dt = judged.found, judged.machine.axles, judged.mission.timeline.dt
     named = {component for (component, _), a in found.assessments.items() if a.findings}
     wrong = named & {h.component for h in judged.hints if h.backwards}
     exchanged = named & {component for h in judged.hints for component in h.exchanged}
-    if not wrong | exchanged:
+    every = "" if axles_in_doubt(judged.places, axles) else all_mirrored(found.assessments, axles)
+    turned = named & ({*axles} if every else axles_in_doubt(judged.places, axles))
+    if not wrong | exchanged | turned:
         return judged
-    told = without_claims(found.assessments, wrong, exchanged, judged.mission.timeline.dt)
+    told = without_claims(found.assessments, wrong, exchanged, dt)
     return Judged(
         judged.mission,
         judged.recorded,
         judged.machine,
         judged.replay,
-        replace(found, assessments=told),
+        replace(found, assessments=without_mirrored(told, turned, dt)),
         factor=judged.factor,
+        mirrored=every,
     )
 
 
