@@ -17,7 +17,7 @@ from diagnosis.channels.recording_gaps import recording_gaps, without_gaps
 from diagnosis.channels.resting_position import with_zeroed_positions
 from diagnosis.channels.shared_gain import without_shared_gain
 from diagnosis.channels.silence import with_silent_sensors
-from diagnosis.clearing.backwards import all_mirrored, axles_in_doubt, without_claims, without_mirrored
+from diagnosis.clearing.backwards import without_claims
 from diagnosis.clearing.beside import (
     less_sure_beside_dead_sensors,
     less_sure_beside_dead_valves,
@@ -30,6 +30,7 @@ from diagnosis.decision import quality
 from diagnosis.decision.as_a_whole import as_a_whole
 from diagnosis.decision.changing_rows import with_chains_as_one
 from diagnosis.decision.episodes import with_episodes
+from diagnosis.decision.mirrored import all_mirrored, axles_in_doubt, without_mirrored
 from diagnosis.decision.second_onsets import with_second_onsets
 from diagnosis.decision.valve_noise import with_doubted_noise
 from diagnosis.decision.way import path_of

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from diagnosis.clearing.backwards import all_mirrored, axles_in_doubt, mirrored, without_mirrored
+from diagnosis.decision.mirrored import all_mirrored, axles_in_doubt, mirrored, without_mirrored
 from diagnosis.results.assessment import CODE, Assessment, Epsilon, Finding
 from diagnosis.results.vocabulary import Tier
 from replay.faults import FaultMode, Side, State
