@@ -30,6 +30,7 @@ from diagnosis.decision import quality
 from diagnosis.decision.as_a_whole import as_a_whole
 from diagnosis.decision.changing_rows import with_chains_as_one
 from diagnosis.decision.episodes import with_episodes
+from diagnosis.decision.late_axles import as_late_axles
 from diagnosis.decision.mirrored import all_mirrored, axles_in_doubt, without_mirrored
 from diagnosis.decision.second_onsets import with_second_onsets
 from diagnosis.decision.valve_noise import with_doubted_noise
@@ -265,7 +266,7 @@ def _with_what_stands_out(judged: Judged) -> Judged:
     found = judged.found
     if judged.hints or judged.places:
         return judged
-    more = what_stands_out(judged.checks, judged.cells, found.words)
+    more = as_late_axles(what_stands_out(judged.checks, judged.cells, found.words), judged.cells, found.words)
     if not (more := without_explained(more, found.events, judged.machine.axles)):
         return judged
     machine = judged.machine
