@@ -128,13 +128,16 @@ def is_rotation(origin: SignalSource) -> bool:
 
 
 def forward(signal: Signal, origins: Mapping[str, SignalSource], at: NDArray[np.int64]) -> Array:
-    """Rotation at some moments, positive forward."""
+    """Rotation at some moments [rad/s], positive forward, shape (n,) as these."""
     origin = origins.get(signal.name, signal.origin)
     return held(signal, at) * (1.0 if origin.gain * signal.origin.gain > 0.0 else -1.0)
 
 
 def rim(signal: Signal, origins: Mapping[str, SignalSource], at: NDArray[np.int64], radius: float) -> Array:
-    """Speed of a wheel's rim [m/s] at some moments, positive forward, as its source in `origins` says; without a unit it is in m/s."""
+    """Speed of a wheel's rim [m/s] at some moments, positive forward, both of shape (n,), as its source in `origins` says; `radius` in m.
+
+    Without a unit it is in m/s.
+    """
     origin = origins.get(signal.name, signal.origin)
     unit = known_unit(origin.unit)
     scale = UNITS[unit][1] if unit is not None and not signal.origin.unit else 1.0  # else it is in SI already
@@ -142,7 +145,7 @@ def rim(signal: Signal, origins: Mapping[str, SignalSource], at: NDArray[np.int6
 
 
 def moments(signals: Sequence[Signal]) -> NDArray[np.int64]:
-    """Moments at which all of some signals were recorded."""
+    """Moments at which all of some signals were recorded [ns], shape (n,)."""
     first, last = max(int(s.stamps[0]) for s in signals), min(int(s.stamps[-1]) for s in signals)
     return np.arange(first, last, round(_STEP_S * 1e9), dtype=np.int64)
 
