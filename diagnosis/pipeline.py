@@ -30,6 +30,8 @@ from diagnosis.decision import quality
 from diagnosis.decision.as_a_whole import as_a_whole
 from diagnosis.decision.changing_rows import with_chains_as_one
 from diagnosis.decision.episodes import with_episodes
+from diagnosis.decision.late_axles import as_late_axles
+from diagnosis.decision.mirrored import all_mirrored, axles_in_doubt, without_mirrored
 from diagnosis.decision.second_onsets import with_second_onsets
 from diagnosis.decision.valve_noise import with_doubted_noise
 from diagnosis.decision.way import path_of
@@ -228,20 +230,23 @@ def _outside_gaps(found: ComponentResult, axles: tuple[str, ...], timeline: Time
 
 def _without_backwards(judged: Judged) -> Judged:
     """The same without what models claim of parts whose channel counts backwards, or is another one's."""
-    found = judged.found
+    found, axles, dt = judged.found, judged.machine.axles, judged.mission.timeline.dt
     named = {component for (component, _), a in found.assessments.items() if a.findings}
     wrong = named & {h.component for h in judged.hints if h.backwards}
     exchanged = named & {component for h in judged.hints for component in h.exchanged}
-    if not wrong | exchanged:
+    every = "" if axles_in_doubt(judged.places, axles) else all_mirrored(found.assessments, axles)
+    turned = named & ({*axles} if every else axles_in_doubt(judged.places, axles))
+    if not wrong | exchanged | turned:
         return judged
-    told = without_claims(found.assessments, wrong, exchanged, judged.mission.timeline.dt)
+    told = without_claims(found.assessments, wrong, exchanged, dt)
     return Judged(
         judged.mission,
         judged.recorded,
         judged.machine,
         judged.replay,
-        replace(found, assessments=told),
+        replace(found, assessments=without_mirrored(told, turned, dt)),
         factor=judged.factor,
+        mirrored=every,
     )
 
 
@@ -262,7 +267,7 @@ def _with_what_stands_out(judged: Judged) -> Judged:
     found = judged.found
     if judged.hints or judged.places:
         return judged
-    more = what_stands_out(judged.checks, judged.cells, found.words)
+    more = as_late_axles(what_stands_out(judged.checks, judged.cells, found.words), judged.cells, found.words)
     if not (more := without_explained(more, found.events, judged.machine.axles)):
         return judged
     machine = judged.machine

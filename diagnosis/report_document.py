@@ -66,6 +66,8 @@ class Judged:
         Checks that alone name a fault of `found`: which part of it fails is not known, so that they stay open.
     factor : float
         By what the speeds of all wheels were multiplied before they were judged [1].
+    mirrored : str
+        What is wrong with the settings where every steering angle reads −1 times what it should; may be empty.
     kept : dict[str, Any]
         What the checks computed of the mission, whatever is found in it.
     """
@@ -77,6 +79,7 @@ class Judged:
     found: ComponentResult
     named_by: tuple[Checked, ...] = ()
     factor: float = 1.0
+    mirrored: str = ""
     kept: dict[str, Any] = field(default_factory=dict, repr=False, compare=False)
 
     @cached_property
@@ -104,8 +107,8 @@ class Judged:
 
     @cached_property
     def places(self) -> tuple[str, ...]:
-        """What the turns contradict of the places of wheels and axles."""
-        return place_doubts(self.mission.timeline, self.machine)
+        """What the turns contradict of the places of wheels and axles, and signs that all angles have wrong."""
+        return (*place_doubts(self.mission.timeline, self.machine), *filter(None, [self.mirrored]))
 
     @cached_property
     def scale(self) -> Scale | None:

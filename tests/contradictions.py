@@ -15,6 +15,7 @@ from diagnosis.decision.short import AS_WELL_HEALTHY
 from diagnosis.pages.labels import fault_title
 from diagnosis.results.candidates import candidates_of, label_of
 from diagnosis.results.machine_words import HYDRAULIC
+from diagnosis.results.recurring import counted
 from diagnosis.results.vocabulary import Severity
 from replay.machine.quantities import OPENING
 from tests.clearing_contradictions import of_checks, of_coverage, of_remedies
@@ -77,14 +78,18 @@ def _verdict(report: Mapping[str, Any]) -> Iterator[str]:
     if (verdict["status"] == "ready") and verdict["to_clear"]:
         yield f"ready, and open: {verdict['to_clear'][0]['reason']}"
     if not verdict["cleared"] and verdict["status"] in ("watch", "not_assessed"):
-        told = bool(verdict["to_clear"]) or verdict["not_cleared"].endswith("may not answer")
-        if not told or not all(row["act"] for row in verdict["to_clear"]):
+        how = bool(verdict["to_clear"]) or verdict["not_cleared"].endswith("may not answer")
+        if not how or not all(row["act"] for row in verdict["to_clear"]):
             yield "not cleared, and nobody is told what would clear it"
     if verdict["status"] == "not_assessed" and len(re.findall(r"[.](?= [A-Z]|$)", verdict["text"])) > 2:
         yield f"more than two sentences: {verdict['text']!r}"
     parts = {(f["component"], f["side"]) for f in faults if f["severity"] != "info"}
     on = re.search(r", on (\d+) parts?$", verdict["title"])
-    if _counted_on(on, high + watch) != len(parts) and verdict["status"] in ("stop", "watch"):
+    told = [
+        counted((f["component"], f["side"], f["mode"]) for f in faults if f["severity"] in of)
+        for of in (("high",), ("medium", "low"))
+    ]
+    if _counted_on(on, sum(told)) != len(parts) and verdict["status"] in ("stop", "watch"):
         yield f"title {verdict['title']!r}, and faults on {len(parts)} parts"
     if len(verdict["actions"]) != len(parts):
         yield f"{len(verdict['actions'])} things to do for {len(parts)} parts"
@@ -94,7 +99,7 @@ def _verdict(report: Mapping[str, Any]) -> Iterator[str]:
         for n in n
         if n
     ]
-    if counts and counts != [n for n in (high, watch) if n]:
+    if counts and counts != [n for n in told if n]:
         yield f"title {verdict['title']!r} with {high} and {watch} faults"
     open_checks = [c for c in report.get("clearing", []) if not c["passed"]]
     if verdict["cleared"] and open_checks:

@@ -21,6 +21,7 @@ from diagnosis.results.comparison_document import FaultChangeRow, PreviousRow
 from diagnosis.results.document import PAPER_DEFAULTS, ActionRow, IntervalRow, MachineRow, ReportDocument
 from diagnosis.results.fault_rows import mode_words
 from diagnosis.results.machine_words import MachineWords, words_of
+from diagnosis.results.recurring import OFTEN
 from diagnosis.results.size_rows import EpsilonRow, SatRow
 from diagnosis.results.vocabulary import Severity
 from replay.machine.quantities import OPENING
@@ -50,7 +51,7 @@ def verdict_parts(report: ReportDocument) -> list[RenderableType]:
         remarks = sum(f["severity"] == Severity.INFO for f in report["intervals"])
         also = f", and {remarks} remark{'s' * (remarks > 1)} (severity info)" if remarks else ""
         parts += [section(f"Faults{also}"), _faults(report["intervals"], words)]
-        rest = len(report["intervals"]) - _SHOWN
+        rest = len(_lines(report["intervals"], None)) - _SHOWN
         if rest > 0:
             parts.append(text(f"… and {rest} more in the report", "dim"))
     if "previous" in report:
@@ -142,7 +143,10 @@ def _faults(intervals: Sequence[IntervalRow], words: MachineWords) -> _Fitting:
     forms = []
     for left_out, bounds in (((), True), ((_SATURATION,), True), ((_SATURATION,), False)):
         keep = [k for k in range(len(heads)) if k not in left_out]
-        rows = [_fault(i, words, bounds) for i in intervals[:_SHOWN]]
+        rows = [
+            _spells(same, words, bounds) if len(same) > 1 else _fault(same[0], words, bounds)
+            for same in _lines(intervals)
+        ]
         form = table(
             [heads[k] for k in keep],
             [[row[k] for k in keep] for row in rows],
@@ -152,6 +156,31 @@ def _faults(intervals: Sequence[IntervalRow], words: MachineWords) -> _Fitting:
             column.no_wrap = k not in _WORDS
         forms.append(form)
     return _Fitting(forms)
+
+
+def _lines(intervals: Sequence[IntervalRow], most: int | None = _SHOWN) -> list[list[IntervalRow]]:
+    """Faults by the lines of the table: each by itself, but for those of one part and row that come again and again."""
+    kinds: dict[tuple[str, ...], list[IntervalRow]] = {}
+    for i in intervals:
+        kinds.setdefault((i["component"], i["side"], i["mode"], i["severity"]), []).append(i)
+    often = {id(i): same for same in kinds.values() if len(same) >= OFTEN for i in same}
+    out = [often.get(id(i), [i]) for i in intervals if id(i) not in often or often[id(i)][0] is i]
+    return out[:most]
+
+
+def _spells(same: Sequence[IntervalRow], words: MachineWords, bounds: bool) -> tuple[object, ...]:
+    """One line for a fault that comes again and again: what its surest spell shows, and from when to when it comes."""
+    best = max(same, key=lambda i: i["probability"])
+    _, part, _, _, *rest = _fault(best, words, bounds)
+    first, last = min(i["start_s"] for i in same), max(i["stop_s"] for i in same)
+    name = text(f"{same[0]['id']} …", "dim")
+    return (
+        name,
+        part,
+        mode_text(best["mode"], f"{label_of(best).lower()}, {len(same)} times"),
+        f"{first:.2f}–{last:.2f}",
+        *rest,
+    )
 
 
 def _fault(fault: IntervalRow, words: MachineWords, bounds: bool) -> tuple[object, ...]:

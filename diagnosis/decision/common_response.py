@@ -45,23 +45,23 @@ def _median(speed: Array) -> Array:
 
 
 def _largest(level: Array, common: Array) -> tuple[float, int] | None:
-    """Largest change at the same levels that nearly all of them agree on [ln], and the window from which on it is there; arrays of shape (windows,)."""
+    """Change at the same levels that nearly all of them agree on [ln], and the window from which on it is there; arrays of shape (windows,)."""
     n, places = common.size, np.floor(level / _LEVEL).astype(np.int64)
     bins = [np.flatnonzero(places == p) for p in np.unique(places)]
-    best: tuple[float, int] | None = None
+    best: tuple[float, float, int] | None = (
+        None  # what medians of all levels before and after leave, the change, and the moment
+    )
     for k in range(_LEAST, n - _LEAST + 1, max(1, n // _SPLITS)):
-        changes, weights, before = [], [], 0
+        changes, weights, before, left = [], [], 0, 0.0
         for inside in bins:
-            early, late = inside[inside < k], inside[inside >= k]
+            parts = [common[inside[inside < k]], common[inside[inside >= k]]]
+            left += sum(float(np.abs(x - np.median(x)).sum()) for x in parts if x.size)
+            early, late = parts
             if min(early.size, late.size) >= _EACH:
-                changes.append(float(np.median(common[late]) - np.median(common[early])))
+                changes.append(float(np.median(late) - np.median(early)))
                 weights.append(late.size)
                 before += early.size
-        if min(before, sum(weights)) < _LEAST:
-            continue
-        every = np.repeat(changes, weights)
-        low, high = np.quantile(every, (_LOW, _HIGH))
-        least = 0.0 if low * high <= 0.0 else float(low if low > 0.0 else high)
-        if best is None or abs(least) > abs(best[0]):
-            best = least, k
-    return best
+        if min(before, sum(weights)) >= _LEAST and (best is None or left < best[0]):
+            low, high = np.quantile(np.repeat(changes, weights), (_LOW, _HIGH))
+            best = left, 0.0 if low * high <= 0.0 else float(low if low > 0.0 else high), k
+    return None if best is None else best[1:]

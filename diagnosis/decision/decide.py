@@ -141,7 +141,8 @@ def decide(
     said = found.title in TITLES  # which parts are not judged, and why
     unseen = tuple(dict.fromkeys(a.hidden for a in assessments.values() if a.hidden))
     told = said or found.status is Verdict.READY  # which call sensors healthy
-    found = replace(found, text=_with_limits(found.text, unseen)) if told else found
+    short = tuple(x.partition(": log ")[0] for x in unseen) if said else unseen  # what to log for it is a caveat
+    found = replace(found, text=_with_limits(found.text, short)) if told else found
     if found.status is Verdict.NOT_ASSESSED and open_points and not against.misplaced:  # which says it itself
         found = replace(found, text=f"{found.text} To clear it: {open_points[0].act}.")
     caveats = caveats_of(against, assessments, decided_s, driven, axles, limits, short_named=said)
@@ -151,7 +152,7 @@ def decide(
     caveats += () if found.status is Verdict.READY else loads
     caveats += limits_of(limits)
     hidden = (_NO_YAW,) if any(_offset_hidden(checks, axle) for axle in axles) else ()
-    if not told:
+    if not told or short != unseen:
         caveats += unseen
     if found.status is Verdict.READY:
         exempt = exempt_axles(assessments, decided_s, driven, axles, limits, words, open_state=against.open_state)

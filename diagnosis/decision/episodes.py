@@ -18,10 +18,11 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from diagnosis.estimation.one_delay import late_s
 from diagnosis.results.assessment import CODE, Assessment, Finding, Reason
 from diagnosis.results.candidates import candidates
 from diagnosis.results.result import Epsilon
-from diagnosis.results.sentence import About, Sentence, is_about, stated_anew
+from diagnosis.results.sentence import About, stated_anew
 from diagnosis.results.vocabulary import Tier
 from replay.arrays.envelope import bucket_of, step_of
 from replay.faults import TOTAL, FaultMode, State
@@ -167,23 +168,19 @@ def _continues(a: Finding, b: Finding, sides: Mapping[str, Assessment], dt: floa
     if (a.side, a.mode, a.tier) != (b.side, b.mode, b.tier) or b.start < a.stop:
         return False
     usual = _SEEN_HEALTHY_S.get(a.tier, _SEEN_BY_MODELS_S)
-    least = _SEEN_LATE_S if _late_s(a) > 0.0 else max(usual, _SEEN_SCALED_S) if a.mode.scaled else usual
+    least = _SEEN_LATE_S if late_s(a) > 0.0 else max(usual, _SEEN_SCALED_S) if a.mode.scaled else usual
     seen = _healthy_steps(a, b, sides, dt) * dt >= least
-    seen = seen and not any(a.mode.scaled and _goes_on(a, b, sides[s.value]) for s in a.side.sides if s.value in sides)
+    known = [sides[s.value] for s in a.side.sides if s.value in sides]
+    seen = seen and not any(a.mode.scaled and _goes_on(a, b, one) for one in known)
+    seen = seen and not any(_late_on(a, b, one, dt) for one in known)
     changes = a.mode is FaultMode.INEFFICIENT and (b.start - a.stop) * dt <= _TOUCHES_S  # a loss that grows or fades
     return not seen and (changes or _alike(a.epsilon, b.epsilon)) and _same_value(a, b) and _as_late(a, b)
 
 
 def _as_late(a: Finding, b: Finding) -> bool:
     """Whether two findings are late by as much, or neither is late."""
-    late = sorted((_late_s(a), _late_s(b)))
+    late = sorted((late_s(a), late_s(b)))
     return late[1] - late[0] <= _AS_LATE * late[1]
-
-
-def _late_s(f: Finding) -> float:
-    """Delay of which a finding is [s], 0 of any other."""
-    late = (float(text.parts[1]) for text in f.evidence if isinstance(text, Sentence) and is_about(text, About.LATE))
-    return 1e-3 * next(late, 0.0)
 
 
 def _healthy_steps(a: Finding, b: Finding, sides: Mapping[str, Assessment], dt: float) -> float:
@@ -210,7 +207,7 @@ def _shows(a: Finding, b: Finding, one: Assessment, dt: float) -> NDArray[np.flo
     steps = np.arange(a.stop, b.start)
     expected, threshold = (one.columns.get(name) for name in ("expected", "threshold"))
     sizes = [f.epsilon.value for f in (a, b) if f.epsilon is not None]
-    late = min(_late_s(a), _late_s(b))
+    late = min(late_s(a), late_s(b))
     if not (late > 0.0 or (a.mode.scaled and len(sizes) == 2)) or expected is None or threshold is None:
         return np.ones(steps.size)
     step = step_of(bucket_of(one.states.size))
@@ -247,6 +244,22 @@ def _goes_on(a: Finding, b: Finding, one: Assessment) -> bool:
     return bool(known.any() and lost < _FITS * np.sum(off[known] ** 2))
 
 
+def _late_on(a: Finding, b: Finding, one: Assessment, dt: float) -> bool:
+    """Whether what is called healthy between two findings that are as late fits their delay far better than none."""
+    late = 0.5 * (late_s(a) + late_s(b))
+    healthy = np.flatnonzero(one.states[a.stop : b.start] == CODE[State.HEALTHY]) + a.stop
+    expected, residual = (one.columns.get(name) for name in ("expected", "residual"))
+    if min(late_s(a), late_s(b)) <= 0.0 or not healthy.size or expected is None or residual is None:
+        return False
+    step = step_of(bucket_of(one.states.size))
+    rows = np.unique(np.minimum((healthy / step).astype(np.intp), len(expected) - 1))
+    x, off = np.asarray(expected, np.float64), np.asarray(residual, np.float64)[rows]
+    before = np.interp(rows - late / (step * dt), np.arange(x.size), x)
+    known = np.isfinite(off) & np.isfinite(before) & np.isfinite(x[rows])
+    lost = np.sum((off - before + x[rows])[known] ** 2)
+    return bool(known.any() and lost < _FITS * np.sum(off[known] ** 2))
+
+
 def _alike(a: Epsilon | None, b: Epsilon | None) -> bool:
     if a is None or b is None:
         return a is b
@@ -271,7 +284,7 @@ def _episode(group: Sequence[Finding], dt: float, *, looks: bool) -> Finding:
     more = f" and {len(group) - _NAMED} more" if len(group) > _NAMED else ""
     between = (
         "between them hardly anything changed, as would show it"
-        if _late_s(longest) > 0.0
+        if late_s(longest) > 0.0
         else "what looks healthy between them is too brief, or would show too little of it, to make several of it"
         if looks
         else "between them nothing healthy was seen of this part"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping, Sequence, Set
 
 from diagnosis.decision.caveats import Reservations
 from diagnosis.decision.open_checks import open_words
@@ -22,6 +22,7 @@ _SOUND = "No speed sensor fault seen"
 _OPEN = "No speed sensor fault seen, but a check is open"
 _DOUBTED = "A sensor is in doubt"
 _REST, _WITH_STEERING = "drives not judged", "drives and steering not judged"
+_NAMED = 2  # drives; where more are all of the machine, their names say nothing
 #: Titles of such a mission.
 TITLES = tuple(
     f"{title}{';' if title is _OPEN else ','} {rest}"
@@ -61,7 +62,8 @@ def sensors_alone(
     for part in against.short:
         drives.setdefault(assessments[part].reasons.get(State.NOT_ASSESSED, ""), []).append(part[0])
     steering = [a for (c, _), a in assessments.items() if c in axles and a.tier is Tier.NONE]
-    said = [f"{_drives(who)} not judged, for {why}" for why, who in drives.items()]
+    wheels = {c for c, _ in assessments if c not in axles}
+    said = [f"{_drives(who, wheels)} not judged, for {why.partition(', and ')[0]}" for why, who in drives.items()]
     if steering:
         why = main_reason(steering[0], main_state(steering[0]))
         said.append(f"the steering was not judged{f', for {why}' if why else ''}")
@@ -88,7 +90,10 @@ def sensors_alone(
     return f"{_DOUBTED}, {rest_of_it}", f"{doubt[0].upper()}{doubt[1:]}. {rest}"
 
 
-def _drives(wheels: Sequence[str]) -> str:
+def _drives(wheels: Sequence[str], every: Set[str]) -> str:
+    """Which drives of several wheels, or of every one, to go on with *not judged*."""
+    if len(wheels) > _NAMED and {*wheels} == every:
+        return f"all {len(wheels)} drives were"
     return f"the drive of {wheels[0]} was" if len(wheels) == 1 else f"the drives of {join_words(wheels)} were"
 
 

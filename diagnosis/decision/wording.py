@@ -11,6 +11,7 @@ from diagnosis.results.durations import seconds_words
 from diagnosis.results.ending import Ending
 from diagnosis.results.fault_rows import mode_words
 from diagnosis.results.machine_words import MachineWords
+from diagnosis.results.recurring import OFTEN, counted
 from diagnosis.results.result import FaultInterval
 from diagnosis.results.sizes import gain_words, loss_known
 from diagnosis.results.vocabulary import Kind, Severity
@@ -30,12 +31,18 @@ def actions_of(intervals: Sequence[FaultInterval], words: MachineWords) -> tuple
 
 
 def count_faults(stop: Sequence[FaultInterval], watch: Sequence[FaultInterval]) -> str:
-    """How many faults there are, and on how many parts where that is another number: ``6 faults to repair, 2 to watch, on 5 parts``."""
-    counted = [(len(stop), "to repair"), (len(watch), "to watch")]
-    (n, what), *more = [(n, what) for n, what in counted if n]
+    """How many faults there are, and on how many parts where that is another number: ``6 faults to repair, 2 to watch, on 5 parts``.
+
+    What comes again and again is one fault: ``1 fault to watch, seen 175 times``.
+    """
+    lists = [(faults, what) for faults, what in ((stop, "to repair"), (watch, "to watch")) if faults]
+    (n, what), *more = [(counted((f.component, f.side, f.mode) for f in faults), what) for faults, what in lists]
     words = ", ".join([f"{count_words(n, 'fault')} {what}", *(f"{n} {what}" for n, what in more)])
-    parts = len({(f.component, f.side) for f in (*stop, *watch)})
-    return words if parts == len(stop) + len(watch) else f"{words}, on {count_words(parts, 'part')}"
+    every, parts = n + sum(n for n, _ in more), len({(f.component, f.side) for f in (*stop, *watch)})
+    times = len(stop) + len(watch)
+    if every == 1 < times:
+        return f"{words}, seen {times} times"
+    return words if parts == every else f"{words}, on {count_words(parts, 'part')}"
 
 
 def _by_part(intervals: Sequence[FaultInterval]) -> list[list[FaultInterval]]:
@@ -131,7 +138,17 @@ def _how_long(kind: str, faults: Sequence[FaultInterval], words: MachineWords) -
     """What faults are, how much they take, the whole time of them on one part, and how many they are."""
     total = seconds_words(sum(f.stop_s - f.start_s for f in faults))
     held = "" if kind.startswith(UNCLEAR) else _held(faults, words)
-    return f"{kind}{held}{_lost(faults)} for {total}" + ("" if len(faults) == 1 else f" in {len(faults)} faults")
+    return f"{kind}{held}{_lost(faults)} for {total}{_times(faults)}"
+
+
+def _times(faults: Sequence[FaultInterval]) -> str:
+    """How many faults of one kind there are, with the course of what comes again and again; empty of one alone."""
+    if len(faults) < OFTEN:
+        return "" if len(faults) == 1 else f" in {len(faults)} faults"
+    what = "gaps" if all(f.mode is FaultMode.NO_SIGNAL and f.side is Side.SENSOR for f in faults) else "spells"
+    return (
+        f" in {len(faults)} {what} from {min(f.start_s for f in faults):.1f} to {max(f.stop_s for f in faults):.1f} s"
+    )
 
 
 def _lost(faults: Sequence[FaultInterval]) -> str:

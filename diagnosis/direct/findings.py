@@ -21,6 +21,7 @@ from diagnosis.estimation.by_itself import told_by_itself
 from diagnosis.estimation.changing_gain import as_changing_gain
 from diagnosis.estimation.fault_models import HEALTHY, INEFFICIENT, STUCK, TOTAL_ROWS, VARYING_ROWS
 from diagnosis.estimation.one_cause import with_one_cause
+from diagnosis.estimation.one_delay import with_one_delay
 from diagnosis.estimation.segments import Run, with_leads
 from diagnosis.estimation.simple_causes import Measured
 from diagnosis.estimation.spells import in_spells
@@ -113,7 +114,7 @@ def find_faults(path: ModePath, found: IdentifiedPair, limits: Limits) -> Faults
             findings.append(_widened(finding, run, whole, dt, _detected(path, whole, dt, shortest, found.lag)))
     beside = [as_excess_beside(as_beside(f, findings, found), findings, found) for f in findings]
     measured = _measured(found, limits)
-    joined = with_one_cause(with_spikes(beside, measured), measured)
+    joined = with_one_delay(with_one_cause(with_spikes(beside, measured), measured), measured)
     spells = [part for f in joined for part in in_spells(as_changing_gain(f, measured), measured)]
     kept = [told_by_itself(f, measured) for f in spells]
     return FaultsFound(

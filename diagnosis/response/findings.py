@@ -10,6 +10,7 @@ from diagnosis.response.jumps import onset_of
 from diagnosis.response.spells import Spell
 from diagnosis.response.wheel import EITHER, SENSOR_SHARE, Wheel, sensor_finding
 from diagnosis.results.assessment import Finding
+from diagnosis.results.limited import limited
 from diagnosis.results.result import Epsilon, Sat
 from diagnosis.results.sentence import About, Sentence
 from replay.faults import FaultMode
@@ -29,6 +30,8 @@ _LOUD = 2.0  # times the usual change from reading to reading, the other wheels'
 _BEYOND_HABIT = 2.5  # times as long as healthy channels stay at a value
 # a scaled speed that only its command contradicts: loads and slip last less, or are less sure
 _BARE_P, _BARE_S = 0.92, 5.0
+# a wheel that reads more than both others of its side, by which factor at least: they may share a loss, of which there are more than gains
+_TWO, _TOO_QUICK, _OUTVOTED_P = 2, 1.1, 0.6
 
 
 def finding_of(spell: Spell, wheel: Wheel, speed: Array | None) -> Finding | None:
@@ -264,6 +267,11 @@ def _scaled(spell: Spell, wheel: Wheel, span: tuple[int, int], speed: Array | No
     wide = 2.0 * misfit / np.sqrt(max(1.0, x.size / 4.0))
     loss = 1.0 - gain
     p = spell.p * (0.5 + 0.5 * spell.mine) if speed is not None or bare else 1.0 - (1.0 - spell.p) * 0.5
-    return sensor_finding(
+    found = sensor_finding(
         begin, max(end, begin + 1), spell.mode, p, Epsilon(loss, loss - wide, loss + wide), None, tuple(texts), sensor
     )
+    outvoted = speed is not None and spell.turns is None and not (places or wheel.own or spell.own or spell.kin)
+    if not outvoted or gain < _TOO_QUICK or len(others := wheel.compared.split(" and ")) != _TWO:
+        return found
+    why = f"Two against one: {others[0]} and {others[1]} may both read too little instead, for nothing else shows how this side moves; a yaw rate would."
+    return limited(found, _OUTVOTED_P, why)

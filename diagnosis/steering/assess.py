@@ -50,8 +50,9 @@ Flags = NDArray[np.bool_]
 
 _SIDES = (Side.SENSOR, Side.ACTUATOR)
 _OTHERWISE = (
-    "The axles do not move as any model of them says, even where it fits best: only faults that a measurement of the same "
-    "quantity shows are stated."
+    "No model of the axles fits their motion closely enough to accuse a part of them, as on many sound machines (valves creep, axles push each "
+    "other, oil warms): only faults that a measurement of the same quantity shows are stated. The verdict does not rest on the model there: what "
+    "clears an axle are second measurements, its rate per opening, and how the machine turns."
 )
 
 

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from replay.log.source_options import SignalSource
 from replay.machine.geometry import WheelGeometry
+from replay.machine.quantities import UNITS
 from replay.machine.units import known_unit
 from replay.setup.motion import held
 from replay.signals.signal import Signal, Signals
@@ -55,8 +56,8 @@ def radius_by_body(
         body = found.items.get(name)
         if body is None or not names:
             continue
-        at = _moments([*(found.items[n] for n in names), body])
-        mean = np.mean([_forward(found.items[n], origins, at) for n in names], axis=0)
+        at = moments([*(found.items[n] for n in names), body])
+        mean = np.mean([forward(found.items[n], origins, at) for n in names], axis=0)
         there = held(body, at)
         if name == "gnss.speed":  # of satellites it has no sign, of a radar one
             mean, there = np.abs(mean), np.abs(there)
@@ -91,14 +92,9 @@ def track_by_yaw(
     ]  # fmt: skip
     if yaw is None or not all(sides):
         return None
-    at = _moments([yaw, *sides[0], *sides[1]])
-    left, right = (np.mean([_forward(s, origins, at) for s in side], axis=0) for side in sides)
-    speeds = all(
-        origin.unit and not is_rotation(origin)
-        for s in (*sides[0], *sides[1])
-        for origin in [origins.get(s.name, s.origin)]
-    )
-    gain = gain_of(held(yaw, at), (1.0 if speeds else radius) * (right - left))
+    at = moments([yaw, *sides[0], *sides[1]])
+    left, right = (np.mean([rim(s, origins, at, radius) for s in side], axis=0) for side in sides)
+    gain = gain_of(held(yaw, at), right - left)
     return Measured(abs(gain), "the yaw rate") if gain is not None else None
 
 
@@ -120,7 +116,7 @@ def base_by_yaw(found: Signals, base: float) -> Measured | None:
     yaw, asked = found.items.get("imu.yaw_rate"), found.items.get("cmd.omega")
     if yaw is None or asked is None or not is_steering_command(asked):
         return None
-    at = _moments([yaw, asked])
+    at = moments([yaw, asked])
     gain = gain_of(held(yaw, at), base * held(asked, at))
     return Measured(gain, "the yaw rate beside commanded speed and steering angle") if gain is not None else None
 
@@ -131,14 +127,25 @@ def is_rotation(origin: SignalSource) -> bool:
     return unit in ("rad/s", "rpm", "rev/s", "deg/s") or (unit == "rad" and origin.derivative)
 
 
-def _forward(signal: Signal, origins: Mapping[str, SignalSource], at: NDArray[np.int64]) -> Array:
-    """Rotation at some moments, positive forward."""
+def forward(signal: Signal, origins: Mapping[str, SignalSource], at: NDArray[np.int64]) -> Array:
+    """Rotation at some moments [rad/s], positive forward, shape (n,) as these."""
     origin = origins.get(signal.name, signal.origin)
     return held(signal, at) * (1.0 if origin.gain * signal.origin.gain > 0.0 else -1.0)
 
 
-def _moments(signals: Sequence[Signal]) -> NDArray[np.int64]:
-    """Moments at which all of some signals were recorded."""
+def rim(signal: Signal, origins: Mapping[str, SignalSource], at: NDArray[np.int64], radius: float) -> Array:
+    """Speed of a wheel's rim [m/s] at some moments, positive forward, both of shape (n,), as its source in `origins` says; `radius` in m.
+
+    Without a unit it is in m/s.
+    """
+    origin = origins.get(signal.name, signal.origin)
+    unit = known_unit(origin.unit)
+    scale = UNITS[unit][1] if unit is not None and not signal.origin.unit else 1.0  # else it is in SI already
+    return held(signal, at) * scale * origin.gain / signal.origin.gain * (radius if is_rotation(origin) else 1.0)
+
+
+def moments(signals: Sequence[Signal]) -> NDArray[np.int64]:
+    """Moments at which all of some signals were recorded [ns], shape (n,)."""
     first, last = max(int(s.stamps[0]) for s in signals), min(int(s.stamps[-1]) for s in signals)
     return np.arange(first, last, round(_STEP_S * 1e9), dtype=np.int64)
 

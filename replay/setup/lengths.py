@@ -14,6 +14,7 @@ from replay.machine.geometry import Geometry, WheelGeometry
 from replay.machine.quantities import UNITS
 from replay.machine.units import known_unit
 from replay.setup.by_the_body import Measured, base_by_yaw, is_rotation, track_by_yaw
+from replay.setup.by_the_steering import Lengths, lengths_by_yaw
 from replay.setup.draft_notes import Draft
 from replay.setup.motion import WheelMotion
 from replay.setup.structure import ONE, Structure
@@ -145,7 +146,8 @@ def wheel_places(
             f"{ONE[0]}, which stands at that axle.",
         )
         return places
-    turned = None if measured is None else track_by_yaw(measured[0], places, *measured[1:])
+    steered = Lengths(None, None) if measured is None else lengths_by_yaw(measured[0], places, *measured[1:])
+    turned = None if measured is None else track_by_yaw(measured[0], places, *measured[1:]) or steered.track
     asked_speeds = {n: m for n, m in motions.items() if n.endswith(".v_ref")}
     told = asked_speeds if len(asked_speeds) == len(places) else motions  # no fault hides what is asked
     tracks = [2 * m.y * (1 if places[n.split(".")[1]].y > 0 else -1) for n, m in told.items() if m.y is not None]
@@ -156,11 +158,9 @@ def wheel_places(
         draft.say("geometry", f"Track {track:.4g} m from {structure.how}.")
     elif turned is not None and _TRACKS[0] <= turned.length <= _TRACKS[1]:
         track = float(_round(turned.length))
-        draft.ask(
-            "geometry",
-            f"is the track {track:g} m? By {turned.by} beside the speeds of the wheels: a machine that skids turns as one with a wider track "
-            "would. Measure it.",
-        )
+        skids = " beside the speeds of the wheels: a machine that skids turns as one with a wider track would"
+        how = f"{turned.by}{'' if turned is steered.track else skids}"
+        draft.ask("geometry", f"is the track {track:g} m? By {how}. Measure it.")
     elif asked is not None and math.isfinite(asked) and fixed:
         track = float(_round(asked))
         draft.ask(
@@ -171,7 +171,7 @@ def wheel_places(
     base = max(p.x for p in places.values()) - min(p.x for p in places.values())
     if "wheelbase" in structure.measured:
         draft.say("geometry", f"Wheelbase {base:.4g} m from {structure.how}.")
-    elif (by_yaw := _base_by_yaw(draft, places, None if measured is None else measured[0])) is not None:
+    elif (by_yaw := _base_by_yaw(draft, places, None if measured is None else measured[0], steered.base)) is not None:
         stretch = by_yaw / base
         places = {w: replace(p, x=round(p.x * stretch, 4)) for w, p in places.items()}
     elif base:
@@ -183,18 +183,22 @@ def wheel_places(
     return {w: replace(p, y=round(p.y * scale, 4)) for w, p in places.items()}
 
 
-def _base_by_yaw(draft: Draft, places: Mapping[str, WheelGeometry], found: Signals | None) -> float | None:
-    """Distance of steered from unsteered wheels [m] by how the machine turns; None where nothing tells it."""
+def _base_by_yaw(
+    draft: Draft, places: Mapping[str, WheelGeometry], found: Signals | None, by_wheels: Measured | None
+) -> float | None:
+    """Wheelbase [m] by how the machine turns beside its measured or commanded angles; None where nothing tells it."""
     base = Geometry(dict(places), 1.0).steering_base
-    turned = None if found is None or base is None else base_by_yaw(found, abs(base))
+    asked = None if found is None or base is None else base_by_yaw(found, abs(base))
+    turned = by_wheels or asked
     if turned is None or not _TRACKS[0] <= abs(turned.length) <= _BASES:
         return None
     length = float(_round(abs(turned.length)))
     draft.ask("geometry", f"are front and rear wheels {length:g} m apart? By {turned.by}. Measure it.")
     if turned.length < 0:
+        which, what = ("measured", "steer.*.phi") if turned is by_wheels else ("commanded", "cmd.omega")
         draft.ask(
             "signals",
-            "is the commanded steering angle positive to the right? The machine turns against it; give cmd.omega gain = -1.",
+            f"is the {which} steering angle positive to the right? The machine turns against it; give {what} gain = -1.",
         )
     return length
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 from replay.log.raw_log import Channel
 from replay.log.source_options import SignalSource
@@ -16,7 +16,10 @@ _QUESTIONS = {
     Open.SPEED: "are {names} speeds of the wheels? Their names tell the wheel, but not what; they are taken so.",
     Open.POSITION: "are {names} positions of the wheels{unit}? They are taken so, and the speeds are their slopes.",
     Open.SECOND: "are {names} second sensors of what {beside} and the like measure? They are taken so: what both say is believed.",
+    Open.OPENING: "are {names} what valves or pumps are told, or where they stand (1 is fully open)? They are taken so.",
 }
+
+_SHOWN = 8  # labels in a question
 
 
 def unsure_signals(
@@ -45,6 +48,12 @@ def unsure_signals(
     for kind, ones in kinds.items():
         if kind in _QUESTIONS:
             bare = any(one.origin.unit == "rad" for one in ones)
-            names, beside = ", ".join(one.origin.label for one in ones), ones[0].beside
+            names, beside = _few([one.origin.label for one in ones]), ones[0].beside
             draft.ask("signals", _QUESTIONS[kind].format(names=names, beside=beside, unit=" in rad" if bare else ""))
     return {one.signal: one.origin for ones in kinds.values() for one in ones}
+
+
+def _few(labels: Sequence[str]) -> str:
+    """Labels, the first of many: their lines are in the draft."""
+    more = f" and {len(labels) - _SHOWN} more" if len(labels) > _SHOWN else ""
+    return ", ".join(labels[:_SHOWN] if more else labels) + more

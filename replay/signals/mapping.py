@@ -25,12 +25,13 @@ from replay.signals.file_names import in_its_file, named_channels
 from replay.signals.name_parts import wheel_said
 from replay.signals.rules import candidates, wanted_type
 from replay.signals.scale_doubt import scale_doubt
+from replay.signals.second_ones import number_of
 from replay.signals.signal import FILE_NAMES, Signal, Signals
 from replay.signals.steering_command import turn_by_steering
 from replay.signals.to_si import Converted, choose_motor_or_wheel, convert, usable_unit
 from replay.signals.unfilled import unfilled, unfilled_note
 from replay.signals.unit_doubts import Doubt, doubt, questions
-from replay.signals.unsure_names import NOT_USED, unsure
+from replay.signals.unsure_names import NOT_USED, Unsure, unsure
 
 #: Why a signal is missing for which nothing was found.
 NO_CHANNEL = "no channel fits by its name or message type"
@@ -154,7 +155,7 @@ def _name_the_unsure(draft: _Draft, logs: Sequence[RawLog]) -> None:
     named: list[str] = []
     for log, channels in zip(logs, named_channels(logs), strict=True):
         for found in unsure(channels, draft.machine):
-            if draft.missing.get(found.signal) == NO_CHANNEL:
+            if draft.missing.get(found.signal) == NO_CHANNEL and not _is_given(draft, log, found):
                 there = replace(found, origin=in_its_file(found.origin, log))
                 draft.missing[found.signal] = there.reason
                 named.append(f"{there.origin.label} ({found.signal})")
@@ -205,7 +206,7 @@ def _take_given(draft: _Draft, name: str, source: SignalSource, logs: Sequence[R
 def _take_guess(draft: _Draft, name: str, found: list[tuple[Candidate, RawLog]]) -> None:
     """Take the surest candidate that holds a number."""
     reason = NO_CHANNEL
-    ranked = sorted(found, key=lambda f: (f[0].rank, -_size(f[1], f[0])))
+    ranked = sorted(found, key=lambda f: (f[0].rank, number_of(f[0].origin.label), -_size(f[1], f[0])))
     for i, (candidate, log) in enumerate(ranked):
         channel = _find(log, candidate.origin)
         if channel is None:
@@ -237,9 +238,7 @@ def _take_guess(draft: _Draft, name: str, found: list[tuple[Candidate, RawLog]])
             else ")"
         )
         rivals = [
-            c.origin.label
-            for c, rival in ranked[i + 1 :]
-            if c.rank == candidate.rank and not _is_given(draft, rival, c)
+            c.origin.label for c, rival in ranked[i + 1 :] if _as_sure(c, candidate) and not _is_given(draft, rival, c)
         ]
         text += f"; {rivals[0]} would fit as well" if rivals else ""
         draft.notes.append(text)
@@ -247,7 +246,12 @@ def _take_guess(draft: _Draft, name: str, found: list[tuple[Candidate, RawLog]])
     draft.missing[name] = reason
 
 
-def _is_given(draft: _Draft, log: RawLog, candidate: Candidate) -> bool:
+def _as_sure(one: Candidate, other: Candidate) -> bool:
+    """Whether neither the rule nor a number in their names prefers one of two channels."""
+    return one.rank == other.rank and number_of(one.origin.label) == number_of(other.origin.label)
+
+
+def _is_given(draft: _Draft, log: RawLog, candidate: Candidate | Unsure) -> bool:
     channel = _find(log, candidate.origin)
     return channel is not None and (log.source, channel.name) in draft.given
 

@@ -1,7 +1,7 @@
-"""Columns and symbols whose names tell a wheel or axle, and leave open what exactly they hold: a person must say it.
+"""Channels whose names tell a wheel or axle, and leave open what exactly they hold: a person must say it.
 
 ``left_actual`` beside ``left_target``, ``vl_ref``, ``left_ticks``, ``left_wheel_position``, ``HubSpeedAct2`` beside ``HubSpeedAct``,
-``fVentil_Soll_VL [mA]``. A diagnosis takes none of them by itself and says why; a draft of a machine file takes them with a question.
+``/steer_FL/angle2`` beside ``/steer_FL/state`` with an angle, ``/wheel_FL/swash.position``, ``fVentil_Soll_VL [mA]``. A diagnosis takes none of them by itself and says why; a draft of a machine file takes them with a question.
 """
 
 from __future__ import annotations
@@ -32,8 +32,10 @@ from replay.signals.name_parts import (
 )
 from replay.signals.name_words import ASKING, MEASURED, english, role, tokens
 from replay.signals.named_units import bare_name, unit_by_end
-from replay.signals.rules import candidates
+from replay.signals.rules import MESSAGE_TYPES, candidates
+from replay.signals.second_ones import number_of, seconds
 from replay.signals.symbol_rules import valve_current
+from replay.signals.unsure_openings import unsure_opening
 
 #: Begin of the note that names such channels.
 NOT_USED = "not used, for their names leave open what they hold"
@@ -48,6 +50,7 @@ class Open(StrEnum):
     SPEED = "speed"
     SECOND = "second"
     MOTION = "motion"
+    OPENING = "opening"
 
 
 @dataclass(frozen=True)
@@ -85,6 +88,7 @@ _REASONS = {
     Open.SPEED: "has no word for what it holds; if it is a speed, with its unit (m/s, rad/s, rpm, mm/s)",
     Open.MOTION: "may be what the machine is told to do, or what it does (odom.v is its measured speed); if it is the command",
     Open.SECOND: "may be a second sensor beside {beside!r}; if it is",
+    Open.OPENING: "may be what a valve or pump is told, or where it stands (1 is fully open); if it is",
 }
 _LETTERS = frozenset(("v", "w", "n", "omega"))  # that stand for a speed
 _THINGS = frozenset(("wheel", "rad", "motor", "drive", "hub", "side", "track", "joint", "chain", "crawler", "st", "fb"))
@@ -107,7 +111,7 @@ _LAST_NUMBER = re.compile(r"[ _.-]?(\d+)(?=\D*$)")
 
 
 def unsure(channels: Mapping[str, Channel], machine: Machine) -> list[Unsure]:
-    """Channels of tables and PLCs that may hold signals, but whose names leave something open.
+    """Channels that may hold signals, but whose names leave something open; of messages, second sensors and openings.
 
     Parameters
     ----------
@@ -132,10 +136,27 @@ def unsure(channels: Mapping[str, Channel], machine: Machine) -> list[Unsure]:
             out += _one(channel, names[name], names, measured)
         else:
             out += _motion(channel, measured)
+    out += _of_any_log(channels, machine)
     first: dict[str, Unsure] = {}
     for found in out:
         first.setdefault(found.signal, found)
     return [*first.values()]
+
+
+def _of_any_log(channels: Mapping[str, Channel], machine: Machine) -> Iterator[Unsure]:
+    """Yield second measurements that a number tells from the first, and what valves and pumps may be told, of messages as of tables."""
+    every = [*candidates(channels, machine)]
+    twice = seconds(every)
+    for signal, (first, second) in twice.items():
+        yield Unsure(f"{signal}_true", second.origin, Open.SECOND, first.origin.label)
+    taken = {c.origin.label for c in every}
+    for channel in channels.values():
+        origin = source_of(channel)
+        if origin.label in taken or (channel.topic and channel.type_name.rpartition("/")[2] in MESSAGE_TYPES):
+            continue
+        told = unsure_opening(channel, machine)
+        if told is not None:
+            yield Unsure(told[0], replace(origin, unit=told[1]), Open.OPENING)
 
 
 @dataclass(frozen=True)
@@ -231,7 +252,7 @@ def _seconds(channels: Mapping[str, Channel], machine: Machine, sure: Mapping[st
         others = [n for n in names if sure.get(n, set()) - signals]
         if len(names) == 2 and len(signals) == 1 and not others:
             (signal,) = signals
-            first = next(n for n in names if of[n])
+            first = min((n for n in names if of[n]), key=number_of)
             second = next(n for n in names if n != first)
             yield Unsure(f"{signal}_true", source_of(channels[second], _unit(channels[second])), Open.SECOND, first)
 

@@ -147,9 +147,20 @@ def test_the_verdict_is_printed(calls: dict[str, Any], capsys: pytest.CaptureFix
 
 
 def test_many_faults_are_cut_with_a_word_about_it(calls: dict[str, Any], capsys: pytest.CaptureFixture[str]) -> None:
-    calls["result"] = result(*["medium"] * 55)
+    many = result(*["medium"] * 55)
+    for k, fault in enumerate(many.report["intervals"]):
+        fault["component"] = f"wheel {k // 4}"
+    calls["result"] = many
     run(["diagnose", "drive.mcap"])
     assert "… and 15 more in the report" in capsys.readouterr().out
+
+
+def test_what_comes_again_and_again_is_one_line(calls: dict[str, Any], capsys: pytest.CaptureFixture[str]) -> None:
+    calls["result"] = result(*["medium"] * 55)
+    run(["diagnose", "drive.mcap"])
+    seen = capsys.readouterr().out
+    assert "stuck, 55 times" in seen
+    assert "more in the report" not in seen
 
 
 def test_json_is_the_report_alone(calls: dict[str, Any], capsys: pytest.CaptureFixture[str]) -> None:

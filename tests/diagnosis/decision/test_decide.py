@@ -375,6 +375,19 @@ def test_the_sentence_names_parts_in_the_order_of_the_actions_with_what_they_los
     assert "inefficient (40 % lost, 95 % bounds 39 to 41 %) for 3.0 s" in str(got.actions[0]["text"])
 
 
+def test_what_comes_again_and_again_is_one_fault_with_its_course() -> None:
+    gaps = [finding(Side.SENSOR, FaultMode.NO_SIGNAL, 1000 * k, 1000 * k + 100) for k in range(1, 8)]
+    alone = verdict(machine(FR_sensor=assessed(*gaps)))
+    assert alone.title == "1 fault to watch, seen 7 times"
+    assert alone.text == "The FR speed sensor was without signal for 700 ms in 7 gaps from 1.0 to 7.1 s."
+    assert "in 7 gaps from 1.0 to 7.1 s" in str(alone.actions[0]["text"])
+    few = verdict(machine(FR_sensor=assessed(*gaps[:4])))
+    assert few.title == "4 faults to watch, on 1 part"
+    beside = finding(Side.ACTUATOR, FaultMode.INEFFICIENT, 3000, 9000, epsilon=0.3)
+    both = verdict(machine(FR_sensor=assessed(*gaps), FL_actuator=assessed(beside)))
+    assert both.title == "2 faults to watch"
+
+
 def test_what_is_unclear_in_several_ways_is_said_once_and_losses_have_bounds() -> None:
     def unclear(start: int, *modes: str) -> Finding:
         rows = [Hypothesis("actuator", mode, 0.9 / len(modes)) for mode in modes]

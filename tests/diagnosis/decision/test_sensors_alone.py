@@ -50,6 +50,17 @@ def test_the_title_says_which_sensors() -> None:
     assert text.startswith("No fault was seen in the speed sensors over at least 20 s")
 
 
+def test_many_drives_that_are_all_of_the_machine_are_not_named_one_by_one_and_have_one_reason() -> None:
+    wheels = [f"W{k}" for k in range(6)]
+    why = "a controller that holds the speed hides a weak drive, and the effort of a healthy one is not known"
+    one = replace(assessed(), tier=Tier.RESPONSE, reasons={State.NOT_ASSESSED: why})
+    parts = {(w, side): one for w in wheels for side in ("sensor", "actuator")}
+    against = Reservations(short=tuple((w, "actuator") for w in wheels), words=HYDRAULIC)
+    got = sensors_alone(parts, dict.fromkeys(parts, 20.0), (), against, ())
+    assert got is not None
+    assert got[1].endswith("; all 6 drives were not judged, for a controller that holds the speed hides a weak drive.")
+
+
 def test_a_steering_that_nothing_judged_has_its_own_words() -> None:
     title, text = said(without=AXLES)
     assert title == "No speed sensor fault seen, drives and steering not judged"
