@@ -41,10 +41,14 @@ RATE = {False: (2.0, 0.6), True: (1.6, 1.0)}
 _LEAST_WINDOWS = 16  # for a change
 #: Of the loss that counts, and times the other axle's: a change of one axle alone. Dead bands that are not known hide half of one.
 _CHANGED, _ALONE = 0.3, 1.5
+_CHANGED_TWICE = (
+    0.6  # the same where both sides are measured twice, so that what lies behind the valve alone is asked for
+)
 _ONE_AXLE = 0.75  # of the loss that counts: a change of the only axle, whose oil warms
 #: Of the loss that counts, and times the other axle's: a deviation of one axle alone in windows. Of 36 healthy tuning missions of nine machines
 #: the axles' largest ones were alike within a factor of 2.6.
 _BRIEF, _BRIEF_ALONE = 0.9, 3.0
+_ALIKE_DEAD = 0.04  # of full opening: axles of one machine have valves of one kind
 _SAME = 0.003  # of a channel that another one's share leaves, root mean square
 _FEW_S = 2.0  # in which an axle is steered, for its usual rate
 
@@ -62,9 +66,12 @@ def axle_checks(cells: Cells, clear_at: float) -> Iterator[Checked]:
     place = np.minimum(np.arange(cells.frame.starts.size), len(rates.off) - 1)
     limit = answered(cells)
     joint = len(cells.machine.axles) > 1 and _one_joint(cells, 0, 1)
-    alone_by = [_ONE_AXLE * share if joint else None] * len(rates.changes)
+    both = [bool(np.isfinite(second[:, j]).any() and np.isfinite(opening[:, j]).any()) for j in range(angle.shape[1])]
     changes = [
-        most or alone(rates.changes, j, share, _CHANGED * share, _ALONE, others=1) for j, most in enumerate(alone_by)
+        _ONE_AXLE * share
+        if joint
+        else alone(rates.changes, j, share, (_CHANGED_TWICE if both[j] else _CHANGED) * share, _ALONE, others=1)
+        for j in range(len(rates.changes))
     ]
     told = any((x or 0.0) > most for x, most in zip(rates.changes, changes, strict=True))  # which of them changes
     for j, axle in enumerate(cells.machine.axles):
@@ -82,7 +89,7 @@ def axle_checks(cells: Cells, clear_at: float) -> Iterator[Checked]:
             yield Checked(*about, Side.SENSOR, Check.ANGLE_SCALE, None, clear_at)
         if np.isfinite(command[:, j]).any():
             yield _still(cells, j, limit)
-            twice = bool(np.isfinite(second[:, j]).any() and np.isfinite(opening[:, j]).any())
+            twice = both[j]
             off = _alone(rates.off, j) if twice else np.abs(rates.off[:, j])
             deviates = worst(cells, (*about, either, Check.RATE), off[place], brief_limit(rates, j, share, twice=twice))
             changed = lasts(cells, (*about, either, Check.RATE), rates.changes[j], changes[j])
@@ -189,7 +196,7 @@ def rates_of(cells: Cells, rate: Array, opening: Array) -> Rates:
         apart[j] = _WRONG_WAY
     for a, b in pairwise(range(len(whole))):
         if np.isfinite(whole[a]) and np.isfinite(whole[b]) and not one:
-            between = float(abs(whole[a] - whole[b]))
+            between = _between(rate[:, [a, b]], opening[:, [a, b]], use[:, [a, b]], dead[[a, b]])
             apart[a], apart[b] = max(apart[a] or 0.0, between), max(apart[b] or 0.0, between)
     changes = [_changes(cells, frame, off, j) for j in range(len(whole))]
     ways = [
@@ -199,6 +206,19 @@ def rates_of(cells: Cells, rate: Array, opening: Array) -> Rates:
     as_they_are, by_side = _parted(tried), _parted(ways)
     parted = [a if b is None else b if a is None else min(a, b) for a, b in zip(as_they_are, by_side, strict=True)]
     return Rates(frame, off, whole, apart, ahead, changes, parted)
+
+
+def _between(rate: Array, opening: Array, use: Flags, dead: Array) -> float:
+    """How far the rates per opening of two axles are apart [ln], arrays (cells, 2); dead bands (2,) that are nearly alike are taken as one.
+
+    A sensor's gain and a dead band take each other's place: an angle that reads 1.4 was found with a dead band of 0 beside one of 0.02.
+    """
+    if abs(float(dead[0] - dead[1])) <= _ALIKE_DEAD:
+        dead = np.full_like(dead, dead.mean())
+    _, ahead, opened = beyond(rate, opening, use, dead)
+    with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
+        log = np.log(np.maximum(ahead.sum(axis=0) / opened.sum(axis=0), 1e-3))
+    return float(abs(log[0] - log[1]))
 
 
 def _parted(tried: Sequence[Array]) -> list[float | None]:

@@ -29,6 +29,8 @@ from diagnosis.results.sentence import mapped
 from diagnosis.results.vocabulary import Kind, Tier
 from replay.faults import FaultMode, Side, State
 
+_BRIEF_S, _MOSTLY, _TOGETHER = 5.0, 0.6, 0.55  # of both axles; of the time; of any fault, set by hand
+_AT_ONCE = "Another axle stands at the same time: parts fail one at a time, so that what supplies or holds the machine is as likely to hold both."
 #: A component and its side.
 Part = tuple[str, str]
 
@@ -62,7 +64,8 @@ def what_stands_out(checks: Sequence[Checked], cells: Cells, words: MachineWords
     found = {component: fault for component, fault in jumping.items() if fault is not None}
     found |= {check.component: fault_of_angle(check, cells) for check in checks if _off_second_angle(check)}
     axles = {c.component: fault_of_axle(c, cells) for c in checks if _does_not_answer(c, cells)}
-    found |= {component: fault for component, fault in axles.items() if fault is not None}
+    still = {component: fault for component, fault in axles.items() if fault is not None}
+    found |= _less_sure_together(still, cells)
     alone = _alone(checks, cells) or _off_its_plant(checks, cells)
     wheel = alone or (None if _stated(cells) else _alone_not_following(checks, cells))
     if wheel is not None:
@@ -73,6 +76,25 @@ def what_stands_out(checks: Sequence[Checked], cells: Cells, words: MachineWords
         component: replace(f, evidence=tuple(mapped(text, words.fill) for text in f.evidence))
         for component, f in found.items()
     }
+
+
+def _less_sure_together(found: Mapping[str, Finding], cells: Cells) -> dict[str, Finding]:
+    """Axles that stand at the same time for a moment, less sure: parts fail one at a time, and what supplies or holds the machine holds both."""
+
+    def together(f: Finding) -> bool:
+        others = [g for g in found.values() if g is not f and g.mode is f.mode]
+        common = [min(f.stop, g.stop) - max(f.start, g.start) for g in others]
+        brief = (f.stop - f.start) * cells.timeline.dt < _BRIEF_S
+        return f.mode is FaultMode.NO_SIGNAL and brief and max(common, default=0) >= _MOSTLY * (f.stop - f.start)
+
+    return {
+        component: limited(f, f.probability * _TOGETHER / _faulty(f), _AT_ONCE) if together(f) else f
+        for component, f in found.items()
+    }
+
+
+def _faulty(f: Finding) -> float:
+    return sum(h.p for h in f.hypotheses if h.mode != State.HEALTHY.value)
 
 
 def without_explained(

@@ -3,13 +3,22 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 import pytest
 
+from diagnosis.clearing.cells import Cells
 from diagnosis.clearing.checks import checks_of
-from diagnosis.clearing.standing_out import what_stands_out, with_findings, without_explained, without_followers
-from diagnosis.clearing.untold_faults import fault_of_wheel
+from diagnosis.clearing.standing_out import (
+    _less_sure_together,
+    what_stands_out,
+    with_findings,
+    without_explained,
+    without_followers,
+)
+from diagnosis.clearing.untold_faults import fault_of_wheel, finding_of
 from diagnosis.results.assessment import CODE, Assessment, Finding
 from diagnosis.results.clearing import Check, Checked
 from diagnosis.results.machine_event import foreign, swinging
@@ -230,3 +239,19 @@ def test_what_stands_out_although_both_measurements_agree_lies_behind_the_valve(
     fault = what_stands_out((*checks_of(cells, HYDRAULIC), *second), cells, HYDRAULIC)["RR"]
     assert (fault.side, fault.mode) == (side, FaultMode.INEFFICIENT)
     assert ("lies behind the valve" in fault.evidence[-1]) is (side is Side.ACTUATOR)
+
+
+@pytest.mark.parametrize(
+    ("starts", "seconds", "sure"), [((10.0, 10.2), 2.0, False), ((10.0, 20.0), 2.0, True), ((10.0, 10.2), 8.0, True)]
+)
+def test_axles_that_stand_at_once_for_a_moment_are_hardly_faulty(
+    starts: tuple[float, float], seconds: float, *, sure: bool
+) -> None:
+    cells = cast(Cells, SimpleNamespace(timeline=SimpleNamespace(dt=0.01)))
+    found = {
+        axle: finding_of((round(100 * a), round(100 * (a + seconds))), FaultMode.NO_SIGNAL, None, ())
+        for axle, a in zip(("front", "rear"), starts, strict=True)
+    }
+    for f in _less_sure_together(found, cells).values():
+        faulty = sum(h.p for h in f.hypotheses if h.mode != "healthy")
+        assert faulty == pytest.approx(0.95 if sure else 0.55)
