@@ -109,7 +109,9 @@ def wheel_checks(cells: Cells, clear_at: float) -> Iterator[Checked]:
             part = whole if for_a_part is None else lasts(cells, about_plant, for_a_part.off, for_a_part.limit * share)
             yield max(whole, part, key=times)
         # where an opening is no speed, what it gives says nothing of a wheel whose sides are both measured twice
-        if _known(used[:, i]) and speed.shape[1] > OTHERS and (tells or not all(twice[i])):
+        # of two wheels, each is the other's measure: enough for what lies behind drives that are measured twice
+        enough = speed.shape[1] > OTHERS or (speed.shape[1] == OTHERS and all(twice[i]))
+        if _known(used[:, i]) and enough and (tells or not all(twice[i])):
             own = limits[i]
             response = (*about, either, Check.RESPONSE)
             driven = worst(cells, response, -windows[:, i], own.below, apart=True)
@@ -139,7 +141,7 @@ def wheel_checks(cells: Cells, clear_at: float) -> Iterator[Checked]:
                     key=times,
                 )
         # nothing tells what lies behind such a drive, and less where its own opening is all that is measured of it
-        if _known(used[:, i]) and speed.shape[1] > OTHERS and not tells and twice[i][0]:
+        if _known(used[:, i]) and enough and not tells and twice[i][0]:
             yield Checked(*about, either, Check.BEHIND, None, limits[i].below)
         if _known(reference[:, i]):
             if (

@@ -127,7 +127,7 @@ def by_model(assessments: Mapping[Part, Assessment], shown: Sequence[Detectable]
         words.fill(
             "Sensors and {valve}s without a second measurement were judged by a {wheel} model identified from this mission. "
         )
-        + f"{sizes}A loss of every {words.part} that lasts the whole mission does not show. A second measurement would show more, and "
+        + f"{sizes}A loss of every {words.part} that lasts the whole mission does not show, one that begins in it where speeds before and after are alike. A second measurement would show more, and "
         f"a machine file with [plant], which `mfhca fit` writes from healthy missions, also a loss of every {words.part}."
     )
 

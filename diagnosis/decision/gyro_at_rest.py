@@ -11,9 +11,9 @@ from replay.signals.timeline import Timeline
 
 Array = NDArray[np.float64]
 
-_CELL_S, _AROUND = 0.5, 2  # cells at the ends of a rest, in which it may sway
+_CELL_S, _AROUND = 0.5, 1  # cells at the ends of a rest, in which it may sway
 _STANDS = 0.02  # of the largest speed
-_REST_S = 1.5  # of one rest
+_REST_S = 1.0  # of one rest
 _LEAST, _ERRORS = 0.02, 4.0  # rad/s that are told: a gyro that was calibrated at rest has a tenth; and by its own noise
 _SWAYS = 0.05  # rad/s, of its means: more is a machine that is moved
 
