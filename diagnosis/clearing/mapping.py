@@ -249,6 +249,9 @@ def _swapped(measured: Array, wanted: Array, dt: float) -> bool:
     sizes = [_rms(z) for z in y.T]
     if min(sizes) < _STILL * max(sizes):
         return False
+    own, other = (np.mean(np.abs(y - z), axis=0) for z in (x, x[:, ::-1]))
+    if np.any(own < _BETTER * other):
+        return False  # a weak valve opens as its neighbour is told, whose loop asks for less; the neighbour follows its own command
     y = y * (np.abs(x).sum() / max(float(np.abs(y).sum()), 1e-9))  # loops stay behind their commands
     own, other = (np.mean(np.abs(y - z)) for z in (x, x[:, ::-1]))
     return bool(other < _BETTER * own)

@@ -155,3 +155,14 @@ def test_two_rows_tell_no_place() -> None:
         mission, stamps=mission.stamps[2000:2300], columns={n: x[2000:2300] for n, x in mission.columns.items()}
     )
     assert mapping_hints(in_cells(short, base=True)) == ()
+
+
+@pytest.mark.parametrize(("gain", "exchanged"), [(0.6, False), (1.0, True)])
+def test_a_weak_valve_beside_one_that_follows_its_own_command_is_not_exchanged_with_it(
+    gain: float, *, exchanged: bool
+) -> None:
+    """Its loop opens it further, so that it stands where its neighbour is told to."""
+    told = 0.3 + 0.2 * np.sin(0.4 * np.arange(600) * 0.1)
+    wanted = np.column_stack([told, told / 0.6])
+    measured = wanted[:, ::-1] if exchanged else wanted * np.array([1.0, gain])
+    assert _swapped(measured, wanted, 0.1) is exchanged
