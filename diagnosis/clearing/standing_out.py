@@ -31,6 +31,9 @@ from replay.faults import FaultMode, Side, State
 
 _BRIEF_S, _MOSTLY, _TOGETHER = 5.0, 0.6, 0.55  # of both axles; of the time; of any fault, set by hand
 _AT_ONCE = "Another axle stands at the same time: parts fail one at a time, so that what supplies or holds the machine is as likely to hold both."
+_SLOWED = "The {wheel}s fell far behind their commands at the same time: an engine that stalls, or what else supplies the machine, stops its steering as well."
+_BEFORE_S, _BEHIND_S = 1.0, 0.5  # before the axle stands; in which most wheels are behind
+_DRIVES, _BEHIND, _WHEELS = 0.1, 0.5, 2  # of the top speed; of a wheel's command; wheels that are told to drive
 #: A component and its side.
 Part = tuple[str, str]
 
@@ -79,7 +82,10 @@ def what_stands_out(checks: Sequence[Checked], cells: Cells, words: MachineWords
 
 
 def _less_sure_together(found: Mapping[str, Finding], cells: Cells) -> dict[str, Finding]:
-    """Axles that stand at the same time for a moment, less sure: parts fail one at a time, and what supplies or holds the machine holds both."""
+    """Axles that stand for a moment at the same time, or while the wheels make little of their commands, less sure: what supplies the machine stops all.
+
+    Parts fail one at a time.
+    """
 
     def together(f: Finding) -> bool:
         others = [g for g in found.values() if g is not f and g.mode is f.mode]
@@ -87,10 +93,27 @@ def _less_sure_together(found: Mapping[str, Finding], cells: Cells) -> dict[str,
         brief = (f.stop - f.start) * cells.timeline.dt < _BRIEF_S
         return f.mode is FaultMode.NO_SIGNAL and brief and max(common, default=0) >= _MOSTLY * (f.stop - f.start)
 
+    def less_sure(f: Finding, why: str) -> Finding:
+        return limited(f, f.probability * _TOGETHER / _faulty(f), why)
+
     return {
-        component: limited(f, f.probability * _TOGETHER / _faulty(f), _AT_ONCE) if together(f) else f
+        component: less_sure(f, _AT_ONCE) if together(f) else less_sure(f, _SLOWED) if _machine_slows(f, cells) else f
         for component, f in found.items()
     }
+
+
+def _machine_slows(f: Finding, cells: Cells) -> bool:
+    """Whether most wheels make less than half of what they are told for a while in, or just before, a brief time in which an axle stands."""
+    if f.mode is not FaultMode.NO_SIGNAL or (f.stop - f.start) * cells.timeline.dt >= _BRIEF_S:
+        return False
+    before = round(_BEFORE_S / cells.dt)
+    part = slice(max(0, f.start // cells.width - before), -(-f.stop // cells.width))
+    speed, asked = np.abs(cells.wheels("v")[part]), np.abs(cells.reference[part])
+    with np.errstate(invalid="ignore"):
+        told = asked > _DRIVES * cells.machine.max_speed
+        behind = told & (speed < _BEHIND * asked)
+    most = (behind.sum(axis=1) > 0.5 * told.sum(axis=1)) & (told.sum(axis=1) >= _WHEELS)
+    return float(np.count_nonzero(most) * cells.dt) >= _BEHIND_S
 
 
 def _faulty(f: Finding) -> float:

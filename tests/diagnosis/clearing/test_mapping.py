@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from diagnosis.clearing.mapping import _swapped as exchanged_with
 from diagnosis.clearing.mapping import mapping_hints
 from diagnosis.pipeline import diagnose_signals
 from replay.faults import FaultMode, FaultSpec, Side
@@ -165,4 +166,4 @@ def test_a_weak_valve_beside_one_that_follows_its_own_command_is_not_exchanged_w
     told = 0.3 + 0.2 * np.sin(0.4 * np.arange(600) * 0.1)
     wanted = np.column_stack([told, told / 0.6])
     measured = wanted[:, ::-1] if exchanged else wanted * np.array([1.0, gain])
-    assert _swapped(measured, wanted, 0.1) is exchanged
+    assert exchanged_with(measured, wanted, 0.1) is exchanged

@@ -242,12 +242,31 @@ def test_what_stands_out_although_both_measurements_agree_lies_behind_the_valve(
 
 
 @pytest.mark.parametrize(
-    ("starts", "seconds", "sure"), [((10.0, 10.2), 2.0, False), ((10.0, 20.0), 2.0, True), ((10.0, 10.2), 8.0, True)]
+    ("starts", "seconds", "makes", "sure"),
+    [
+        ((10.0, 10.2), 2.0, 1.0, False),
+        ((10.0, 20.0), 2.0, 1.0, True),
+        ((10.0, 10.2), 8.0, 1.0, True),
+        ((10.0, 20.0), 2.0, 0.3, False),
+        ((10.0, 20.0), 8.0, 0.3, True),
+    ],
 )
-def test_axles_that_stand_at_once_for_a_moment_are_hardly_faulty(
-    starts: tuple[float, float], seconds: float, *, sure: bool
+def test_axles_that_stand_for_a_moment_at_once_or_while_the_machine_slows_are_hardly_faulty(
+    starts: tuple[float, float], seconds: float, makes: float, *, sure: bool
 ) -> None:
-    cells = cast(Cells, SimpleNamespace(timeline=SimpleNamespace(dt=0.01)))
+    told = np.ones((600, 4))
+    machine = SimpleNamespace(max_speed=2.0)
+    cells = cast(
+        Cells,
+        SimpleNamespace(
+            timeline=SimpleNamespace(dt=0.01),
+            dt=0.1,
+            width=10,
+            machine=machine,
+            reference=told,
+            wheels=lambda _: makes * told,
+        ),
+    )
     found = {
         axle: finding_of((round(100 * a), round(100 * (a + seconds))), FaultMode.NO_SIGNAL, None, ())
         for axle, a in zip(("front", "rear"), starts, strict=True)
