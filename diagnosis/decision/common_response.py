@@ -14,13 +14,15 @@ from diagnosis.clearing.responses import responses_of
 _LEVEL = 0.12  # ln of the speed: as wide are speeds that are alike
 _LEAST, _EACH = 20, 3  # windows before and after, in all, and at a level
 _SPLITS = 40  # moments that are tried
-_KNOWN = 0.6  # of the wheels
+_WHEELS, _KNOWN = 2, 0.6  # fewer have nothing in common; of the wheels
 _LOW, _HIGH = 0.2, 0.8  # quantiles of the differences of all levels, which must agree
 
 
 def common_change(cells: Cells) -> tuple[float, float] | None:
     """By how much all wheels' speed per opening changes at least at the same speeds [ln], and when [s]; None where little is driven alike before and after."""
     speed, command, opening = (cells.wheels(leaf) for leaf in ("v", "u", "u_applied"))
+    if speed.shape[1] < _WHEELS:
+        return None
     used = np.where(np.isfinite(opening), opening, command)
     found = responses_of(cells, speed, used, cells.reference, over_time=False)
     own = found.own
