@@ -196,7 +196,7 @@ def _walk(
             Judged(mission, recorded, machine, replay, found, factor=1.0 if scale is None else scale.first_factor)
         )
     )
-    judged = _with_stalls(_with_what_stands_out(judged))
+    judged = _with_machine_events(_with_what_stands_out(judged))
     found = judged.found
     report = report_of_mission(judged, identity)
     timeline.store.release()
@@ -277,7 +277,7 @@ def _with_what_stands_out(judged: Judged) -> Judged:
     return replace(judged, found=told, named_by=open_)
 
 
-def _with_stalls(judged: Judged) -> Judged:
+def _with_machine_events(judged: Judged) -> Judged:
     """The same with what stopped the whole machine, whose drives were open, or what it does as a whole that no part explains."""
     stopped = supply_gone(judged.cells)
     events = [] if stopped is None else [stopped]
