@@ -6,7 +6,7 @@ speed alone that is a dead valve of every wheel that stood first. One that is de
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -44,25 +44,36 @@ def or_machine_held(data: WheelsData, found: Mapping[int, WheelFindings]) -> dic
     return {
         i: wheel
         if data.measured[i] or data.y.shape[1] <= _OTHERS
-        else replace(wheel, findings=[_less_sure(data, i, f) for f in wheel.findings])
+        else replace(wheel, findings=[_less_sure(data, i, f, _sound(found, i, f)) for f in wheel.findings])
         for i, wheel in found.items()
     }
 
 
-def _less_sure(data: WheelsData, i: int, f: Finding) -> Finding:
-    if not f.mode.total or not _held(data, i, f):
+def _sound(found: Mapping[int, WheelFindings], i: int, f: Finding) -> list[int]:
+    """Other wheels of which nothing like it is found meanwhile: one that has failed itself makes little of its command as well."""
+    return [
+        j
+        for j, other in found.items()
+        if j != i and not any(g.mode.total and g.start < f.stop and g.stop > f.start for g in other.findings)
+    ]
+
+
+def _less_sure(data: WheelsData, i: int, f: Finding, sound: Sequence[int]) -> Finding:
+    if not f.mode.total or not _held(data, i, f, sound):
         return f
     faulty = sum(h.p for h in f.hypotheses if h.mode != State.HEALTHY.value)
     return limited(f, f.probability * _MOST / faulty, _HELD) if faulty > _MOST else f
 
 
-def _held(data: WheelsData, i: int, f: Finding) -> bool:
-    """Whether wheel `i` stands through most of a finding while most other wheels make little of what they are told for part of it."""
+def _held(data: WheelsData, i: int, f: Finding, sound: Sequence[int]) -> bool:
+    """Whether wheel `i` stands through most of a finding while most `sound` wheels make little of what they are told for part of it."""
+    if len(sound) < _OTHERS:
+        return False
     speed, asked = np.abs(data.y[f.start : f.stop]), np.abs(data.reference[f.start : f.stop])
     own = speed[:, i][np.isfinite(speed[:, i])]
     if not own.size or float(np.median(own)) > _RESTS * data.span:
         return False
-    others = np.arange(speed.shape[1]) != i
+    others = np.isin(np.arange(speed.shape[1]), sound)
     with np.errstate(invalid="ignore"):
         told = (asked > _DRIVES * data.span) & np.isfinite(speed)
         behind = told & (speed < _BEHIND * asked)

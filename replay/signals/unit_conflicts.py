@@ -35,7 +35,7 @@ def unit_conflict(sources: Mapping[str, SignalSource] | Iterable[tuple[str, Sign
 
 def _other_unit(source: SignalSource) -> str:
     """Unit that a channel's name has in brackets where it is of the same quantity as the one given, and of another size; else empty."""
-    stated, given = known_unit(bare_name(source.label)[1]), known_unit(source.unit)
+    stated, given = known_unit(bare_name(source.label)[1]), known_unit(source.unit or "")
     if stated is None or given is None or source.gain != 1.0:
         return ""
     (one, factor), (other, by) = UNITS[stated], UNITS[given]

@@ -28,19 +28,25 @@ def claim(mode: FaultMode = FaultMode.NO_SIGNAL) -> Finding:
 
 
 def judged(
-    others: float, seconds: float, *, own: float = 0.0, measured: bool = False, mode: FaultMode = FaultMode.NO_SIGNAL
+    others: float,
+    seconds: float,
+    *,
+    own: float = 0.0,
+    measured: bool = False,
+    mode: FaultMode = FaultMode.NO_SIGNAL,
+    failed: tuple[int, ...] = (),
 ) -> Finding:
     """The claim of wheel 0 whose others make a share of their commands for the last seconds of it."""
     y = np.full((SIZE, 4), 1.0)
     y[START:STOP, 0] = own
     y[STOP - round(seconds / DT) : STOP, 1:] = others
     data = SimpleNamespace(y=y, reference=np.ones((SIZE, 4)), measured=[measured] * 4, span=2.2)
-    found = {0: WheelFindings([claim(mode)])}
+    found = {0: WheelFindings([claim(mode)])} | {j: WheelFindings([claim()] if j in failed else []) for j in (1, 2, 3)}
     return or_machine_held(cast(WheelsData, data), found)[0].findings[0]
 
 
 def test_a_wheel_that_is_held_with_the_machine_is_hardly_faulty() -> None:
-    f = judged(0.1, 1.5)
+    f = judged(0.1, 1.5, failed=(3,))
     assert sum(h.p for h in f.hypotheses if h.mode != "healthy") == pytest.approx(0.55)
     assert any("what holds the machine" in e for e in f.evidence)
 
@@ -53,8 +59,11 @@ def test_a_wheel_that_is_held_with_the_machine_is_hardly_faulty() -> None:
         {"own": 0.9},
         {"measured": True},
         {"mode": FaultMode.INEFFICIENT},
+        {"failed": (1, 2)},
     ],
 )
-def test_others_that_drive_on_a_measured_valve_and_a_wheel_that_turns_change_nothing(other: dict[str, float]) -> None:
+def test_others_that_drive_on_or_fail_a_measured_valve_and_a_wheel_that_turns_change_nothing(
+    other: dict[str, float],
+) -> None:
     f = judged(**{"others": 0.1, "seconds": 1.5} | other)  # type: ignore[arg-type]
     assert f.probability == 0.7
