@@ -173,7 +173,8 @@ def _at_rest(cells: Cells) -> Iterator[MachineEvent]:
     used = _median(np.where(np.isfinite(opening), opening, command))
     with np.errstate(invalid="ignore"):
         stands = (asked <= _STANDS * top) & (used <= _CLOSED)
-        moves = np.nanmin(np.where(np.isfinite(speeds), np.abs(speeds), np.inf), axis=1, initial=np.inf) > _CREEPS * top
+        # every wheel of which nothing is stated, of more than half
+        moves = np.isfinite(v) & (np.where(np.isfinite(speeds), np.abs(speeds), np.inf).min(axis=1) > _CREEPS * top)
     before = round(_SETTLES_S / cells.dt)
     settled = np.lib.stride_tricks.sliding_window_view(np.pad(stands, (before, 0)), before + 1).all(axis=1)
     edges = np.flatnonzero(np.diff(np.r_[False, settled & moves, False].astype(np.int8)))

@@ -81,7 +81,7 @@ CHECK_WORDS: dict[Check, tuple[str, str]] = {
     ),
     Check.CARRIED: (
         "share of the speed that the ground gives a {wheel} whose {valve} is dead",
-        "the ground carries {part}: by this mission's own model of the {wheels} a dead {valve} would leave it {value} of its speed",
+        "the ground carries {part}: by the model of the {wheels} ([plant], or this mission's own) a dead {valve} would leave it {value} of its speed",
     ),
     Check.BEHIND: (
         "what lies behind a {valve} that does as it is told",

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
+from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from diagnosis.decision.as_a_whole import as_a_whole
+from diagnosis.clearing.cells import Cells
+from diagnosis.decision.as_a_whole import _at_rest, as_a_whole
 from replay.machine.config import haulotte
 from replay.simulation.options import SimulatedMission
 from tests.diagnosis.clearing.missions import LENGTH, in_cells, simulated
@@ -78,3 +81,15 @@ def test_without_openings_other_models_judge_the_machine() -> None:
     columns = {n: x for n, x in one.columns.items() if not n.endswith((".u", ".u_applied"))}
     columns["gnss.speed"] = columns["gnss.speed"] * np.where(t > 30.0, 0.5, 1.0)
     assert as_a_whole(in_cells(replace(one, columns=columns), base=False)) == []
+
+
+@pytest.mark.parametrize(("stated", "said"), [(False, True), (True, False)])
+def test_wheels_that_all_read_a_speed_at_rest_are_told_but_not_those_of_stated_faults(stated: bool, said: bool) -> None:
+    size, wheels, top = 300, ("FR", "FL", "RR", "RL"), 2.0
+    rests = np.zeros((size, 4))
+    leaves = {"v": rests + 0.3, "u": rests, "u_applied": np.full((size, 4), np.nan)}
+    machine = SimpleNamespace(wheels=wheels, max_speed=top)
+    cells = SimpleNamespace(
+        size=size, dt=0.1, machine=machine, reference=rests, wheels=leaves.get, told=lambda _: np.full(size, stated)
+    )
+    assert bool(list(_at_rest(cast(Cells, cells)))) is said
