@@ -49,7 +49,7 @@ _ONE_AXLE = 0.75  # of the loss that counts: a change of the only axle, whose oi
 #: the axles' largest ones were alike within a factor of 2.6.
 _BRIEF, _BRIEF_ALONE = 0.9, 3.0
 _ALIKE_DEAD = 0.04  # of full opening: axles of one machine have valves of one kind
-_SAME = 0.003  # of a channel that another one's share leaves, root mean square
+_SAME = 1e-6  # of a channel that the share of another one leaves, root mean square: two sensors differ by their noise
 _FEW_S = 2.0  # in which an axle is steered, for its usual rate
 
 
