@@ -24,6 +24,7 @@ _OTHERS, _CHANGES, _AS_OFTEN = (
     40,
     0.5,
 )  # wheels; changes that each other speed makes meanwhile, and as often as this one elsewhere
+_DITHER = 1e-6  # of the largest reading: less is how a fraction was rounded, and no step
 _SMALL = 0.1  # quantile of changes: those of noise are mostly several of its steps, those of a count are one
 _P, _VALVE = 0.96, 0.02  # that the sensor is frozen, and that its valve is; set by hand, not calibrated
 _FAR, _P_NEAR = (
@@ -88,7 +89,8 @@ def _others_tremble(data: WheelsData, i: int, r: Frozen) -> bool:
 def _step_of(values: np.ndarray) -> float:
     """Step of readings, each of which is not the one before, shape (n,) [m/s]: teeth in a window are some, and its digits are finer."""
     changes = np.abs(np.diff(values))
-    changes = changes[changes > 0.0]  # NaN are none
+    least = _DITHER * float(np.nanmax(np.abs(values), initial=0.0))
+    changes = changes[changes > least]  # NaN are none
     few = float(np.quantile(changes, _SMALL)) if changes.size else 0.0
     return max(rounding_step(values), few)
 

@@ -13,7 +13,7 @@ from diagnosis.results.assessment import Finding
 from diagnosis.results.result import Hypothesis
 from diagnosis.results.vocabulary import Tier
 from diagnosis.wheels.findings import WheelFindings
-from diagnosis.wheels.frozen import with_frozen
+from diagnosis.wheels.frozen import _step_of, with_frozen
 from replay.faults import FaultMode, Side
 from replay.machine.config import WheelPlant
 
@@ -238,3 +238,9 @@ def test_a_sensor_that_comes_back_to_the_values_at_which_it_stays_reads_in_steps
     y = np.concatenate([y, np.full(round(1.6 / DT), 0.25), rng.normal(0.25, 0.01, round(1.0 / DT)), np.full(9, 0.35)])
     last = [r for r in frozen_of(y, SPAN, DT) if r.value == 0.25]
     assert bool(last) is frozen
+
+
+def test_how_a_fraction_was_rounded_is_no_step() -> None:
+    counts = np.round(np.linspace(1.0, 3.0, 200) / 0.015) * 0.015
+    dither = 1e-8 * np.random.default_rng(1).standard_normal(200)
+    assert _step_of(counts + dither) > 0.001
