@@ -83,6 +83,11 @@ def _common(cells: Cells) -> tuple[Array, Array, float]:
     return speeds, v, _usual(v)
 
 
+def _stated(cells: Cells) -> Flags:
+    """Cells in which a fault of any wheel is stated, shape (cells,)."""
+    return np.column_stack([cells.told(wheel) for wheel in cells.machine.wheels]).any(axis=1)
+
+
 def _median(x: Array) -> Array:
     """Size of the median of the wheels, NaN where hardly half of them are known; from shape (cells, wheels) to (cells,)."""
     known = np.isfinite(x).sum(axis=1) > x.shape[1] / 2
@@ -115,6 +120,7 @@ def _beside_commands(cells: Cells) -> Iterator[MachineEvent]:
     before = np.r_[np.full(min(back, asked.size), np.nan), asked[:-back]]
     with np.errstate(invalid="ignore"):
         use = (asked > _MOVES * usual) & (np.abs(asked - before) < _SETTLED * usual)
+    use &= ~_stated(cells)  # a wheel that has failed is dragged along by the others, or drags them
     course, counts = _course(cells, v, asked, use), _counts(cells)
     text = course.changes("what they are told", _NEARLY * counts, _MANY)
     if not text and course.mostly(counts, counts):
