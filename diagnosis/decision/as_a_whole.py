@@ -85,7 +85,7 @@ def _common(cells: Cells) -> tuple[Array, Array, float]:
 
 def _stated(cells: Cells) -> Flags:
     """Cells in which a fault of any wheel is stated, shape (cells,)."""
-    return np.column_stack([cells.told(wheel) for wheel in cells.machine.wheels]).any(axis=1)
+    return np.asarray(np.column_stack([cells.told(wheel) for wheel in cells.machine.wheels]).any(axis=1), np.bool_)
 
 
 def _median(x: Array) -> Array:
