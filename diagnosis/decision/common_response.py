@@ -2,6 +2,7 @@
 
 A controller that holds the speeds hides in them what all motors lose, and what all sensors read too little: it opens all valves further. Valves are no
 straight lines, so that only what is driven as fast before as after is compared. Another load, oil or gear changes the same; no part is blamed for it.
+While a wheel's fault is stated nothing is asked: the others drag it, or it drags them.
 """
 
 from __future__ import annotations
@@ -29,6 +30,7 @@ def common_change(cells: Cells) -> tuple[float, float] | None:
     known = np.isfinite(own).sum(axis=1) >= _KNOWN * own.shape[1]
     common = np.full(len(own), np.nan)
     common[known] = np.nanmedian(own[known], axis=1)
+    common[np.column_stack([cells.explained(wheel) for wheel in cells.machine.wheels]).any(axis=1)] = np.nan
     level = cells.frame.mean(_median(speed))
     best: tuple[float, float] | None = None
     for way in (found.ahead.all(axis=1), ~found.ahead.any(axis=1)):

@@ -100,12 +100,12 @@ def _is_habit(finding: Finding, off: Array, low: NDArray[np.bool_], limits: tupl
     return finding.stop - finding.start <= brief or bool(np.median(off[part]) <= middle)
 
 
-def left_open(a: Assessment, findings: Sequence[Finding]) -> Assessment:
-    """An assessment that leaves open what some findings said."""
+def left_open(a: Assessment, findings: Sequence[Finding], state: State = State.NOT_ASSESSED) -> Assessment:
+    """An assessment that leaves open what some findings said, or calls it another state."""
     if not findings:
         return a
     states = a.states.copy()
     for f in findings:
         inside = states[f.start : f.stop]
-        inside[inside == CODE[State(f.mode.value)]] = CODE[State.NOT_ASSESSED]
+        inside[inside == CODE[State(f.mode.value)]] = CODE[state]
     return replace(a, states=states, findings=tuple(f for f in a.findings if f not in findings))

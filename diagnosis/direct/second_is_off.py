@@ -93,7 +93,7 @@ def _without_at_rest(
 def _rests(finding: Finding, one: IdentifiedPair, opening: Array, others: Sequence[Array]) -> bool:
     """Whether a drive is closed, its sensor reads nothing and most other wheels stand for nearly all of a finding."""
     part, least = slice(finding.start, finding.stop), _RESTS * one.pair.span
-    closed = np.abs(np.nan_to_num(opening[part])) <= _CLOSED
+    closed = np.abs(np.nan_to_num(opening[part], nan=np.inf)) <= _CLOSED
     stand = np.column_stack([np.abs(np.nan_to_num(y[part], nan=np.inf)) <= least for y in others])
     own = np.abs(np.nan_to_num(one.pair.y[part], nan=np.inf)) <= least
     return bool(np.mean(closed & own & (stand.mean(axis=1) > 0.5)) >= _NEARLY_ALL)

@@ -8,14 +8,13 @@ at the same time, is taken from the others; a finding that is no further off is 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 
 import numpy as np
 
 from diagnosis.channels.sample_status import PAIR
 from diagnosis.direct.identification import IdentifiedPair
 from diagnosis.direct.low_speed import left_open
-from diagnosis.results.assessment import CODE, Assessment, Finding
+from diagnosis.results.assessment import Assessment, Finding
 from replay.faults import FaultMode, State
 
 _SMALL = 0.1  # of the span, root mean square: a larger deviation is none of a healthy valve, whatever is usual
@@ -54,19 +53,8 @@ def without_small_deviations(
             if _may_be_small(f) and _small(f, found[w], most, _meanwhile(f, [found[x] for x in others]))
         ]
         built = [f for f in small if _hardly_off(f, found[w])]
-        out[w] = left_open(as_built(a, built), [f for f in small if not any(f is b for b in built)])
+        out[w] = left_open(left_open(a, built, State.HEALTHY), [f for f in small if not any(f is b for b in built)])
     return out
-
-
-def as_built(a: Assessment, findings: Sequence[Finding]) -> Assessment:
-    """An assessment that calls healthy what some findings said."""
-    if not findings:
-        return a
-    states = a.states.copy()
-    for f in findings:
-        inside = states[f.start : f.stop]
-        inside[inside == CODE[State(f.mode.value)]] = CODE[State.HEALTHY]
-    return replace(a, states=states, findings=tuple(f for f in a.findings if not any(f is b for b in findings)))
 
 
 def _hardly_off(finding: Finding, one: IdentifiedPair) -> bool:
