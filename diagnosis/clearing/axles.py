@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from diagnosis.clearing.cells import Array, Cells, Frame
 from diagnosis.clearing.measure import alone, compared, lasts, off_commands, times, worst
 from diagnosis.clearing.responses import clear_change, growth, largest, largest_change
+from diagnosis.clearing.seconds import slope_off
 from diagnosis.clearing.still import (
     ALIKE,
     OVERLAP,
@@ -31,6 +32,7 @@ from replay.faults import Side
 Flags = NDArray[np.bool_]
 
 FLOOR_RAD, OPENING = 0.06, 0.03  # deviations are shares of at least this angle and opening
+_SMALL = 0.1  # of that angle: an axle that is steered by less, root mean square, shows nothing
 _RATE_S = 8.0
 _LEAST_S = 0.5  # of a window, in which it is steered
 _WRONG_WAY = 5.0  # for an axle that turns against its opening
@@ -79,8 +81,7 @@ def axle_checks(cells: Cells, clear_at: float) -> Iterator[Checked]:
         if not np.isfinite(angle[:, j]).any():
             continue
         if np.isfinite(second[:, j]).any():
-            off = compared(cells, angle[:, j], second[:, j], FLOOR_RAD).off
-            yield worst(cells, (*about, Side.SENSOR, Check.SECOND_MEASUREMENT), off, clear_at, apart=True)
+            yield _beside_second(cells, axle, angle[:, j], second[:, j], clear_at)
         if np.isfinite(opening[:, j]).any() and np.isfinite(command[:, j]).any():
             yield worst(
                 cells, (*about, Side.ACTUATOR, Check.SECOND_MEASUREMENT), behind[:, j], VALVE * clear_at, apart=True
@@ -100,6 +101,15 @@ def axle_checks(cells: Cells, clear_at: float) -> Iterator[Checked]:
                 yield lasts(cells, (*about, either, Check.LASTING_RATE), rates.apart[j], RATE[twice][1] * share)
             elif not twice:  # both sides of which are measured twice needs nothing to compare with
                 yield lasts(cells, (*about, either, Check.PLANT_RATE), rates.apart[j], RATE[twice][1] * share)
+
+
+def _beside_second(cells: Cells, axle: str, angle: Array, second: Array, clear_at: float) -> Checked:
+    """An angle beside its second measurement [rad], of shape (cells,): in windows, or by its changes over the mission where it stays small."""
+    about = (Kind.STEER, axle, Side.SENSOR, Check.SECOND_MEASUREMENT)
+    off = compared(cells, angle, second, FLOOR_RAD).off
+    if np.isfinite(off).any():
+        return worst(cells, about, off, clear_at, apart=True)
+    return lasts(cells, about, slope_off(angle, second, cells.dt, _SMALL * FLOOR_RAD), clear_at)
 
 
 def _alone(off: Array, j: int) -> Array:

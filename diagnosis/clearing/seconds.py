@@ -10,6 +10,7 @@ from diagnosis.clearing.measure import behind, compared
 _LAGS_S = (0.0, 0.05, 0.1, 0.15, 0.2, 0.3)  # of one instrument behind the other
 _FOLLOWED = 0.8  # quantile of the windows: lag shows where speeds change
 _WHEELS = 2  # fewer do not tell a lag of the machine's from one of a part
+_EVEN_S, _SURE = 0.3, 0.05  # s apart are readings that count for a slope, whose standard error is at most that
 
 
 def off_second(cells: Cells, speed: Array, second: Array, floor: float) -> Array:
@@ -45,4 +46,40 @@ def off_second(cells: Cells, speed: Array, second: Array, floor: float) -> Array
         left = float(np.median(known)) if known else np.inf
         if left < least or not (of_second or of_speed):
             best, least = off, left
-    return best
+    return less_at_starts(best)
+
+
+def less_at_starts(off: Array) -> Array:
+    """Deviations in windows, where one borders on windows of rest no more than in the next one of driving; shape (windows, wheels).
+
+    Such a window holds the first or last moment of a movement alone, in which the later of two instruments is far behind the other. NaN where a
+    wheel rests.
+    """
+    edge = np.full((1, off.shape[1]), np.nan)
+    before, after = np.concatenate([edge, off[:-1]]), np.concatenate([off[1:], edge])
+    borders = np.isnan(before) ^ np.isnan(after)
+    return np.asarray(np.where(np.isfinite(off) & borders, np.fmin(off, np.fmax(before, after)), off))
+
+
+def slope_off(y: Array, x: Array, dt: float, least: float) -> float | None:
+    """By how much y changes more or less than x over the mission, as a share, where both hardly move; None where they tell too little.
+
+    Parameters
+    ----------
+    y, x : Array, shape (cells,)
+        A channel and its second measurement, in one unit; NaN where unknown.
+    dt : float
+        Of a cell [s].
+    least : float
+        By which x varies, root mean square: less may be noise that both share.
+    """
+    known = np.flatnonzero(np.isfinite(y) & np.isfinite(x))
+    if known.size < 2:
+        return None
+    a, b = y[known] - y[known].mean(), x[known] - x[known].mean()
+    power, count = float(b @ b), known.size * dt / _EVEN_S
+    if power <= least**2 * known.size or count < 2.0:
+        return None
+    slope = float(a @ b) / power
+    error = float(np.sqrt(np.mean((a - slope * b) ** 2) / (np.mean(b**2) * count)))
+    return abs(slope - 1.0) if error <= _SURE else None

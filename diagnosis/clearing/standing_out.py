@@ -19,6 +19,7 @@ from diagnosis.clearing.cells import Cells
 from diagnosis.clearing.jumps import fault_of_jumps
 from diagnosis.clearing.limits import Limits, measured_twice, usual_limits
 from diagnosis.clearing.openings import speeds_follow_openings
+from diagnosis.clearing.still import rate_of
 from diagnosis.clearing.untold_faults import fault_of_angle, fault_of_axle, fault_of_wheel
 from diagnosis.results.assessment import CODE, Assessment, Finding
 from diagnosis.results.clearing import Check, Checked
@@ -32,6 +33,11 @@ from replay.faults import FaultMode, Side, State
 _BRIEF_S, _MOSTLY, _TOGETHER = 5.0, 0.6, 0.55  # of both axles; of the time; of any fault, set by hand
 _AT_ONCE = "Another axle stands at the same time: parts fail one at a time, so that what supplies or holds the machine is as likely to hold both."
 _SLOWED = "The {wheel}s fell far behind their commands at the same time: an engine that stalls, or what else supplies the machine, stops its steering as well."
+_ALL_RESTS = (
+    "Nothing else of the machine moved at the time: what supplies the axle may have been off, as while an engine that died is started again, "
+    "and a machine at rest does not show it."
+)
+_RESTS, _TURNS, _NEARLY = 0.02, 0.015, 0.9  # of the top speed; rad/s; of the time
 _BEFORE_S, _BEHIND_S = 1.0, 0.5  # before the axle stands; in which most wheels are behind
 _DRIVES, _BEHIND, _WHEELS = 0.1, 0.5, 2  # of the top speed; of a wheel's command; wheels that are told to drive
 #: A component and its side.
@@ -82,7 +88,7 @@ def what_stands_out(checks: Sequence[Checked], cells: Cells, words: MachineWords
 
 
 def _less_sure_together(found: Mapping[str, Finding], cells: Cells) -> dict[str, Finding]:
-    """Axles that stand for a moment at the same time, or while the wheels make little of their commands, less sure: what supplies the machine stops all.
+    """Axles that stand for a moment at the same time, while the wheels make little of their commands, or nothing moves, less sure: by one supply, all stop.
 
     Parts fail one at a time.
     """
@@ -90,22 +96,24 @@ def _less_sure_together(found: Mapping[str, Finding], cells: Cells) -> dict[str,
     def together(f: Finding) -> bool:
         others = [g for g in found.values() if g is not f and g.mode is f.mode]
         common = [min(f.stop, g.stop) - max(f.start, g.start) for g in others]
-        brief = (f.stop - f.start) * cells.timeline.dt < _BRIEF_S
-        return f.mode is FaultMode.NO_SIGNAL and brief and max(common, default=0) >= _MOSTLY * (f.stop - f.start)
+        return max(common, default=0) >= _MOSTLY * (f.stop - f.start)
 
     def less_sure(f: Finding, why: str) -> Finding:
         return limited(f, f.probability * _TOGETHER / _faulty(f), why)
 
-    return {
-        component: less_sure(f, _AT_ONCE) if together(f) else less_sure(f, _SLOWED) if _machine_slows(f, cells) else f
-        for component, f in found.items()
-    }
+    def why(component: str, f: Finding) -> str | None:
+        if f.mode is not FaultMode.NO_SIGNAL or (f.stop - f.start) * cells.timeline.dt >= _BRIEF_S:
+            return None
+        if together(f):
+            return _AT_ONCE
+        return _SLOWED if _machine_slows(f, cells) else _ALL_RESTS if _all_rests(component, f, cells) else None
+
+    reasons = {component: why(component, f) for component, f in found.items()}
+    return {c: f if (reason := reasons[c]) is None else less_sure(f, reason) for c, f in found.items()}
 
 
 def _machine_slows(f: Finding, cells: Cells) -> bool:
-    """Whether most wheels make less than half of what they are told for a while in, or just before, a brief time in which an axle stands."""
-    if f.mode is not FaultMode.NO_SIGNAL or (f.stop - f.start) * cells.timeline.dt >= _BRIEF_S:
-        return False
+    """Whether most wheels make less than half of what they are told for a while in, or just before, the time in which an axle stands."""
     before = round(_BEFORE_S / cells.dt)
     part = slice(max(0, f.start // cells.width - before), -(-f.stop // cells.width))
     speed, asked = np.abs(cells.wheels("v")[part]), np.abs(cells.reference[part])
@@ -114,6 +122,18 @@ def _machine_slows(f: Finding, cells: Cells) -> bool:
         behind = told & (speed < _BEHIND * asked)
     most = (behind.sum(axis=1) > 0.5 * told.sum(axis=1)) & (told.sum(axis=1) >= _WHEELS)
     return float(np.count_nonzero(most) * cells.dt) >= _BEHIND_S
+
+
+def _all_rests(component: str, f: Finding, cells: Cells) -> bool:
+    """Whether no wheel rolls and no other axle turns while an axle stands."""
+    part = slice(f.start // cells.width, -(-f.stop // cells.width))
+    others = [j for j, axle in enumerate(cells.machine.axles) if axle != component]
+    speed, rate = np.abs(cells.wheels("v")[part]), np.abs(rate_of(cells.axles("phi"), cells.dt)[part][:, others])
+    if not np.isfinite(speed).any():
+        return False
+    with np.errstate(invalid="ignore"):
+        moves = (speed > _RESTS * cells.machine.max_speed).any(axis=1) | (rate > _TURNS).any(axis=1)
+    return float(np.mean(~moves)) >= _NEARLY
 
 
 def _faulty(f: Finding) -> float:

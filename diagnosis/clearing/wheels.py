@@ -19,7 +19,7 @@ from diagnosis.clearing.pairs import FALLS, pairs_fall
 from diagnosis.clearing.plant_response import LIMIT, beside_plant
 from diagnosis.clearing.responses import OTHERS, USUAL_TOP, largest, others_at, responses_of
 from diagnosis.clearing.same_side import beside_its_side
-from diagnosis.clearing.seconds import off_second
+from diagnosis.clearing.seconds import less_at_starts, off_second
 from diagnosis.clearing.wild import wild_readings
 from diagnosis.results.clearing import Check, Checked
 from diagnosis.results.vocabulary import Kind
@@ -81,9 +81,8 @@ def wheel_checks(cells: Cells, clear_at: float) -> Iterator[Checked]:
     delays, made = late(speed, reference, cells.dt), made_of_commands(cells, speed, reference)
     either = Side.SENSOR_OR_ACTUATOR
     top = cells.machine.max_speed
-    creeping = np.column_stack(
-        [compared(cells, y, x, CREEPING * top).off for y, x in zip(speed.T, second.T, strict=True)]
-    )
+    slow_off = [compared(cells, y, x, CREEPING * top).off for y, x in zip(speed.T, second.T, strict=True)]
+    creeping = less_at_starts(np.column_stack(slow_off))
     slowly = [float(x) for x in largest(creeping)]
     apart_from_second = off_second(cells, speed, second, FLOOR * top)
     for i, wheel in enumerate(cells.machine.wheels):

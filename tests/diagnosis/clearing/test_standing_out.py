@@ -249,13 +249,15 @@ def test_what_stands_out_although_both_measurements_agree_lies_behind_the_valve(
         ((10.0, 10.2), 8.0, 1.0, True),
         ((10.0, 20.0), 2.0, 0.3, False),
         ((10.0, 20.0), 8.0, 0.3, True),
+        ((10.0, 20.0), 2.0, 0.0, False),
+        ((10.0, 20.0), 8.0, 0.0, True),
     ],
 )
-def test_axles_that_stand_for_a_moment_at_once_or_while_the_machine_slows_are_hardly_faulty(
+def test_axles_that_stand_for_a_moment_at_once_or_while_the_machine_slows_or_rests_are_hardly_faulty(
     starts: tuple[float, float], seconds: float, makes: float, *, sure: bool
 ) -> None:
     told = np.ones((600, 4))
-    machine = SimpleNamespace(max_speed=2.0)
+    machine = SimpleNamespace(max_speed=2.0, axles=("front", "rear"))
     cells = cast(
         Cells,
         SimpleNamespace(
@@ -263,8 +265,9 @@ def test_axles_that_stand_for_a_moment_at_once_or_while_the_machine_slows_are_ha
             dt=0.1,
             width=10,
             machine=machine,
-            reference=told,
+            reference=told if makes else 0.0 * told,
             wheels=lambda _: makes * told,
+            axles=lambda _: np.zeros((600, 2)),
         ),
     )
     found = {
