@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from diagnosis.clearing.cells import Array, Cells
 from diagnosis.clearing.yaw import turn_by_angles
-from diagnosis.decision.common_response import common_change
+from diagnosis.decision.common_response import common_change, common_spell
 from diagnosis.decision.course import FEW, FLOOR, Course
 from diagnosis.decision.scale import bodies
 from diagnosis.results.machine_event import (
@@ -131,12 +131,17 @@ def _beside_commands(cells: Cells) -> Iterator[MachineEvent]:
 
 
 def _beside_openings(cells: Cells) -> Iterator[MachineEvent]:
-    """All wheels make another speed of the same openings from some moment on."""
-    found = common_change(cells)
+    """All wheels make another speed of the same openings from some moment on, or for a while."""
+    found, spell, least = common_change(cells), common_spell(cells), _NEARLY * _counts(cells)
     if found is not None and _counts(cells) <= abs(found[0]) <= _GEAR:
         yield other_response(
             f"All {{wheels}} together make at least {np.exp(abs(found[0])):.2f} times {'more' if found[0] > 0 else 'less'} speed of the same {{valve}} "
             f"openings from about {found[1]:.0f} s on, as fast as they are driven before it"
+        )
+    elif spell is not None and least <= abs(spell[0]) <= _GEAR:
+        yield other_response(
+            f"At about {spell[1]:.0f}–{spell[2]:.0f} s all {{wheels}} together make at least {np.exp(abs(spell[0])):.2f} times {'more' if spell[0] > 0 else 'less'} speed "
+            "of their {valve} openings than else at the same speed or opening"
         )
 
 

@@ -1,4 +1,4 @@
-"""What all wheels' speed per opening has in common, before and after a moment, at the same speeds.
+"""What all wheels' speed per opening has in common, before and after a moment or in a spell, at the same speeds or openings.
 
 A controller that holds the speeds hides in them what all motors lose, and what all sensors read too little: it opens all valves further. Valves are no
 straight lines, so that only what is driven as fast before as after is compared. Another load, oil or gear changes the same; no part is blamed for it.
@@ -7,7 +7,11 @@ While a wheel's fault is stated nothing is asked: the others drag it, or it drag
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from typing import NamedTuple
+
 import numpy as np
+from numpy.typing import NDArray
 
 from diagnosis.clearing.cells import Array, Cells
 from diagnosis.clearing.responses import responses_of
@@ -17,13 +21,67 @@ _LEAST, _EACH = 20, 3  # windows before and after, in all, and at a level
 _SPLITS = 40  # moments that are tried
 _WHEELS, _KNOWN = 2, 0.6  # fewer have nothing in common; of the wheels
 _LOW, _HIGH = 0.2, 0.8  # quantiles of the differences of all levels, which must agree
+_SPELL_S, _FULL = 5.0, 0.6  # and of its windows, in which the response is known
+_ALIKE, _FITS = 4, 0.03  # windows at a level; ln that half of them are off its usual one: where levels explain what is usual
+
+
+class _Common(NamedTuple):
+    """What the wheels have in common in each window, all of shape (windows,) but the ways.
+
+    Attributes
+    ----------
+    response : Array
+        ln of speed per opening, NaN where it is not known.
+    levels : tuple[Array, Array]
+        Speed [m/s] and opening [1] of the median wheel.
+    ways : tuple[NDArray[np.bool_], NDArray[np.bool_]]
+        Windows ahead and back.
+    hop_s : float
+        From one window to the next [s].
+    """
+
+    response: Array
+    levels: tuple[Array, Array]
+    ways: tuple[NDArray[np.bool_], NDArray[np.bool_]]
+    hop_s: float
 
 
 def common_change(cells: Cells) -> tuple[float, float] | None:
     """By how much all wheels' speed per opening changes at least at the same speeds [ln], and when [s]; None where little is driven alike before and after."""
+    common = _common(cells)
+    best: tuple[float, float] | None = None
+    for at, level in _driven(common, 0):
+        change = _largest(level, common.response[at])
+        if change is not None and (best is None or abs(change[0]) > abs(best[0])):
+            best = change[0], float(at[change[1]]) * common.hop_s
+    return best
+
+
+def common_spell(cells: Cells) -> tuple[float, float, float] | None:
+    """By how much all wheels' speed per opening differs for some seconds from what is usual at the same speeds or openings [ln], and their span [s].
+
+    By both, unless one of them hardly leaves anything unexplained elsewhere; None where nothing does. What differs may as well be what is usual here.
+    """
+    common = _common(cells)
+    width = max(1, round(_SPELL_S / common.hop_s))
+    by_speed, by_opening = (list(_driven(common, k)) for k in (0, 1))
+    best: tuple[float, float, float] | None = None
+    for one, other in zip(by_speed, by_opening, strict=True):
+        found = [_spell(at, _unusual(level, common.response[at]), width) for at, level in (one, other)]
+        sure = [x for x in found if x is not None and x.unusual <= _FITS]
+        both = [x for x in found if x is not None] if len(sure) == 0 else []
+        told = max(sure, key=_size, default=None) or (min(both, key=_size) if len(both) == len(found) else None)
+        if told is not None and (best is None or abs(told.off) > abs(best[0])):
+            best = told.off, told.start * common.hop_s, (told.start + width) * common.hop_s
+    return best
+
+
+def _common(cells: Cells) -> _Common:
+    return cells.once("common response", lambda: _of_all(cells))
+
+
+def _of_all(cells: Cells) -> _Common:
     speed, command, opening = (cells.wheels(leaf) for leaf in ("v", "u", "u_applied"))
-    if speed.shape[1] < _WHEELS:
-        return None
     used = np.where(np.isfinite(opening), opening, command)
     found = responses_of(cells, speed, used, cells.reference, over_time=False)
     own = found.own
@@ -31,14 +89,57 @@ def common_change(cells: Cells) -> tuple[float, float] | None:
     common = np.full(len(own), np.nan)
     common[known] = np.nanmedian(own[known], axis=1)
     common[np.column_stack([cells.explained(wheel) for wheel in cells.machine.wheels]).any(axis=1)] = np.nan
-    level = cells.frame.mean(_median(speed))
-    best: tuple[float, float] | None = None
-    for way in (found.ahead.all(axis=1), ~found.ahead.any(axis=1)):
-        at = np.flatnonzero(way & np.isfinite(common) & (np.nan_to_num(level) > 0.0))
-        change = _largest(np.log(level[at]), common[at])
-        if change is not None and (best is None or abs(change[0]) > abs(best[0])):
-            best = change[0], float(cells.frame.starts[at[change[1]]] * cells.dt)
-    return best
+    levels = cells.frame.mean(_median(speed)), cells.frame.mean(_median(used))
+    ways = found.ahead.all(axis=1), ~found.ahead.any(axis=1)
+    if speed.shape[1] < _WHEELS:
+        common[:] = np.nan
+    return _Common(common, levels, ways, cells.frame.hop * cells.dt)
+
+
+def _driven(common: _Common, by: int) -> Iterator[tuple[NDArray[np.intp], Array]]:
+    """Windows of either way in which the response is known, and ln of their speed (0) or opening (1)."""
+    level = np.nan_to_num(common.levels[by])
+    for way in common.ways:
+        at = np.flatnonzero(way & np.isfinite(common.response) & (level > 0.0))
+        yield at, np.log(level[at])
+
+
+def _unusual(level: Array, response: Array) -> Array:
+    """What is off the usual response at the same level [ln], NaN where that is not known; all of shape (windows,)."""
+    out, places = np.full(level.size, np.nan), np.floor(level / _LEVEL).astype(np.int64)
+    for place in np.unique(places):
+        inside = places == place
+        if np.count_nonzero(inside) >= _ALIKE:
+            out[inside] = response[inside] - np.median(response[inside])
+    return out
+
+
+class _Spell(NamedTuple):
+    """Some windows on end: by how much nearly all of them are off at least [ln], the first one, and what half of all windows are off [ln]."""
+
+    off: float
+    start: int
+    unusual: float
+
+
+def _size(x: _Spell) -> float:
+    return abs(x.off)
+
+
+def _spell(at: NDArray[np.intp], off: Array, width: int) -> _Spell | None:
+    """The spell of so many windows that is furthest off; None where none is known. Windows and what each is off, of shape (windows,)."""
+    if not np.isfinite(off).any() or (count := int(at.max()) + 1) < width:
+        return None
+    every = np.full(count, np.nan)
+    every[at] = off
+    windows = np.lib.stride_tricks.sliding_window_view(every, width)
+    starts = np.flatnonzero(np.isfinite(windows).sum(axis=1) >= _FULL * width)
+    if not starts.size:
+        return None
+    low, high = np.nanquantile(windows[starts], (_LOW, _HIGH), axis=1)
+    least = np.where(low * high <= 0.0, 0.0, np.where(low > 0.0, low, high))
+    k = int(np.argmax(np.abs(least)))
+    return _Spell(float(least[k]), int(starts[k]), float(np.median(np.abs(off[np.isfinite(off)]))))
 
 
 def _median(speed: Array) -> Array:
