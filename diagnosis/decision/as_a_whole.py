@@ -141,7 +141,7 @@ def _beside_openings(cells: Cells) -> Iterator[MachineEvent]:
     elif spell is not None and least <= abs(spell[0]) <= _GEAR:
         yield other_response(
             f"At about {spell[1]:.0f}–{spell[2]:.0f} s all {{wheels}} together make at least {np.exp(abs(spell[0])):.2f} times {'more' if spell[0] > 0 else 'less'} speed "
-            "of their {valve} openings than else at the same speed or opening"
+            "of their {valve} openings than else at the same speed"
         )
 
 

@@ -22,7 +22,8 @@ _SPLITS = 40  # moments that are tried
 _WHEELS, _KNOWN = 2, 0.6  # fewer have nothing in common; of the wheels
 _LOW, _HIGH = 0.2, 0.8  # quantiles of the differences of all levels, which must agree
 _SPELL_S, _FULL = 5.0, 0.6  # and of its windows, in which the response is known
-_ALIKE, _FITS = 4, 0.03  # windows at a level; ln that half of them are off its usual one: where levels explain what is usual
+#: Windows at a level; ln that half of them are off its usual one, where levels explain what is usual; and times that, elsewhere.
+_ALIKE, _FITS, _FAR = 4, 0.03, 4.0
 
 
 class _Common(NamedTuple):
@@ -58,22 +59,24 @@ def common_change(cells: Cells) -> tuple[float, float] | None:
 
 
 def common_spell(cells: Cells) -> tuple[float, float, float] | None:
-    """By how much all wheels' speed per opening differs for some seconds from what is usual at the same speeds or openings [ln], and their span [s].
+    """By how much all wheels' speed per opening differs for some seconds from what is usual at the same speed [ln], and their span [s].
 
-    By both, unless one of them hardly leaves anything unexplained elsewhere; None where nothing does. What differs may as well be what is usual here.
+    At the same opening as well, and far, where speeds explain little of what is usual; None where nothing does. By openings alone another gear would
+    differ. What differs may as well be what is usual, and the rest be what has changed.
     """
     common = _common(cells)
     width = max(1, round(_SPELL_S / common.hop_s))
-    by_speed, by_opening = (list(_driven(common, k)) for k in (0, 1))
-    best: tuple[float, float, float] | None = None
-    for one, other in zip(by_speed, by_opening, strict=True):
-        found = [_spell(at, _unusual(level, common.response[at]), width) for at, level in (one, other)]
-        sure = [x for x in found if x is not None and x.unusual <= _FITS]
-        both = [x for x in found if x is not None] if len(sure) == 0 else []
-        told = max(sure, key=_size, default=None) or (min(both, key=_size) if len(both) == len(found) else None)
-        if told is not None and (best is None or abs(told.off) > abs(best[0])):
-            best = told.off, told.start * common.hop_s, (told.start + width) * common.hop_s
-    return best
+    best: _Spell | None = None
+    for one, other in zip(_driven(common, 0), _driven(common, 1), strict=True):
+        by_speed, by_opening = (_spell(at, _unusual(level, common.response[at]), width) for at, level in (one, other))
+        told = by_speed
+        if by_speed is not None and by_speed.unusual > _FITS:
+            told = None if by_opening is None else min(by_speed, by_opening, key=_size)
+            if told is not None and _size(told) < _FAR * max(by_speed.unusual, told.unusual):
+                told = None
+        if told is not None and (best is None or _size(told) > _size(best)):
+            best = told
+    return None if best is None else (best.off, best.start * common.hop_s, (best.start + width) * common.hop_s)
 
 
 def _common(cells: Cells) -> _Common:

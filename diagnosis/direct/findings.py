@@ -13,6 +13,7 @@ from diagnosis.direct.identification import IdentifiedPair
 from diagnosis.direct.isolation import Isolated, estimate_run, isolate
 from diagnosis.direct.onset import refine
 from diagnosis.direct.same_share import as_beside, as_excess_beside
+from diagnosis.direct.same_value import in_one_row
 from diagnosis.direct.sentences import END_SENTENCE, RANGE_SENTENCE, alike_sentence, sentences
 from diagnosis.direct.slow_deviation import not_noise
 from diagnosis.direct.stated_mode import least_constant, mode_of
@@ -118,7 +119,7 @@ def find_faults(path: ModePath, found: IdentifiedPair, limits: Limits) -> Faults
     spells = [part for f in joined for part in in_spells(as_changing_gain(f, measured), measured)]
     kept = [told_by_itself(f, measured) for f in spells]
     return FaultsFound(
-        [not_noise(part, measured, found.pair.habit.window) for parts in kept for part in parts],
+        in_one_row([not_noise(part, measured, found.pair.habit.window) for parts in kept for part in parts], measured),
         timing,
         below + sum(not parts for parts in kept),
     )

@@ -58,9 +58,10 @@ def sentences(isolated: Isolated, found: IdentifiedPair, mode: FaultMode, epsilo
     return tuple(out)
 
 
-def alike_sentence(found: IdentifiedPair) -> str:
+def alike_sentence(found: IdentifiedPair) -> Sentence:
     """Why a constant value and a constant share are equally probable."""
-    return f"{found.pair.x_name} hardly moved but for its noise, so stuck and inefficient cannot be distinguished."
+    words = f"{found.pair.x_name} hardly moved but for its noise, so stuck and inefficient cannot be distinguished."
+    return Sentence(About.EITHER, words)
 
 
 def bounds_words(low: float, high: float) -> str:

@@ -25,6 +25,10 @@ class About(StrEnum):
     RIVAL = "rival"
     #: By how many milliseconds a channel comes late; they are the part in the middle.
     LATE = "late"
+    #: That one spell is of one row as probably as of another.
+    EITHER = "either"
+    #: What several spells have in common.
+    SPELLS = "spells"
     #: The effort by which a drive was judged.
     EFFORT = "effort"
 
