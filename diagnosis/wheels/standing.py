@@ -24,6 +24,7 @@ Array = NDArray[np.float64]
 
 _STANDS_S, _STOPS = 0.3, 3  # of zeros that are a stop; fewer stops tell no habit
 _NEARLY, _BEYOND = 0.9, 1.5  # quantile of the readings beside stops, and times it
+_ZERO = 0.6  # of a time of zeros: a wheel that stands may creep now and then, which a dead sensor would not read
 _NEAR_S, _STEADY = 0.3, 1.35  # around an end; times the first reading: a wheel that starts goes on to more than that
 _EITHER = 0.85  # that it is one of both, of what the sensor was said to be
 _DEAD, _STANDS, _HELD = 0.5, 0.3, 0.2  # sensor dead, drive dead, drive stuck near its middle: of that
@@ -73,11 +74,11 @@ def or_standing(
 
 
 def _silent(f: Finding, y: Array) -> bool:
-    """Whether a sensor is said to give nothing, and reads exactly that."""
+    """Whether a sensor is said to give nothing, and reads exactly that for the most part."""
     if f.side is not Side.SENSOR or f.mode is not FaultMode.NO_SIGNAL:
         return False
     known = y[f.start : f.stop][np.isfinite(y[f.start : f.stop])]
-    return known.size > 0 and float(np.mean(known == 0.0)) > _NEARLY
+    return known.size > 0 and float(np.mean(known == 0.0)) > _ZERO
 
 
 def _stops(y: Array, findings: list[Finding], dt: float) -> Iterator[_Ends]:
