@@ -53,7 +53,7 @@ def _while_most_run(timeline: Timeline, names: Sequence[str], delivers: NDArray[
     ended = sorted(timeline.size - int(np.argmax(timeline.fresh[n][::-1])) for n in names)
     delivers = delivers.copy()
     delivers[: begun[(len(begun) - 1) // 2]] = False
-    delivers[ended[len(ended) // 2] :] = False
+    delivers[ended[(len(ended) - 1) // 2] :] = False
     return delivers
 
 

@@ -44,7 +44,7 @@ _BIASED = {
     FaultMode.NO_SIGNAL: 0.1,
     FaultMode.STUCK: 0.05,
 }  # set by hand
-_MOST_GAINED = 1.5  # of the speed per opening, by which no fault makes a wheel quicker: openings say little of this machine
+_MOST_GAINED = 2.0  # of the speed per opening, by which no fault makes a wheel quicker: openings say little of this machine
 _ALL = 0.9  # of the speed per opening, that is lost where nothing is left
 _HALF, _LARGEST = 0.5, 0.8  # of the largest deviations, by this quantile: where a fault lasts
 
