@@ -15,9 +15,9 @@ _ALIKE = 0.5  # of the limit: where half of the wheels deviate by more, openings
 _SURELY, _FOLLOWS = 0.8, 0.45
 
 
-def speeds_follow_openings(cells: Cells) -> bool:
-    """Whether any wheel's speed is a multiple of its opening, as a valve's is and a torque's is not."""
-    return _explained(cells) > _FOLLOWS
+def speeds_follow_openings(cells: Cells, *, surely: bool = False) -> bool:
+    """Whether any wheel's speed is a multiple of its opening, as a valve's is and a torque's is not; `surely`: as all healthy valves' were."""
+    return _explained(cells) > (_SURELY if surely else _FOLLOWS)
 
 
 def _explained(cells: Cells) -> float:

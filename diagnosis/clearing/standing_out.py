@@ -80,7 +80,9 @@ def what_stands_out(checks: Sequence[Checked], cells: Cells, words: MachineWords
     if wheel is not None:
         agree = _agree(checks, wheel.component)
         told = fault_of_wheel(wheel, cells, alone=alone is not None, agree=agree)
-        found |= {} if told is None else {wheel.component: told}
+        quick = told is not None and told.mode is FaultMode.OUTSIDE_TABLE  # as one is that a torque lets run
+        if told is not None and (not quick or speeds_follow_openings(cells, surely=True)):
+            found[wheel.component] = told
     return {
         component: replace(f, evidence=tuple(mapped(text, words.fill) for text in f.evidence))
         for component, f in found.items()

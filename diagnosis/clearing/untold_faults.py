@@ -44,7 +44,6 @@ _BIASED = {
     FaultMode.NO_SIGNAL: 0.1,
     FaultMode.STUCK: 0.05,
 }  # set by hand
-_MOST_GAINED = 2.0  # of the speed per opening, by which no fault makes a wheel quicker: openings say little of this machine
 _ALL = 0.9  # of the speed per opening, that is lost where nothing is left
 _HALF, _LARGEST = 0.5, 0.8  # of the largest deviations, by this quantile: where a fault lasts
 
@@ -58,8 +57,7 @@ class _Shown:
 
 
 def fault_of_wheel(check: Checked, cells: Cells, *, alone: bool, agree: bool = False) -> Finding | None:
-    """The fault of a wheel whose speed per opening is not that of the others; None where no window of driving shows it, or it
-    is beyond what a fault makes of it.
+    """The fault of a wheel whose speed per opening is not that of the others; None where no window of driving shows it.
 
     Parameters
     ----------
@@ -85,8 +83,6 @@ def fault_of_wheel(check: Checked, cells: Cells, *, alone: bool, agree: bool = F
     start, stop, size, spread = _where(shown, cells)
     half = max(check.limit, 2.0 * spread)
     low, middle, high = (-np.expm1(-x if below else x) for x in (size - half, size, size + half))
-    if not below and middle < -_MOST_GAINED:
-        return None
     mode = FaultMode.OUTSIDE_TABLE if not below else FaultMode.INEFFICIENT if middle < _ALL else FaultMode.NO_SIGNAL
     measured = "speed of {part} per {unit_command}".replace("{part}", check.component)
     text = (
