@@ -132,16 +132,16 @@ def _beside_commands(cells: Cells) -> Iterator[MachineEvent]:
 
 def _beside_openings(cells: Cells) -> Iterator[MachineEvent]:
     """All wheels make another speed of the same openings from some moment on, or for a while."""
-    found, spell, least = common_change(cells), common_spell(cells), _NEARLY * _counts(cells)
-    if found is not None and _counts(cells) <= abs(found[0]) <= _GEAR:
+    found, spell, least = common_change(cells, _GEAR), common_spell(cells), _NEARLY * _counts(cells)
+    if found is not None and abs(found[0]) >= _counts(cells):
         yield other_response(
-            f"All {{wheels}} together make at least {np.exp(abs(found[0])):.2f} times {'more' if found[0] > 0 else 'less'} speed of the same {{valve}} "
-            f"openings from about {found[1]:.0f} s on, as fast as they are driven before it"
+            f"From about {found[1]:.0f} s on all {{wheels}} together make {np.exp(found[0]):.2f} times the speed of the same {{valve}} openings that they "
+            "made before, where they are driven alike"
         )
     elif spell is not None and least <= abs(spell[0]) <= _GEAR:
         yield other_response(
-            f"At about {spell[1]:.0f}–{spell[2]:.0f} s all {{wheels}} together make at least {np.exp(abs(spell[0])):.2f} times {'more' if spell[0] > 0 else 'less'} speed "
-            "of their {valve} openings than else at the same speed"
+            f"At about {spell[1]:.0f}–{spell[2]:.0f} s all {{wheels}} together make {np.exp(spell[0]):.2f} times the speed of the same {{valve}} openings "
+            "that they make else at such speeds"
         )
 
 

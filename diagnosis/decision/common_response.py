@@ -47,15 +47,20 @@ class _Common(NamedTuple):
     hop_s: float
 
 
-def common_change(cells: Cells) -> tuple[float, float] | None:
-    """By how much all wheels' speed per opening changes at least at the same speeds [ln], and when [s]; None where little is driven alike before and after."""
+def common_change(cells: Cells, most: float) -> tuple[float, float] | None:
+    """By how much all wheels' speed per opening changes at least at the same speeds, or openings [ln], and when [s].
+
+    None where little is driven alike before and after. A controller that does not hold the speeds leaves the openings alike. What changes by more than
+    `most` [ln] is left out.
+    """
     common = _common(cells)
-    best: tuple[float, float] | None = None
-    for at, level in _driven(common, 0):
-        change = _largest(level, common.response[at])
-        if change is not None and (best is None or abs(change[0]) > abs(best[0])):
-            best = change[0], float(at[change[1]]) * common.hop_s
-    return best
+    found = [
+        (change[0], float(at[change[1]]) * common.hop_s)
+        for by in (0, 1)
+        for at, level in _driven(common, by)
+        if (change := _largest(level, common.response[at])) is not None and abs(change[0]) <= most
+    ]
+    return max(found, key=lambda x: abs(x[0]), default=None)
 
 
 def common_spell(cells: Cells) -> tuple[float, float, float] | None:
