@@ -34,10 +34,10 @@ from replay.machine.drive_model import EffortMap, InverseController
 Array = NDArray[np.float64]
 
 _STEP_RANGE = 0.1
-_MOST = 0.5  # of the driving
+_MOST, _PIECES = 0.5, 6  # of the driving; separate faults of one sensor, of which more are how the drive is controlled
 _NO_MODEL = (
-    "the controller that command and effort show in this mission explains less than half of its driving; `mfhca fit` with healthy missions "
-    "finds it more surely"
+    "the controller that command and effort show in this mission does not explain its driving, from one part of it to the next; `mfhca fit` with "
+    "healthy missions finds it more surely"
 )
 
 
@@ -112,10 +112,12 @@ def assess_drive(data: DriveData, limits: Limits) -> tuple[Assessment, Assessmen
 
 
 def _mostly_faulty(data: DriveData, findings: list[Finding], limits: Limits) -> bool:
-    """Whether a controller that was found in this mission alone calls most of its driving faulty: then it is not the drive's.
+    """Whether a controller that was found in this mission alone calls most of its driving, or many pieces of it, faulty: then it is not the drive's.
 
-    It is identified by what holds in more than half of the time.
+    It is identified by what holds in more than half of the time, and a sensor fails in one way.
     """
+    if len(findings) > _PIECES:
+        return True
     driving = np.isfinite(data.y) & (np.abs(np.nan_to_num(data.command)) > limits.driving_speed)
     there = np.zeros(data.y.size, np.bool_)
     for f in findings:
