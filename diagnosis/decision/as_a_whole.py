@@ -96,6 +96,12 @@ def _median(x: Array) -> Array:
     return out
 
 
+def _largest(x: Array) -> Array:
+    """Largest size among the wheels, NaN where none is known; from shape (cells, wheels) to (cells,)."""
+    known = np.isfinite(x).any(axis=1)
+    return np.where(known, np.abs(np.nan_to_num(x)).max(axis=1, initial=0.0), np.nan)
+
+
 def _usual(size: Array) -> float:
     """What a size of shape (cells,) usually is while it is anything; infinite where it never is."""
     some = size[np.nan_to_num(size) > 0.0]
@@ -179,9 +185,9 @@ def _beyond_the_top(cells: Cells) -> Iterator[MachineEvent]:
 def _at_rest(cells: Cells) -> Iterator[MachineEvent]:
     """All wheels read a speed while they are told to stand, and their drives are closed."""
     speeds, v, _ = _common(cells)
-    asked, top = _median(cells.reference), cells.machine.max_speed
-    command, opening = cells.wheels("u"), cells.wheels("u_applied")
-    used = _median(np.where(np.isfinite(opening), opening, command))
+    command, opening, top = cells.wheels("u"), cells.wheels("u_applied"), cells.machine.max_speed
+    # of every wheel: in a turn on the spot their median is still
+    asked, used = (_largest(x) for x in (cells.reference, np.where(np.isfinite(opening), opening, command)))
     with np.errstate(invalid="ignore"):
         stands = (asked <= _STANDS * top) & (used <= _CLOSED)
         # every wheel of which nothing is stated, of more than half
