@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 from diagnosis.channels.liveness import alive_sources
 from diagnosis.evidence import ACTUATOR, SENSOR, MissionView, Part
-from diagnosis.families import AXLES, SINGLE, WHOLE
+from diagnosis.families import AXLES, SINGLE, whole
 from diagnosis.results.assessment import Assessment, unassessed
 from diagnosis.results.limited import believed
 from diagnosis.results.machine_event import MachineEvent
@@ -57,7 +57,7 @@ def assess_components(
     chosen = tuple(w for w in machine.wheels if w in wheels)
     mission = MissionView(timeline, replay, machine, chosen, alive_sources(timeline), progress)
     mission = _measured(mission)
-    for family in WHOLE:
+    for family in whole(mission):
         mission = mission.after(family.assess(mission))
     parts = [(component, side) for component in (*chosen, *machine.axles) for side in (SENSOR, ACTUATOR)]
     found = {part: mission.known.get(part) or _without_evidence(mission, *part) for part in parts}
