@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from diagnosis.clearing import axles, wheels, yaw
 from diagnosis.clearing import responses as resp
 from diagnosis.clearing.alone import Rough, Still, Straight
+from diagnosis.clearing.axle_rates import rates_of
 from diagnosis.clearing.cells import Array, Cells
 from diagnosis.clearing.limits import measured_twice, response_limits
 from diagnosis.clearing.measure import as_followed, compared, late
@@ -174,7 +175,7 @@ def _axles(cells: Cells) -> Iterator[Gauges]:
     clear_at, frame = cells.machine.limits.clear_at, still_frame(cells)
     used, share = np.where(np.isfinite(opening), opening, command), -np.log1p(-clear_at)
     followed = as_followed(cells, opening, command, axles.OPENING)
-    rates, limit = axles.rates_of(cells, rate_of(angle, cells.dt), used), answered(cells)
+    rates, limit = rates_of(cells, rate_of(angle, cells.dt), used), answered(cells)
     path = yaw.off_straight(cells)
     straight = None if path is None else Straight(cells.frame, path, yaw.OFF / yaw.ANSWERED)
     turned = (

@@ -101,7 +101,7 @@ def _of_all(cells: Cells) -> _Common:
     common[known] = np.nanmedian(own[known], axis=1)
     common[np.column_stack([cells.explained(wheel) for wheel in cells.machine.wheels]).any(axis=1)] = np.nan
     levels = cells.frame.mean(_median(speed)), cells.frame.mean(_median(used))
-    ways = found.ahead.all(axis=1), ~found.ahead.any(axis=1)
+    ways = np.asarray(found.ahead.all(axis=1)), np.asarray(~found.ahead.any(axis=1))
     return _Common(common, levels, ways, cells.frame.hop * cells.dt)
 
 

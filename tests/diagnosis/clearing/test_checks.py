@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from diagnosis.clearing import yaw
-from diagnosis.clearing.axles import _evened, _parted
+from diagnosis.clearing.axle_rates import _evened, _parted
 from diagnosis.clearing.cells import Frame
 from diagnosis.clearing.checks import checks_of
 from diagnosis.clearing.limits import usual_limits

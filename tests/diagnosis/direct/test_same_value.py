@@ -25,7 +25,14 @@ def told(values: tuple[float, ...], commands: tuple[float, ...] = COMMANDS, sure
         x[a:b], y[a:b] = command, value
     rng = np.random.default_rng(4)
     measured = Measured(
-        y + 0.002 * rng.standard_normal(y.size), x, np.ones(y.size, np.bool_), DT, ("opening", "command"), "1", 0.002, 0.02
+        y + 0.002 * rng.standard_normal(y.size),
+        x,
+        np.ones(y.size, np.bool_),
+        DT,
+        ("opening", "command"),
+        "1",
+        0.002,
+        0.02,
     )
     found = []
     for k, (a, b) in enumerate(SPELLS):
