@@ -22,14 +22,14 @@ def gain_words(epsilon: float) -> str:
 
 
 def amount(value: float, unit: str, digits: int = 3) -> str:
-    """A value with its unit, for `MachineWords.fill`: ``0.31 {speed_unit}``, of a command ``2.1{percent}``, an angle in degrees.
+    """A value with its unit, for `MachineWords.fill`: ``0.31 {speed_unit}``, of a command ``2.1{percent}``, an angle or a turn in degrees.
 
     Parameters
     ----------
     value : float
         The value, in `unit`.
     unit : str
-        As recorded: m/s, rad, a fraction of full opening.
+        As recorded: m/s, rad, rad/s of a machine or an axle that turns, a fraction of full opening.
     digits : int
         Significant digits.
     """
@@ -37,7 +37,15 @@ def amount(value: float, unit: str, digits: int = 3) -> str:
         return f"{plain(100 * value, digits)}{{percent}}"
     if unit == "rad":
         return f"{plain(math.degrees(value), digits)}°"
+    if unit == "rad/s":
+        return turn(value, digits)
     return f"{plain(value, digits)} {'{speed_unit}' if unit == 'm/s' else unit}".rstrip()
+
+
+def turn(value: float, digits: int = 2, sign: str = "") -> str:
+    """How fast something turns in words, ``5.7°/s``, from rad/s, as the page shows it; `sign` ``+``: with its sign always."""
+    words = plain(math.degrees(value), digits)
+    return f"{sign if value > 0.0 else ''}{words}°/s"
 
 
 def kept_to(least: float, most: float, unit: str) -> str:
