@@ -8,8 +8,8 @@ from typing import NamedTuple
 
 from replay.faults import State
 
-#: As many faults of one row on one part are one that comes and goes, such as a loose contact.
-OFTEN = 5
+#: As many faults of one row on one part are one that comes and goes, such as a loose contact; two may be two.
+OFTEN = 3
 _CANDIDATE = 0.15  # of a fault's rows: one that it may as well be of
 
 
