@@ -23,6 +23,7 @@ from diagnosis.results.vocabulary import Tier
 from replay.faults import TOTAL, FaultMode, Side, State
 
 _QUIET_S = 4.0  # healthy between two pieces: more ends a fault, as does more than either of them lasts
+_SURE = 0.9  # of two pieces of different rows: two faults
 _MOMENT_S, _SHARE = (
     1.0,
     0.2,
@@ -84,7 +85,10 @@ def _chains(findings: Sequence[Finding], a: Assessment, dt: float) -> list[list[
 
 
 def _goes_on(chain: Sequence[Finding], f: Finding, a: Assessment, dt: float) -> bool:
-    """Whether less is healthy between a chain and the next finding than either of them lasts."""
+    """Whether less is healthy between a chain and the next finding than either of them lasts, and not both are sure of rows that differ."""
+    sure = {g.mode for g in chain if g.probability >= _SURE and not _brief(g, dt)}
+    if sure and f.probability >= _SURE and not _brief(f, dt) and f.mode not in sure:
+        return False
     last = max(g.stop for g in chain)
     quiet = np.count_nonzero(a.states[last : f.start] == CODE[State.HEALTHY]) * dt
     longer = max(last - chain[0].start, f.stop - f.start) * dt
@@ -94,20 +98,22 @@ def _goes_on(chain: Sequence[Finding], f: Finding, a: Assessment, dt: float) -> 
 def _without_dead(chain: list[Finding], dt: float) -> list[list[Finding]]:
     """A chain parted at pieces that surely are stuck or dead, and for more than a moment of it."""
     whole = sum(f.stop - f.start for f in chain)
-    out: list[list[Finding]] = []
-    before: bool | None = None
+    out: list[list[Finding]] = [[]]
     for f in chain:
-        dead = risk_of(f) >= PROBABLY_TOTAL and not _moment(f, whole, dt)
-        if dead is before:
-            out[-1].append(f)
+        if _is_dead(f, whole, dt):
+            out += [[f], []]
         else:
-            out.append([f])
-        before = dead
-    return out
+            out[-1].append(f)
+    return [part for part in out if part]
 
 
-def _moment(f: Finding, whole: int, dt: float) -> bool:
-    return (f.stop - f.start) * dt < _MOMENT_S and f.stop - f.start < _SHARE * whole
+def _is_dead(f: Finding, whole: int, dt: float) -> bool:
+    """Whether a piece surely is stuck or dead, for more than a moment of a chain of `whole` steps of faults."""
+    return risk_of(f) >= PROBABLY_TOTAL and not (_brief(f, dt) and f.stop - f.start < _SHARE * whole)
+
+
+def _brief(f: Finding, dt: float) -> bool:
+    return (f.stop - f.start) * dt < _MOMENT_S
 
 
 def _one(chain: Sequence[Finding], dt: float) -> Finding | None:

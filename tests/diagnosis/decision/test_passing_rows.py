@@ -30,7 +30,8 @@ def told(*findings: Finding, side: str = "actuator") -> Assessment:
     return with_disturbances_as_one({("FR", side): assessed(*findings)}, DT)["FR", side]
 
 
-PIECES = (piece(NOISY, 1000, 6000), piece(LOSS, 7500, 12_000), piece(NOISY, 13_000, 20_000))
+UNSURE = {"inefficient": 0.8, "stuck": 0.1, "noisy": 0.01}
+PIECES = (piece(NOISY, 1000, 6000), piece(LOSS, 7500, 12_000, **UNSURE), piece(NOISY, 13_000, 20_000))
 
 
 def test_what_looks_like_several_rows_in_turn_is_one_fault_with_its_course() -> None:
@@ -79,6 +80,7 @@ def test_the_share_of_a_valve_that_may_be_stuck_is_not_lost() -> None:
     "pieces",
     [
         (piece(NOISY, 1000, 2500), piece(LOSS, 5000, 7000)),  # healthy for longer than the longest of them lasts
+        (piece(NOISY, 1000, 4000), piece(LOSS, 4500, 9000)),  # both sure
         (piece(NOISY, 1000, 9000), piece(NOISY, 13_500, 22_000)),  # for longer than a disturbance is quiet
         (piece(LOSS, 1000, 4000), piece(LOSS, 5000, 9000)),  # a loss that is healthy in between comes and goes
         (piece(NOISY, 1000, 4000),),
