@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 
+from diagnosis.results.candidates import unclear_words
 from diagnosis.results.comparison_document import Change, CoverageChangeRow, FaultChangeRow, SideCoverageRow
 from diagnosis.results.durations import seconds_words
+from diagnosis.results.fault_rows import state_label
 from diagnosis.results.vocabulary import Tier
 
 OUTCOMES: dict[str, str] = {
@@ -45,6 +47,14 @@ def headline(counts: Mapping[str, int], *, several: bool = False) -> str:
 def are_several(faults: Iterable[FaultChangeRow]) -> bool:
     """Whether some rows of a comparison stand for more than one fault of a mission."""
     return any(len(f["ids"]) > 1 for c in faults for f in (c["older"], c["newer"]) if f is not None)
+
+
+def row_of_found(mode: str, side: str, rows: Sequence[str]) -> tuple[str, str]:
+    """Symbol and label of a fault of a comparison: its row, or that its kind is unclear, with the candidates."""
+    if not rows:
+        return mode, state_label(mode, side)
+    words = unclear_words(side, rows)
+    return "warning", words[0].upper() + words[1:]
 
 
 def times(count: int, seconds: float) -> str:
