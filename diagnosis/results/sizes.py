@@ -43,7 +43,10 @@ def amount(value: float, unit: str, digits: int = 3) -> str:
 
 
 def turn(value: float, digits: int = 2, sign: str = "") -> str:
-    """How fast something turns in words, ``5.7°/s``, from rad/s, as the page shows it; `sign` ``+``: with its sign always."""
+    """How fast something turns in words, ``5.7°/s``, as the page shows it.
+
+    `value` in rad/s; `sign` ``+``: with its sign always.
+    """
     words = plain(math.degrees(value), digits)
     return f"{sign if value > 0.0 else ''}{words}°/s"
 
