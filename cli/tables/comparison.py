@@ -10,7 +10,7 @@ from rich.text import Text
 
 from cli.tables.layout import ByWidth, bullets, key_values, section, table, text
 from cli.tables.looks import mode_text, severity_text, verdict_style
-from diagnosis.comparison.words import CHANGES, OUTCOMES, coverage_words, headline, row_of_found, times
+from diagnosis.comparison.words import CHANGES, OUTCOMES, coverage_words, headline, row_of_found, standing, times
 from diagnosis.pages.labels import utc
 from diagnosis.results.machine_words import MachineWords, words_of
 
@@ -33,7 +33,7 @@ def comparison_parts(found: Comparison) -> list[RenderableType]:
     """Headline, the two missions, faults by what became of them, coverage, figures, and what to bear in mind."""
     words = words_of({"words": found.words})
     several = any(len(f.ids) > 1 for c in found.faults for f in (c.older, c.newer) if f is not None)
-    label, style = ("WORSE", "bold white on #b63a00") if found.worse else ("NOT WORSE", "bold white on #1d7a63")
+    label, style = _label(found)
     parts: list[RenderableType] = [
         Text.assemble((f" {label} ", style), "  ", text(headline(found.counts, several=several), "bold")),
         "",
@@ -46,6 +46,15 @@ def comparison_parts(found: Comparison) -> list[RenderableType]:
     if found.notes:
         parts += [section("Notes"), bullets(found.notes)]
     return [*parts, ""]
+
+
+def _label(found: Comparison) -> tuple[str, str]:
+    """Word and style of the outcome; what is no worse is no relief while a fault stands."""
+    if found.worse:
+        return "WORSE", "bold white on #b63a00"
+    if standing(found.counts):
+        return "NOT WORSE, FAULTS STAND", "bold black on #f2b11b"
+    return "NOT WORSE", "bold white on #1d7a63"
 
 
 def _mission(m: ComparedMission) -> Text:

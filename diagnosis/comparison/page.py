@@ -16,6 +16,7 @@ from diagnosis.comparison.words import (
     coverage_words,
     headline,
     row_of_found,
+    standing,
     times,
 )
 from diagnosis.pages import labels
@@ -70,6 +71,7 @@ def build_compare_page(document: ComparisonDocument) -> str:
         "css": plain_style(_HERE / "compare.css"),
         "csp": POLICY,
         "worse": document["worse"],
+        "standing": standing(document["counts"]),
         "headline": headline(document["counts"], several=are_several(document["faults"])),
         "missions": [_mission("older", document["older"]), _mission("newer", document["newer"])],
         "groups": groups,

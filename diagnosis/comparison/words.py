@@ -44,6 +44,11 @@ def headline(counts: Mapping[str, int], *, several: bool = False) -> str:
     return f"Faults{once}: " + ", ".join(found) if found else "No fault in either mission"
 
 
+def standing(counts: Mapping[str, int]) -> bool:
+    """Whether any fault stands in the newer mission, or is gone without a sign of repair: nothing new is no relief then."""
+    return any(n for name, n in counts.items() if name != "resolved")
+
+
 def are_several(faults: Iterable[FaultChangeRow]) -> bool:
     """Whether some rows of a comparison stand for more than one fault of a mission."""
     return any(len(f["ids"]) > 1 for c in faults for f in (c["older"], c["newer"]) if f is not None)

@@ -62,3 +62,10 @@ def test_a_fault_whose_kind_is_unclear_is_no_other_one_than_a_row_that_it_may_be
     assert same.older.rows == ("stuck", "inefficient", "noisy")
     other = only(compared(older, later(fault("FR", "sensor", "no_signal"))))
     assert other.changes == ("row",)
+
+
+def test_a_severe_fault_that_is_gone_stands_beside_a_mission_that_is_ready() -> None:
+    older = report(fault("FR", "sensor", "stuck", severity="high"))
+    newer = report(start_s=-86_400.0) | {"verdict": {"status": "ready", "title": "t"}}
+    assert any("not shown to be repaired, and is open" in note for note in compared(older, newer).notes)
+    assert not any("is open" in note for note in compared(older, later()).notes)
