@@ -7,7 +7,7 @@ import math
 from diagnosis.results.plain_numbers import plain
 from replay.machine.quantities import OPENING
 
-_MOST, _LEAST = 1e6, 1.5
+_MOST, _LEAST, _LESS = 1e6, 1.5, "less probable"
 _WIDEST = 0.95  # 95 % bounds of a loss that are as wide say nothing of it
 
 
@@ -75,6 +75,15 @@ def not_reported(below: int, name: str) -> str:
     return f"{many} below the limits from which a deviation counts as a fault, and not reported."
 
 
+def probable_words(log_evidence: float, this: str = "with this fault", other: str = "without one") -> str:
+    """How probable a channel is, to follow *is*: ``about 3 000 times as probable with this fault as without one``.
+
+    A difference of natural logarithms [1].
+    """
+    words = times_as_probable(log_evidence)
+    return f"{words} {this} {'than' if words == _LESS else 'as'} {other}"
+
+
 def times_as_probable(log_evidence: float) -> str:
     """A log-evidence in words, to be followed by *with this fault as without*: ``about 3 000 times as probable``.
 
@@ -84,7 +93,7 @@ def times_as_probable(log_evidence: float) -> str:
         return "more than a million times as probable"
     times = math.exp(log_evidence)
     if times < _LEAST:
-        return "about as probable" if times > 1.0 / _LEAST else "less probable"
+        return "about as probable" if times > 1.0 / _LEAST else _LESS
     rounded = float(f"{times:.1g}") if times >= 10.0 else float(f"{times:.2g}")
     return (
         f"about {rounded:,.0f}".replace(",", "\u202f") + " times as probable"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from diagnosis.results.sizes import amount, kept_to, turn
+from diagnosis.results.sizes import amount, kept_to, probable_words, turn
 
 
 @pytest.mark.parametrize(
@@ -28,3 +28,8 @@ def test_what_turns_does_so_in_degrees_a_second_as_the_page_has_it() -> None:
         "-5.7°/s",
     )
     assert amount(0.5, "rad/s", 2) == "29°/s"
+
+
+def test_what_is_less_probable_is_so_than_something() -> None:
+    assert probable_words(9.0) == "about 8\u202f000 times as probable with this fault as without one"
+    assert probable_words(-9.0) == "less probable with this fault than without one"
