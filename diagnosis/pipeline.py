@@ -32,7 +32,9 @@ from diagnosis.decision.changing_rows import with_chains_as_one
 from diagnosis.decision.episodes import with_episodes
 from diagnosis.decision.late_axles import as_late_axles
 from diagnosis.decision.mirrored import all_mirrored, axles_in_doubt, without_mirrored
+from diagnosis.decision.passing_rows import with_disturbances_as_one
 from diagnosis.decision.second_onsets import with_second_onsets
+from diagnosis.decision.stated_once import without_restated
 from diagnosis.decision.valve_noise import with_doubted_noise
 from diagnosis.decision.way import path_of
 from diagnosis.recording_rows import machine_row
@@ -224,7 +226,8 @@ def _outside_gaps(found: ComponentResult, axles: tuple[str, ...], timeline: Time
     told = with_silent_sensors(found.assessments, timeline)
     seen = {key: without_gaps(a, gaps, timeline) for key, a in told.items()}
     joined = with_doubted_noise(with_episodes(seen, timeline.dt), axles, timeline.dt)
-    joined = with_chains_as_one(joined, timeline.dt)
+    joined = with_disturbances_as_one(with_chains_as_one(joined, timeline.dt), timeline.dt)
+    joined = without_restated(joined, timeline.dt)
     return replace(found, assessments=with_second_onsets(joined, timeline.dt))
 
 

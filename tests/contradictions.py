@@ -15,7 +15,7 @@ from diagnosis.decision.short import AS_WELL_HEALTHY
 from diagnosis.pages.labels import fault_title
 from diagnosis.results.candidates import candidates_of, label_of
 from diagnosis.results.machine_words import HYDRAULIC
-from diagnosis.results.recurring import counted
+from diagnosis.results.recurring import Seen, counted
 from diagnosis.results.vocabulary import Severity
 from replay.machine.quantities import OPENING
 from tests.clearing_contradictions import of_checks, of_coverage, of_remedies
@@ -85,10 +85,7 @@ def _verdict(report: Mapping[str, Any]) -> Iterator[str]:
         yield f"more than two sentences: {verdict['text']!r}"
     parts = {(f["component"], f["side"]) for f in faults if f["severity"] != "info"}
     on = re.search(r", on (\d+) parts?$", verdict["title"])
-    told = [
-        counted((f["component"], f["side"], f["mode"]) for f in faults if f["severity"] in of)
-        for of in (("high",), ("medium", "low"))
-    ]
+    told = counted([[_seen(f) for f in faults if f["severity"] in of] for of in (("high",), ("medium", "low"))])
     if _counted_on(on, sum(told)) != len(parts) and verdict["status"] in ("stop", "watch"):
         yield f"title {verdict['title']!r}, and faults on {len(parts)} parts"
     if len(verdict["actions"]) != len(parts):
@@ -104,6 +101,10 @@ def _verdict(report: Mapping[str, Any]) -> Iterator[str]:
     open_checks = [c for c in report.get("clearing", []) if not c["passed"]]
     if verdict["cleared"] and open_checks:
         yield f"cleared with {len(open_checks)} open checks"
+
+
+def _seen(f: Mapping[str, Any]) -> Seen:
+    return Seen(f["component"], f["side"], f["mode"], tuple((h["mode"], h["p"]) for h in f["hypotheses"]))
 
 
 def _counted_on(on: re.Match[str] | None, faults: int) -> int:

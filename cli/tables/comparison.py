@@ -10,9 +10,8 @@ from rich.text import Text
 
 from cli.tables.layout import ByWidth, bullets, key_values, section, table, text
 from cli.tables.looks import mode_text, severity_text, verdict_style
-from diagnosis.comparison.words import CHANGES, OUTCOMES, coverage_words, headline, times
+from diagnosis.comparison.words import CHANGES, OUTCOMES, coverage_words, headline, row_of_found, standing, times
 from diagnosis.pages.labels import utc
-from diagnosis.results.fault_rows import state_label
 from diagnosis.results.machine_words import MachineWords, words_of
 
 if TYPE_CHECKING:
@@ -20,7 +19,8 @@ if TYPE_CHECKING:
 
     from diagnosis.comparison.compare import ComparedMission, Comparison, MetricChange
     from diagnosis.comparison.coverage import CoverageChange, SideCoverage
-    from diagnosis.comparison.faults import FaultChange, FoundFault
+    from diagnosis.comparison.faults import FaultChange
+    from diagnosis.comparison.found import FoundFault
     from diagnosis.results.comparison_document import CoverageChangeRow
 
 _STYLES = {"new": "bold red", "worse": "bold red", "resolved": "#2fa98c", "better": "#2fa98c", "unchanged": "dim"}
@@ -33,7 +33,7 @@ def comparison_parts(found: Comparison) -> list[RenderableType]:
     """Headline, the two missions, faults by what became of them, coverage, figures, and what to bear in mind."""
     words = words_of({"words": found.words})
     several = any(len(f.ids) > 1 for c in found.faults for f in (c.older, c.newer) if f is not None)
-    label, style = ("WORSE", "bold white on #b63a00") if found.worse else ("NOT WORSE", "bold white on #1d7a63")
+    label, style = _label(found)
     parts: list[RenderableType] = [
         Text.assemble((f" {label} ", style), "  ", text(headline(found.counts, several=several), "bold")),
         "",
@@ -46,6 +46,15 @@ def comparison_parts(found: Comparison) -> list[RenderableType]:
     if found.notes:
         parts += [section("Notes"), bullets(found.notes)]
     return [*parts, ""]
+
+
+def _label(found: Comparison) -> tuple[str, str]:
+    """Word and style of the outcome; what is no worse is no relief while a fault stands."""
+    if found.worse:
+        return "WORSE", "bold white on #b63a00"
+    if standing(found.counts):
+        return "NOT WORSE, FAULTS STAND", "bold black on #f2b11b"
+    return "NOT WORSE", "bold white on #1d7a63"
 
 
 def _mission(m: ComparedMission) -> Text:
@@ -97,9 +106,8 @@ def _faults(faults: Sequence[FaultChange], machine_words: MachineWords) -> list[
 
 
 def _rows(c: FaultChange) -> Text:
-    found = dict.fromkeys((f.mode, f.side) for f in (c.older, c.newer) if f is not None)
-    words = dict.fromkeys((mode, state_label(mode, side).lower()) for mode, side in found)
-    return Text(" → ").join(mode_text(mode, label) for mode, label in words)
+    words = dict.fromkeys(row_of_found(f.mode, f.side, f.rows) for f in (c.older, c.newer) if f is not None)
+    return Text(" → ").join(mode_text(mode, label[0].lower() + label[1:]) for mode, label in words)
 
 
 def _both(c: FaultChange, bounds: bool) -> tuple[Text, Text]:
@@ -107,10 +115,10 @@ def _both(c: FaultChange, bounds: bool) -> tuple[Text, Text]:
 
 
 def _found(f: FoundFault | None, bounds: bool) -> Text:
-    """Severity, number and time of the faults, and ε̂ where the row leaves it open."""
+    """Severity, number and time of the faults, their probability, and ε̂ where the row leaves it open."""
     if f is None:
         return text("–")
-    words = f" {times(len(f.ids), f.seconds)}"
+    words = f" {times(len(f.ids), f.seconds)}, p {f.probability:.2f}"
     if f.epsilon is not None and not f.mode.total:
         words += f", ε {f.epsilon['value']:.2f}"
         words += f" ({f.epsilon['low']:.2f}–{f.epsilon['high']:.2f})" if bounds else ""

@@ -14,7 +14,7 @@ from diagnosis.results.assessment import Assessment, Finding
 from diagnosis.results.limited import limited
 from diagnosis.results.machine_words import MachineWords
 from diagnosis.results.vocabulary import Tier
-from replay.faults import Side
+from replay.faults import Side, State
 
 #: A component and its side.
 Part = tuple[str, str]
@@ -22,6 +22,8 @@ Part = tuple[str, str]
 _SURE = 0.9  # of a valve's fault
 #: Of what lies beside another fault. Beside wrong angles partial faults were right as often as that; else set by hand.
 _MOST = 0.65
+#: Of any fault that only a model shows beside a sensor that surely is dead or stuck: less than is worth a check, for that fault makes it up.
+_MADE_UP = 0.55
 _INSIDE = 0.5  # of its time
 _SAME = 1e-9  # m/s
 _ANGLE = "Meanwhile a steering sensor fails, or may, from whose angle follows what this part should do, which makes the fault less probable."
@@ -102,7 +104,13 @@ def less_sure_beside_dead_sensors(
     def doubtful(f: Finding) -> bool:
         return f.tier is Tier.MODEL and not f.mode.total
 
-    return _less_sure(assessments, _sides(wheels), others, doubtful, words.fill(_SENSOR))
+    why = words.fill(_SENSOR)
+    told = _less_sure(assessments, _sides(wheels), others, doubtful, why)
+
+    def sure(part: Part) -> list[Finding]:
+        return [f for f in others(part) if f.probability >= _SURE]
+
+    return _less_sure(told, _sides(wheels), sure, doubtful, why, _MADE_UP)
 
 
 def _less_sure(
@@ -111,17 +119,29 @@ def _less_sure(
     causes: Callable[[Part], Sequence[Finding]],
     doubtful: Callable[[Finding], bool],
     why: str,
+    any_fault: float | None = None,
 ) -> dict[Part, Assessment]:
-    """Assessments in which doubtful findings of parts are limited where they lie for the most part within one of its causes."""
+    """Assessments in which doubtful findings of parts are limited where they lie for the most part within one of its causes.
+
+    `any_fault`: what any fault may be claimed with, instead of the row alone.
+    """
     out = dict(assessments)
     for part in parts:
         by = causes(part)
         found = _findings(assessments, part)
         less = [doubtful(f) and _within(f, by) for f in found]
         if any(less):
-            told = tuple(limited(f, _MOST, why) if x else f for f, x in zip(found, less, strict=True))
+            told = tuple(_limited(f, why, any_fault) if x else f for f, x in zip(found, less, strict=True))
             out[part] = replace(assessments[part], findings=told)
     return out
+
+
+def _limited(f: Finding, why: str, any_fault: float | None) -> Finding:
+    if any_fault is None:
+        return limited(f, _MOST, why)
+    faulty = sum(h.p for h in f.hypotheses if h.mode != State.HEALTHY.value)
+    fewer = replace(f, evidence=tuple(text for text in f.evidence if text != why))
+    return limited(fewer, f.probability * min(1.0, any_fault / faulty), why) if faulty > any_fault else f
 
 
 def _within(f: Finding, causes: Sequence[Finding]) -> bool:

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from diagnosis.comparison.coverage import CoverageChange, coverage_changes, sides_of
-from diagnosis.comparison.faults import FaultChange, found_faults, is_worse, match_faults
+from diagnosis.comparison.faults import FaultChange, is_worse, match_faults
+from diagnosis.comparison.found import FoundFault, found_faults
+from diagnosis.comparison.gone import Newer
 from diagnosis.results.comparison_document import SCHEMA, ComparisonDocument, Outcome
 from diagnosis.results.document import LimitsRow, MachineIdentity, ReportDocument
 from diagnosis.results.machine_words import words_of
 from diagnosis.results.result import to_json
-from diagnosis.results.vocabulary import Verdict
+from diagnosis.results.vocabulary import Severity, Verdict
 from diagnosis.results.words_row import WordsRow
 from replay.errors import ConfigError
 
@@ -132,7 +134,9 @@ def compare_reports(
         raise ConfigError(f"{difference}; compare two missions of one machine, or add --force")
     had, has = sides_of(older), sides_of(newer)
     words = words_of(newer["machine"])
-    faults = tuple(match_faults(found_faults(older, had), found_faults(newer, has), had, has, words))
+    seen = Newer(has, newer["detectability"]["rows"], newer["limits"]["clear_at"], _not_later(older, newer, a, b))
+    faults = tuple(match_faults(found_faults(older, had), found_faults(newer, has), had, seen, words))
+    gone = [c.older for c in faults if c.status == "not_seen_again" and c.older is not None]
     axles = {*older["machine"]["axles"], *newer["machine"]["axles"]}
     outcomes: list[str] = [c.trend or c.status for c in faults]
     return Comparison(
@@ -144,7 +148,7 @@ def compare_reports(
         faults=faults,
         coverage=coverage_changes(had, has, axles),
         metrics=_metrics(older, newer),
-        notes=tuple(_notes(older, newer, a, b, difference)),
+        notes=tuple(_notes(older, newer, a, b, difference, gone)),
         words=words.row(),
     )
 
@@ -187,12 +191,30 @@ def _listed(names: list[str]) -> str:
     return ", ".join(names) or "none"
 
 
+def _not_later(older: ReportDocument, newer: ReportDocument, a: ComparedMission, b: ComparedMission) -> str:
+    """Why the newer mission is not known to come after the older one, in a sentence; empty where it does, or no clock says otherwise."""
+    if _is_same_log(older, newer):
+        return "Both results are of the same log, which shows no repair."
+    if min(a.start_ns, b.start_ns) > 0 and b.start_ns < a.start_ns + a.duration_s * 1e9:
+        return "By the clocks of the logs the mission without it does not come after the one with it."
+    return ""
+
+
+def _is_same_log(older: ReportDocument, newer: ReportDocument) -> bool:
+    hashes = [{f["sha256"] for f in r["log"]["files"]} for r in (older, newer)]
+    return bool(hashes[0]) and hashes[0] == hashes[1]
+
+
 def _notes(
-    older: ReportDocument, newer: ReportDocument, a: ComparedMission, b: ComparedMission, difference: str
+    older: ReportDocument,
+    newer: ReportDocument,
+    a: ComparedMission,
+    b: ComparedMission,
+    difference: str,
+    open_: Sequence[FoundFault],
 ) -> list[str]:
     out = [f"Different machines, compared with --force: {difference}."] if difference else []
-    hashes = [{f["sha256"] for f in r["log"]["files"]} for r in (older, newer)]
-    if hashes[0] and hashes[0] == hashes[1]:
+    if _is_same_log(older, newer):
         out.append("Both results are of the same log.")
     elif b.start_ns < a.start_ns:
         out.append(
@@ -213,6 +235,11 @@ def _notes(
             + " Give it as machine.id in the machine file, or with --machine-id."
         )
     out += [f"Faults were injected into the recording of {m.name}." for m in (a, b) if m.open_loop]
+    severe = [f for f in open_ if f.severity is Severity.HIGH]
+    if severe and b.verdict is Verdict.READY:
+        out.append(
+            f"The verdict of {b.name} is of that mission alone: a severe fault of the older one is not shown to be repaired, and is open."
+        )
     if a.version != b.version:
         out.append(f"They were judged by different versions of the tool ({a.version or '?'}, {b.version or '?'}).")
     out += _different_limits(older["limits"], newer["limits"])

@@ -2,65 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
-from diagnosis.comparison.coverage import SideCoverage
+from diagnosis.comparison.found import FoundFault, Sides, keys_of
+from diagnosis.comparison.gone import Newer, why_not_resolved
 from diagnosis.decision.wording import join_words
+from diagnosis.results.candidates import unclear_words
 from diagnosis.results.comparison_document import Change, Status, Trend
-from diagnosis.results.document import IntervalRow, ReportDocument, StateRow
-from diagnosis.results.ending import HEALTHY_S, healthy_after
 from diagnosis.results.fault_rows import mode_words
 from diagnosis.results.machine_words import MachineWords
-from diagnosis.results.size_rows import EpsilonRow
 from diagnosis.results.vocabulary import Kind, Severity, Tier
-from diagnosis.results.wheel_model import RESOLUTION
 from replay.faults import FaultMode, Side
 
 _LONGER, _LEAST_S = 2.0, 1.0
 _LEAST_EPSILON = 0.05  # bounds are those of one mission; the same fault differs more from mission to mission
-
-Sides = Mapping[tuple[str, str], SideCoverage]
-
-
-@dataclass(frozen=True)
-class FoundFault:
-    """All faults of one mission on one component and side in one row.
-
-    Attributes
-    ----------
-    component, kind, side, mode : str, Kind, Side, FaultMode
-        As in `diagnosis.results.result.FaultInterval`.
-    ids : tuple[str, ...]
-        Their numbers in the report.
-    seconds : float
-        Time of all of them [s].
-    share : float or None
-        The same as a share of the time in which the side was judged; None where that is not known.
-    severity : Severity
-        The worst.
-    epsilon : EpsilonRow or None
-        ``value``, ``low``, ``high`` of the longest of the worst ones.
-    probability : float
-        Of the same one.
-    tier : Tier
-        Strongest evidence.
-    recovered : bool
-        Whether the part was healthy again in the same mission, for a second or more behind the end of one of them.
-    """
-
-    component: str
-    kind: Kind
-    side: Side
-    mode: FaultMode
-    ids: tuple[str, ...]
-    seconds: float
-    share: float | None
-    severity: Severity
-    epsilon: EpsilonRow | None
-    probability: float
-    tier: Tier
-    recovered: bool = False
 
 
 @dataclass(frozen=True)
@@ -106,60 +62,25 @@ def is_worse(change: FaultChange) -> bool:
     )
 
 
-def found_faults(report: ReportDocument, sides: Sides) -> list[FoundFault]:
-    """Gather a report's faults by component, side and row, worst first; `sides` from `sides_of`."""
-    groups: dict[tuple[str, Side, FaultMode], list[IntervalRow]] = {}
-    for i in report["intervals"]:
-        groups.setdefault((i["component"], i["side"], i["mode"]), []).append(i)
-    out = [_found(key, faults, sides, report["states"]) for key, faults in groups.items()]
-    return sorted(out, key=lambda f: (-f.severity.rank, -f.seconds, f.component, f.side, f.mode))
-
-
-def _found(
-    key: tuple[str, Side, FaultMode], faults: Sequence[IntervalRow], sides: Sides, states: Sequence[StateRow]
-) -> FoundFault:
-    component, side, mode = key
-    first = max(faults, key=lambda f: (f["severity"].rank, f["stop_s"] - f["start_s"]))
-    seconds = float(sum(f["stop_s"] - f["start_s"] for f in faults))
-    judged = [sides[k].judged_s for k in _keys(component, side) if k in sides]
-    epsilon = first["epsilon"]
-    return FoundFault(
-        component=component,
-        kind=first["kind"],
-        side=side,
-        mode=mode,
-        ids=tuple(f["id"] for f in faults),
-        seconds=seconds,
-        share=seconds / max(judged) if judged and max(judged) > 0 else None,
-        severity=first["severity"],
-        epsilon=epsilon,
-        probability=first["probability"],
-        tier=max((f["tier"] for f in faults), key=lambda tier: tier.strength),
-        recovered=healthy_after(*key[:2], min(f["stop_s"] for f in faults), states) >= HEALTHY_S,
-    )
-
-
-def _keys(component: str, side: Side) -> list[tuple[str, Side]]:
-    """Component and side of the parts that a fault may sit in."""
-    sides = (Side.SENSOR, Side.ACTUATOR) if side is Side.SENSOR_OR_ACTUATOR else (side,)
-    return [(component, s) for s in sides]
-
-
 def match_faults(
     older: Sequence[FoundFault],
     newer: Sequence[FoundFault],
     older_sides: Sides,
-    newer_sides: Sides,
+    seen: Newer,
     words: MachineWords,
 ) -> list[FaultChange]:
     """Match faults one to one: same side and row, then same row where one side is not told apart, then same side.
+
+    Faults whose kind is unclear are of the same row where they may be.
 
     Parameters
     ----------
     older, newer : Sequence[FoundFault]
         From `found_faults`.
-    older_sides, newer_sides : Mapping
-        What was assessed, by component and side.
+    older_sides : Mapping
+        What was assessed in the older mission, by component and side.
+    seen : Newer
+        What the newer mission could show.
     words : MachineWords
         How to speak of the machine.
 
@@ -170,7 +91,7 @@ def match_faults(
     """
     left, out = list(older), []
     open_: list[FoundFault] = list(newer)
-    for alike in (_same, _same_row, _same_side):
+    for alike in (_same, _maybe_same, _same_row, _same_side):
         rest = []
         for b in open_:
             a = next((a for a in left if a.component == b.component and alike(a, b)), None)
@@ -182,7 +103,7 @@ def match_faults(
         open_ = rest
     out += [_change("new", None, b, note=_unseen_before(b, older_sides, words)) for b in open_]
     for a in left:
-        why = _why_not_assessed(a, newer_sides, words)
+        why = why_not_resolved(a, seen, words)
         out.append(
             _change("not_seen_again" if why else "resolved", a, None, note=why or _other_faults(a, newer, words))
         )
@@ -198,6 +119,15 @@ def _order(c: FaultChange) -> tuple[int, int, str, str, str]:
 
 def _same(a: FoundFault, b: FoundFault) -> bool:
     return a.side == b.side and a.mode == b.mode
+
+
+def _maybe_same(a: FoundFault, b: FoundFault) -> bool:
+    return a.side == b.side and _may_be_one_row(a, b)
+
+
+def _may_be_one_row(a: FoundFault, b: FoundFault) -> bool:
+    """Whether two faults are of one row, or may be: one whose kind is unclear may be of any of its rows."""
+    return not {a.mode.value, *a.rows}.isdisjoint({b.mode.value, *b.rows}) if a.rows or b.rows else a.mode == b.mode
 
 
 def _same_row(a: FoundFault, b: FoundFault) -> bool:
@@ -225,7 +155,7 @@ def _both(a: FoundFault, b: FoundFault) -> FaultChange:
     """A fault of both missions."""
     severity, epsilon, duration = _sign(a.severity.rank, b.severity.rank), _epsilon(a, b), _duration(a, b)
     differs: dict[Change, bool] = {
-        "row": a.mode != b.mode,
+        "row": not _may_be_one_row(a, b),
         "side": a.side != b.side,
         "severity": bool(severity),
         "epsilon": bool(epsilon),
@@ -264,7 +194,7 @@ def _duration(a: FoundFault, b: FoundFault) -> int:
 
 
 def _unseen_before(b: FoundFault, sides: Sides, words: MachineWords) -> str:
-    keys = _keys(b.component, b.side)
+    keys = keys_of(b.component, b.side)
     for key in keys:
         side = sides.get(key)
         if side is None or not side.assessed:
@@ -274,39 +204,22 @@ def _unseen_before(b: FoundFault, sides: Sides, words: MachineWords) -> str:
     return ""
 
 
+def _words(f: FoundFault) -> str:
+    return unclear_words(f.side, f.rows) if f.rows else mode_words(f.side, f.mode)
+
+
 def _other_faults(a: FoundFault, newer: Sequence[FoundFault], words: MachineWords) -> str:
     """Say that a part whose fault is gone has another one, or that its fault may be taken for one of the other side."""
-    keys = set(_keys(a.component, a.side))
+    keys = set(keys_of(a.component, a.side))
     near = [b for b in newer if b.component == a.component and b.severity is not Severity.INFO]
-    own = [b for b in near if keys & set(_keys(b.component, b.side))]
+    own = [b for b in near if keys & set(keys_of(b.component, b.side))]
     if own:
-        modes = join_words(list(dict.fromkeys(mode_words(b.side, b.mode) for b in own)))
+        modes = join_words(list(dict.fromkeys(_words(b) for b in own)))
         return f"The part is not healthy: in the newer mission it is {modes}."
     other = next((b for b in near if Tier.DIRECT not in (a.tier, b.tier)), None)
     if other is None:
         return ""
     return (
         f"In the newer mission the {words.part_words(other.kind, other.component, other.side)} is "
-        f"{mode_words(other.side, other.mode)}; without second measurements one can be taken for the other."
+        f"{_words(other)}; without second measurements one can be taken for the other."
     )
-
-
-def _why_not_assessed(a: FoundFault, sides: Sides, words: MachineWords) -> str:
-    """Sentence that says why a fault that is gone cannot count as resolved, empty where it can."""
-    for key in _keys(a.component, a.side):
-        side, part = sides.get(key), words.part_name(a.kind, key[1])
-        if side is None:
-            return f"The newer result does not hold the {part}."
-        if not side.assessed:
-            return f"In the newer mission the {part} was {side.words}."
-        small = a.epsilon is not None and a.epsilon["low"] < RESOLUTION[key[1]]
-        if side.tier is Tier.TRACKING and not a.mode.total:
-            return f"In the newer mission the {part} was judged by its tracking alone, which does not show this row."
-        if side.tier.strength < a.tier.strength and not a.mode.total and small:
-            return (
-                f"In the newer mission the {part} was judged by weaker evidence ({side.tier}, not {a.tier}), which "
-                f"mostly does not name a loss below about {100 * RESOLUTION[key[1]]:.0f} % there."
-            )
-    if a.recovered and a.severity is not Severity.INFO:
-        return "In the older mission it went away by itself as well, so that its absence shows no repair."
-    return ""

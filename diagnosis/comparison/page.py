@@ -8,7 +8,17 @@ from pathlib import Path
 
 import jinja2
 
-from diagnosis.comparison.words import CHANGES, OUTCOMES, SIGNS, are_several, coverage_words, headline, times
+from diagnosis.comparison.words import (
+    CHANGES,
+    OUTCOMES,
+    SIGNS,
+    are_several,
+    coverage_words,
+    headline,
+    row_of_found,
+    standing,
+    times,
+)
 from diagnosis.pages import labels
 from diagnosis.pages.environment import POLICY, environment, plain_style
 from diagnosis.pages.svg import icon
@@ -21,7 +31,6 @@ from diagnosis.results.comparison_document import (
     MetricChangeRow,
     SideCoverageRow,
 )
-from diagnosis.results.fault_rows import state_label
 from diagnosis.results.machine_words import MachineWords, words_of
 from diagnosis.results.vocabulary import Kind, Tier
 
@@ -36,8 +45,9 @@ _DEFINITIONS = (
     "Changed: another row or side, another severity, ε̂ of each mission outside the other's 95 % bounds and 0.05 apart, or time that changed "
     "by more than a factor of two, both in seconds and as a share of the judged time, and by a second at least.",
     "Worse: a higher severity, else a larger ε̂ or more time.",
-    "Resolved: not found again although the part was judged long enough in the newer mission (with evidence, for the seconds that the "
-    "verdict “ready” takes, and for four fifths of its driving), and the part was not healthy again before its mission ended. "
+    "Resolved: not found again although the part was judged long enough in a later, whole mission (with evidence, for the seconds that the "
+    "verdict “ready” takes, and for four fifths of its driving), which by its report would have shown such a fault more often than not, "
+    "and the part was not healthy again before its mission ended. "
     "Otherwise a missing fault is “not seen again, no repair shown”: what comes and goes is gone at any time.",
     "Tracking error: mean |e| while driving. Control effort: mean |u_a| while driving. Both depend on what was driven.",
 )
@@ -61,6 +71,7 @@ def build_compare_page(document: ComparisonDocument) -> str:
         "css": plain_style(_HERE / "compare.css"),
         "csp": POLICY,
         "worse": document["worse"],
+        "standing": standing(document["counts"]),
         "headline": headline(document["counts"], several=are_several(document["faults"])),
         "missions": [_mission("older", document["older"]), _mission("newer", document["newer"])],
         "groups": groups,
@@ -98,10 +109,10 @@ def _mission(word: str, m: ComparedMissionRow) -> Context:
 
 def _row(c: FaultChangeRow, words: MachineWords) -> Context:
     found = [f for f in (c["older"], c["newer"]) if f is not None]
-    rows = {f["mode"]: (f["mode"], state_label(f["mode"], f["side"])) for f in found}
+    rows = dict.fromkeys(row_of_found(f["mode"], f["side"], f.get("rows", ())) for f in found)
     return {
         "part": words.part_words(c["kind"], c["component"], c["side"]),
-        "rows": list(rows.values()),
+        "rows": list(rows),
         "older": _found(c["older"], c["kind"], words),
         "newer": _found(c["newer"], c["kind"], words),
         "changed": ", ".join(CHANGES[name] for name in c["changes"]),

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 
+from diagnosis.results.candidates import unclear_words
 from diagnosis.results.comparison_document import Change, CoverageChangeRow, FaultChangeRow, SideCoverageRow
 from diagnosis.results.durations import seconds_words
+from diagnosis.results.fault_rows import state_label
 from diagnosis.results.vocabulary import Tier
 
 OUTCOMES: dict[str, str] = {
@@ -42,9 +44,22 @@ def headline(counts: Mapping[str, int], *, several: bool = False) -> str:
     return f"Faults{once}: " + ", ".join(found) if found else "No fault in either mission"
 
 
+def standing(counts: Mapping[str, int]) -> bool:
+    """Whether any fault stands in the newer mission, or is gone without a sign of repair: nothing new is no relief then."""
+    return any(n for name, n in counts.items() if name != "resolved")
+
+
 def are_several(faults: Iterable[FaultChangeRow]) -> bool:
     """Whether some rows of a comparison stand for more than one fault of a mission."""
     return any(len(f["ids"]) > 1 for c in faults for f in (c["older"], c["newer"]) if f is not None)
+
+
+def row_of_found(mode: str, side: str, rows: Sequence[str]) -> tuple[str, str]:
+    """Symbol and label of a fault of a comparison: its row, or that its kind is unclear, with the candidates."""
+    if not rows:
+        return mode, state_label(mode, side)
+    words = unclear_words(side, rows)
+    return "warning", words[0].upper() + words[1:]
 
 
 def times(count: int, seconds: float) -> str:

@@ -62,11 +62,11 @@ def with_episodes(assessments: Mapping[Part, Assessment], dt: float) -> dict[Par
         both = {side: b for (component, side), b in assessments.items() if component == part[0]}
         findings = a.findings if len(a.findings) < 2 else joined(a.findings, both, dt)
         told = tuple(_with_its_chance(f) for f in findings)
-        out[part] = a if told == a.findings else _without_healthy(replace(a, findings=told), a.findings)
+        out[part] = a if told == a.findings else without_healthy_between(replace(a, findings=told), a.findings)
     return out
 
 
-def _without_healthy(joined: Assessment, pieces: Sequence[Finding]) -> Assessment:
+def without_healthy_between(joined: Assessment, pieces: Sequence[Finding]) -> Assessment:
     """The same with nothing called healthy between the pieces of one fault: of the fault where it goes on, else it does not show there."""
     states, healthy = joined.states.copy(), CODE[State.HEALTHY]
     open_state = State.NOT_EXCITED if State.NOT_EXCITED in joined.reasons else State.NOT_ASSESSED

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from diagnosis.results.sizes import turn
 from replay.arrays.blocks import release
 from replay.machine.config import Machine
 from replay.signals.timeline import Timeline
@@ -48,8 +49,8 @@ def offset_at_rest(timeline: Timeline, machine: Machine) -> str:
     if len(told) < len(rests):
         often = f"in {len(told)} of {len(rests)} stops of the machine"
     return (
-        f"The gyro (imu.yaw_rate) reads up to {largest:+.2g} rad/s {often}: an offset, which a heading takes for {abs(np.degrees(largest)):.2g}° in every "
-        "second. Calibrate it at rest. Where speeds are held against it a constant one is taken out."
+        f"The gyro (imu.yaw_rate) reads up to {turn(largest, sign='+')} {often}: an offset, by which a heading goes wrong. "
+        "Calibrate it at rest. Where speeds are held against it a constant one is taken out."
     )
 
 

@@ -30,7 +30,7 @@ _MOMENT_S = 0.15  # of which a row must be likely, to be worth a check
 _CERTAIN = 0.99  # probability of any fault from which on even brief noise is worth a check
 _LOST = 0.9  # ε̂ from which on so little is left that the part is as good as without signal
 _EVEN = 0.5  # that a part delivers nothing usable, from which on that is what is said
-_PROBABLY_TOTAL = 0.75  # that the named side is stuck or without signal, from which on the machine is stopped, ...
+PROBABLY_TOTAL = 0.75  # that the named side is stuck or without signal, from which on the machine is stopped, ...
 _MAY_BE_TOTAL = 0.25  # ... and from which on it is looked at before the machine goes out
 HALF = 0.5  # of ε: a part that may have lost so much is no fault to drive on with
 _ALONE = "This alone is no reason to stop; check it before it grows."
@@ -97,9 +97,9 @@ def _severity_of_total(
                 "Faulty, but which part is not certain enough to stop for: check sensor and {valve} before the next mission."
             ),
         )
-    if risk_of(finding) < _PROBABLY_TOTAL and finding.side is Side.SENSOR and seconds <= limits.brief:
+    if risk_of(finding) < PROBABLY_TOTAL and finding.side is Side.SENSOR and seconds <= limits.brief:
         return Severity.LOW, "Short, and its kind is not clear: check plug and cable at the next service."
-    if risk_of(finding) < _PROBABLY_TOTAL:
+    if risk_of(finding) < PROBABLY_TOTAL:
         likely = "Probably" if risk_of(finding) >= _EVEN else "It may be"
         return (
             Severity.MEDIUM,

@@ -11,7 +11,7 @@ from diagnosis.results.durations import seconds_words
 from diagnosis.results.ending import Ending
 from diagnosis.results.fault_rows import mode_words
 from diagnosis.results.machine_words import MachineWords
-from diagnosis.results.recurring import OFTEN, counted
+from diagnosis.results.recurring import OFTEN, Seen, counted
 from diagnosis.results.result import FaultInterval
 from diagnosis.results.sizes import gain_words, loss_known
 from diagnosis.results.vocabulary import Kind, Severity
@@ -33,16 +33,25 @@ def actions_of(intervals: Sequence[FaultInterval], words: MachineWords) -> tuple
 def count_faults(stop: Sequence[FaultInterval], watch: Sequence[FaultInterval]) -> str:
     """How many faults there are, and on how many parts where that is another number: ``6 faults to repair, 2 to watch, on 5 parts``.
 
-    What comes again and again is one fault: ``1 fault to watch, seen 175 times``.
+    What comes again and again is one fault, as severe as the worst of it: ``1 fault to watch, seen 175 times``.
     """
     lists = [(faults, what) for faults, what in ((stop, "to repair"), (watch, "to watch")) if faults]
-    (n, what), *more = [(counted((f.component, f.side, f.mode) for f in faults), what) for faults, what in lists]
+    counts = [
+        (n, what)
+        for n, (_, what) in zip(counted([[_seen(f) for f in own] for own, _ in lists]), lists, strict=True)
+        if n
+    ]
+    (n, what), *more = counts
     words = ", ".join([f"{count_words(n, 'fault')} {what}", *(f"{n} {what}" for n, what in more)])
     every, parts = n + sum(n for n, _ in more), len({(f.component, f.side) for f in (*stop, *watch)})
     times = len(stop) + len(watch)
     if every == 1 < times:
         return f"{words}, seen {times} times"
     return words if parts == every else f"{words}, on {count_words(parts, 'part')}"
+
+
+def _seen(f: FaultInterval) -> Seen:
+    return Seen(f.component, f.side.value, f.mode.value, tuple((h.mode, h.p) for h in f.hypotheses))
 
 
 def _by_part(intervals: Sequence[FaultInterval]) -> list[list[FaultInterval]]:

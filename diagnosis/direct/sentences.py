@@ -11,7 +11,7 @@ from diagnosis.direct.shape import shape_sentence
 from diagnosis.estimation.fault_models import TOTAL_ROWS
 from diagnosis.results.result import Epsilon
 from diagnosis.results.sentence import About, Sentence
-from diagnosis.results.sizes import amount, kept_to, times_as_probable
+from diagnosis.results.sizes import amount, kept_to, probable_words
 from replay.faults import FaultMode
 
 END_SENTENCE = (
@@ -52,9 +52,7 @@ def sentences(isolated: Isolated, found: IdentifiedPair, mode: FaultMode, epsilo
         out.append(Sentence(About.DEVIATION, words))
     if mode is FaultMode.OUTSIDE_TABLE:
         out.append("The gain is outside 0…1, which no row of the tables describes.")
-    out.append(
-        Sentence(About.TIMES, f"{pair.y_name} is {times_as_probable(isolated.gain)} with this fault as without one.")
-    )
+    out.append(Sentence(About.TIMES, f"{pair.y_name} is {probable_words(isolated.gain)}."))
     return tuple(out)
 
 

@@ -28,7 +28,7 @@ from diagnosis.results.assessment import Finding
 from diagnosis.results.fault_rows import ROWS, codes
 from diagnosis.results.result import Hypothesis
 from diagnosis.results.sentence import About, Sentence
-from diagnosis.results.sizes import kept_to, times_as_probable
+from diagnosis.results.sizes import kept_to, probable_words
 from diagnosis.results.vocabulary import Tier
 from replay.faults import FaultMode, Side
 from replay.machine.config import Limits
@@ -242,7 +242,5 @@ def _sentences(isolated: Isolated, pair: SpeedPair, delta: float) -> tuple[str, 
             f"The logged speed is not the one that the controller acted on (difference {deviation:.3g} {{speed_unit}} root mean square), "
             "so the drive follows its command and the channel of the speed is faulty."
         )
-    out.append(
-        Sentence(About.TIMES, f"{pair.name} is {times_as_probable(isolated.gain)} with this fault as without one.")
-    )
+    out.append(Sentence(About.TIMES, f"{pair.name} is {probable_words(isolated.gain)}."))
     return tuple(out)

@@ -12,6 +12,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from diagnosis.estimation.healthy_gaps import parted
 from diagnosis.estimation.simple_causes import Cause, Measured, below_limit, causes, every_power, power
 from diagnosis.results.assessment import Finding
 from diagnosis.results.result import Hypothesis
@@ -75,7 +76,11 @@ def with_one_cause(findings: Sequence[Finding], measured: Measured) -> list[Find
             near, cause = wide, offset  # what a loss, say, explains of a part is an offset's by the rest
         told = cause is None or (cause.alone and all(f.mode == cause.mode for f in near))
         small = cause is not None and below_limit(cause, measured) and all(f.mode.varying for f in near)
-        out += near if told or small or cause is None else [joined(near, cause)]
+        if told or small or cause is None:
+            out += near
+            continue
+        parts = parted(near, cause, measured)
+        out += [joined(near, cause)] if len(parts) < 2 else [f for p in parts for f in with_one_cause(p, measured)]
     return out
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from diagnosis.comparison.words import CHANGES, OUTCOMES, SIGNS, coverage_head, coverage_words, times
+from diagnosis.comparison.words import CHANGES, OUTCOMES, SIGNS, coverage_head, coverage_words, row_of_found, times
 from diagnosis.pages import labels
 from diagnosis.report.judged_parts import kind_of
 from diagnosis.report.tables import Context
@@ -15,7 +15,6 @@ from diagnosis.results.comparison_document import (
     SideCoverageRow,
 )
 from diagnosis.results.document import MachineRow, ReportDocument
-from diagnosis.results.fault_rows import state_label
 from diagnosis.results.machine_words import MachineWords, words_of
 from diagnosis.results.size_rows import EpsilonRow
 from diagnosis.results.vocabulary import Tier, Verdict
@@ -71,14 +70,14 @@ def _mission(m: OtherMissionRow) -> Context:
 def _row(c: FaultChangeRow, words: MachineWords) -> Context:
     outcome = c["trend"] or c["status"]
     both = [c["older"], c["newer"]]
-    modes = {f["mode"]: (f["mode"], state_label(f["mode"], f["side"])) for f in both if f}
+    modes = dict.fromkeys(row_of_found(f["mode"], f["side"], f.get("rows", ())) for f in both if f)
     changes = ", ".join(CHANGES[n] for n in c["changes"])
     return {
         "sign": SIGNS[outcome],
         "outcome": OUTCOMES[outcome],
         "bad": outcome in _BAD,
         "part": words.part_words(c["kind"], c["component"], c["side"]),
-        "modes": list(modes.values()),
+        "modes": list(modes),
         "cells": [_found(f) for f in both],
         "ids": [f["ids"][:3] if f else [] for f in both],
         "more": "; ".join(x for x in (changes, c["note"]) if x),
@@ -90,7 +89,9 @@ def _found(f: FoundFaultRow | None) -> str:
         return "–"
     e = f["epsilon"]
     size = "" if e is None or FaultMode(f["mode"]).total else f", ε̂ {_epsilon(e)}"
-    return f"{f['severity']}, {times(len(f['ids']), f['seconds'])}{size}"
+    return (
+        f"{f['severity']}, {times(len(f['ids']), f['seconds'])}, {min(100 * f['probability'], 99.9):.0f} % sure{size}"
+    )
 
 
 def _epsilon(e: EpsilonRow) -> str:

@@ -18,6 +18,7 @@ from diagnosis.response.machine import Judged
 from diagnosis.response.spells import Spell
 from diagnosis.response.turning import Turning, difference, fitted
 from diagnosis.results.machine_event import GYRO_CONSTANT, GYRO_REST, GYRO_SLIP
+from diagnosis.results.sizes import turn
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -160,7 +161,7 @@ def _constant(about: _Spread, part: slice, use_of: tuple[Flags, Flags, Flags], b
         or not helps
     ):
         return ""
-    return f"reads {constant:+.2g} {GYRO_CONSTANT}"
+    return f"reads {turn(constant, sign='+')} {GYRO_CONSTANT}"
 
 
 def _only(where: Flags, part: slice) -> Flags:
@@ -188,8 +189,8 @@ def _kind(about: _Spread, part: slice, sound: Flags, block_s: float) -> str:
     if np.std(measured) < max(2.0 * about.noise, _STILL * about.usual) and turns and np.ptp(made) > about.usual:
         value = float(np.mean(measured))
         none = abs(value) < _ASIDE * about.usual
-        said, held = ("gives next to nothing", _HELD) if none else (f"stays at {value:.2g} rad/s", "")
-        return f"{said} while the {{wheels}} turn the machine at up to {np.max(np.abs(made)):.2g} rad/s{held}"
+        said, held = ("gives next to nothing", _HELD) if none else (f"stays at {turn(value)}", "")
+        return f"{said} while the {{wheels}} turn the machine at up to {turn(float(np.max(np.abs(made))))}{held}"
     size = float(np.sqrt(np.mean((measured - made) ** 2)))
     constant = float(np.mean(measured - made))
     gain = float(made @ measured) / max(float(made @ made), 1e-12)
@@ -198,11 +199,11 @@ def _kind(about: _Spread, part: slice, sound: Flags, block_s: float) -> str:
         return ""
     if by_constant < by_gain:
         aside = abs(constant) > _ASIDE * about.usual
-        return f"reads {constant:+.2g} {GYRO_CONSTANT}" if aside else ""
+        return f"reads {turn(constant, sign='+')} {GYRO_CONSTANT}" if aside else ""
     if not turns or abs(gain - 1.0) < _SAME:
         return ""
     if abs(gain) < _NOTHING:
-        return f"gives next to nothing while the {{wheels}} turn the machine at up to {np.max(np.abs(made)):.2g} rad/s{_HELD}"
+        return f"gives next to nothing while the {{wheels}} turn the machine at up to {turn(float(np.max(np.abs(made))))}{_HELD}"
     ground = f", {GYRO_SLIP}" if 0.0 < gain < 1.0 else ""
     return f"reads {gain:.2f} × what the {{wheels}} make{ground}"
 

@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from diagnosis.results.sizes import turn
 from replay.signals.timeline import Timeline
 
 Array = NDArray[np.float64]
@@ -168,7 +169,7 @@ def _told(made: Array, measured: Array, span: tuple[int, int], which: str, block
     gyro, odometry = (float(np.median(np.abs(x[known]))) for x in (measured, made))
     head = (
         f"From {span[0] * block_s:.1f} to {span[1] * block_s:.1f} s the gyro (imu.yaw_rate) and the heading of odometry (odom.yaw) contradict each "
-        f"other: {gyro:.2g} and {odometry:.2g} rad/s (medians), where they otherwise agree"
+        f"other: {turn(gyro)} and {turn(odometry)} (medians), where they otherwise agree"
     )
     return (
         head

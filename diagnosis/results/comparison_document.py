@@ -61,7 +61,9 @@ class FoundFaultRow(TypedDict):
     epsilon: EpsilonRow | None
     probability: float
     tier: Tier
-    recovered: NotRequired[bool]  # missing in documents of earlier versions
+    recovered: NotRequired[bool]  # missing in documents of earlier versions, as are the following
+    rows: NotRequired[list[str]]  # that it may be, where none has the majority
+    longest_s: NotRequired[float]
 
 
 class FaultChangeRow(TypedDict):

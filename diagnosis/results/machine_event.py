@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from diagnosis.results.machine_words import MachineWords
 
 #: What a sentence on a gyro has in it where it is off by a constant, and where the ground is named already.
-GYRO_CONSTANT, GYRO_SLIP = "rad/s more than the {wheels} make", "unless the ground let them slip"
+GYRO_CONSTANT, GYRO_SLIP = "more than the {wheels} make", "unless the ground let them slip"
 GYRO_OTHERWISE = "Gyro and steering angles contradict each other"
 GYRO_REST = ", where they rest as well"  # so that no slip makes it
 

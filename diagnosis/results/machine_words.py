@@ -137,8 +137,8 @@ class MachineWords:
         """
         if unit == OPENING:
             return f"{plain(100 * value, digits)}{self.percent}"
-        if unit == "rad":
-            return f"{plain(math.degrees(value), digits)}°"
+        if unit in ("rad", "rad/s") and unit != self.speed_unit:
+            return f"{plain(math.degrees(value), digits)}°{unit.removeprefix('rad')}"
         return f"{plain(value, digits)} {self.unit(unit)}".rstrip()
 
     def fill(self, text: str) -> str:

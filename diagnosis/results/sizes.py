@@ -7,7 +7,7 @@ import math
 from diagnosis.results.plain_numbers import plain
 from replay.machine.quantities import OPENING
 
-_MOST, _LEAST = 1e6, 1.5
+_MOST, _LEAST, _LESS = 1e6, 1.5, "less probable"
 _WIDEST = 0.95  # 95 % bounds of a loss that are as wide say nothing of it
 
 
@@ -22,14 +22,14 @@ def gain_words(epsilon: float) -> str:
 
 
 def amount(value: float, unit: str, digits: int = 3) -> str:
-    """A value with its unit, for `MachineWords.fill`: ``0.31 {speed_unit}``, of a command ``2.1{percent}``, an angle in degrees.
+    """A value with its unit, for `MachineWords.fill`: ``0.31 {speed_unit}``, of a command ``2.1{percent}``, an angle or a turn in degrees.
 
     Parameters
     ----------
     value : float
         The value, in `unit`.
     unit : str
-        As recorded: m/s, rad, a fraction of full opening.
+        As recorded: m/s, rad, rad/s of a machine or an axle that turns, a fraction of full opening.
     digits : int
         Significant digits.
     """
@@ -37,7 +37,18 @@ def amount(value: float, unit: str, digits: int = 3) -> str:
         return f"{plain(100 * value, digits)}{{percent}}"
     if unit == "rad":
         return f"{plain(math.degrees(value), digits)}°"
+    if unit == "rad/s":
+        return turn(value, digits)
     return f"{plain(value, digits)} {'{speed_unit}' if unit == 'm/s' else unit}".rstrip()
+
+
+def turn(value: float, digits: int = 2, sign: str = "") -> str:
+    """How fast something turns in words, ``5.7°/s``, as the page shows it.
+
+    `value` in rad/s; `sign` ``+``: with its sign always.
+    """
+    words = plain(math.degrees(value), digits)
+    return f"{sign if value > 0.0 else ''}{words}°/s"
 
 
 def kept_to(least: float, most: float, unit: str) -> str:
@@ -64,6 +75,15 @@ def not_reported(below: int, name: str) -> str:
     return f"{many} below the limits from which a deviation counts as a fault, and not reported."
 
 
+def probable_words(log_evidence: float, this: str = "with this fault", other: str = "without one") -> str:
+    """How probable a channel is, to follow *is*: ``about 3 000 times as probable with this fault as without one``.
+
+    A difference of natural logarithms [1].
+    """
+    words = times_as_probable(log_evidence)
+    return f"{words} {this} {'than' if words == _LESS else 'as'} {other}"
+
+
 def times_as_probable(log_evidence: float) -> str:
     """A log-evidence in words, to be followed by *with this fault as without*: ``about 3 000 times as probable``.
 
@@ -73,7 +93,7 @@ def times_as_probable(log_evidence: float) -> str:
         return "more than a million times as probable"
     times = math.exp(log_evidence)
     if times < _LEAST:
-        return "about as probable" if times > 1.0 / _LEAST else "less probable"
+        return "about as probable" if times > 1.0 / _LEAST else _LESS
     rounded = float(f"{times:.1g}") if times >= 10.0 else float(f"{times:.2g}")
     return (
         f"about {rounded:,.0f}".replace(",", "\u202f") + " times as probable"

@@ -13,7 +13,7 @@ from diagnosis.results.fault_rows import mode_words
 from diagnosis.results.machine_words import part_token
 from diagnosis.results.result import Epsilon, Hypothesis
 from diagnosis.results.sentence import About, Sentence
-from diagnosis.results.sizes import amount, times_as_probable
+from diagnosis.results.sizes import amount, probable_words
 from diagnosis.results.vocabulary import Kind, Tier
 from diagnosis.steering.dead_readings import LEAST_ASKED_S, at_rest, lapse
 from diagnosis.steering.excitation import asked
@@ -249,8 +249,8 @@ def _may_be_stated(choice: _Choice, epsilon: Epsilon | None, run: _Run) -> bool:
 def _sentences(choice: _Choice, gain: float, ranked: Sequence[tuple[Fault, float]], run: _Run) -> tuple[str, ...]:
     """What decided, one sentence each."""
     channel = run.axle.names[0]
-    more = times_as_probable(gain)
-    words = f"Over {run.seconds:.2f} s {channel} is {more} with “{_words((choice.side, choice.mode))}” as with a healthy axle."
+    more = probable_words(gain, f"with “{_words((choice.side, choice.mode))}”", "with a healthy axle")
+    words = f"Over {run.seconds:.2f} s {channel} is {more}."
     lines: list[str] = [Sentence(About.TIMES, words)]
     if choice.dead_sensor:
         level, spread, count = level_of(run.start, run.stop, run.axle)

@@ -13,7 +13,7 @@ from diagnosis.results.fault_rows import mode_words
 from diagnosis.results.machine_words import part_token
 from diagnosis.results.result import Hypothesis
 from diagnosis.results.sentence import About, Sentence
-from diagnosis.results.sizes import kept_to, times_as_probable
+from diagnosis.results.sizes import kept_to, probable_words
 from diagnosis.results.vocabulary import Kind, Tier
 from diagnosis.wheels.estimates import estimate
 from diagnosis.wheels.models import (
@@ -251,7 +251,7 @@ def _sentences(
     lines: list[str] = [Sentence(About.CASES, words, f"{100 * share:.0f}", " of 100 cases.")]
     ahead = run.ahead(m)
     if ahead > 0:
-        words = f"{names[0]} is {times_as_probable(ahead)} by its Kalman model as by that of a healthy {{wheel}}."
+        words = f"{names[0]} is {probable_words(ahead, 'by its Kalman model', 'by that of a healthy {wheel}')}."
         lines.append(Sentence(About.TIMES, words))
     else:
         lines.append(NOT_PREFERRED)

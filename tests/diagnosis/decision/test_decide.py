@@ -381,8 +381,8 @@ def test_what_comes_again_and_again_is_one_fault_with_its_course() -> None:
     assert alone.title == "1 fault to watch, seen 7 times"
     assert alone.text == "The FR speed sensor was without signal for 700 ms in 7 gaps from 1.0 to 7.1 s."
     assert "in 7 gaps from 1.0 to 7.1 s" in str(alone.actions[0]["text"])
-    few = verdict(machine(FR_sensor=assessed(*gaps[:4])))
-    assert few.title == "4 faults to watch, on 1 part"
+    few = verdict(machine(FR_sensor=assessed(*gaps[:2])))
+    assert few.title == "2 faults to watch, on 1 part"
     beside = finding(Side.ACTUATOR, FaultMode.INEFFICIENT, 3000, 9000, epsilon=0.3)
     both = verdict(machine(FR_sensor=assessed(*gaps), FL_actuator=assessed(beside)))
     assert both.title == "2 faults to watch"

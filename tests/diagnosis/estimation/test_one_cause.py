@@ -39,6 +39,14 @@ def measured(change: Callable[[Array], Array]) -> Measured:
     return Measured(y, X, np.ones(SIZE, np.bool_), DT, ("a", "b"), "m/s", NOISE, 0.02)
 
 
+def test_pieces_with_a_healthy_second_between_them_are_not_joined() -> None:
+    apart = pieces(((1000, 1400, FaultMode.STUCK), (1500, 1600, FaultMode.NOISY), (1900, 2100, FaultMode.NOISY)))
+    where = (T >= 10.0) & (T < 16.0)
+    found = with_one_cause(apart, measured(lambda x: x + 0.08 * (where | (T >= 19.0))))
+    assert [(f.start, f.stop) for f in found] == [(1000, 1600), (1900, 2100)]
+    assert "0.08" in found[0].evidence[0]
+
+
 @pytest.mark.parametrize(
     ("change", "mode", "words"),
     [

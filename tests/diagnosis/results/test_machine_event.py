@@ -8,7 +8,7 @@ from diagnosis.results.machine_event import GYRO_CONSTANT, GYRO_SLIP, gyro_or_sl
 
 
 @pytest.mark.parametrize(
-    "what", [f"reads -0.095 {GYRO_CONSTANT}", f"reads 0.30 × what the {{wheels}} make, {GYRO_SLIP}"]
+    "what", [f"reads -5.4°/s {GYRO_CONSTANT}", f"reads 0.30 × what the {{wheels}} make, {GYRO_SLIP}"]
 )
 def test_slip_is_named_and_looked_for_first(what: str) -> None:
     event = gyro_or_slip(f"From 1.0 to 5.0 s the gyro (imu.yaw_rate) {what}.")
@@ -19,7 +19,7 @@ def test_slip_is_named_and_looked_for_first(what: str) -> None:
 
 def test_a_gyro_that_stays_is_the_gyros() -> None:
     event = gyro_or_slip(
-        "From 1.0 to 5.0 s the gyro (imu.yaw_rate) stays at 0.2 rad/s while the {wheels} turn the machine."
+        "From 1.0 to 5.0 s the gyro (imu.yaw_rate) stays at 11°/s while the {wheels} turn the machine."
     )
     assert event.title == "The gyro contradicts the {wheels}"
     assert "lip" not in event.text
