@@ -117,7 +117,13 @@ def check(
     count = len(machine.signals)
     still = open_questions(file)
     open_ = _still_asked(still)
-    terminal.show(f"{file}: valid. {machine.name}, wheels {', '.join(machine.wheels)}, {count} signals given.{open_}")
+    parts = f"{machine.part}s {', '.join(machine.wheels)}{_free(machine)}"
+    terminal.show(f"{file}: valid. {machine.name}, {parts}, {count} signals given.{open_}")
+
+
+def _free(machine: Machine) -> str:
+    """Which of the wheels have no drive, in brackets; empty where all have one."""
+    return f" ({', '.join(machine.unpowered)} without a drive)" if machine.unpowered else ""
 
 
 def _still_asked(questions: int) -> str:

@@ -176,7 +176,7 @@ def _at_rest(cells: Cells) -> Iterator[MachineEvent]:
     speeds, v, _ = _common(cells)
     asked, top = _median(cells.reference), cells.machine.max_speed
     command, opening = cells.wheels("u"), cells.wheels("u_applied")
-    used = _median(np.where(np.isfinite(opening), opening, command))
+    used = _median(np.where(np.isfinite(opening), opening, command)[:, cells.driven])
     with np.errstate(invalid="ignore"):
         stands = (asked <= _STANDS * top) & (used <= _CLOSED)
         # every wheel of which nothing is stated, of more than half

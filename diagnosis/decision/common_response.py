@@ -22,11 +22,11 @@ _LOW, _HIGH = 0.2, 0.8  # quantiles of the differences of all levels, which must
 def common_change(cells: Cells) -> tuple[float, float] | None:
     """By how much all wheels' speed per opening changes at least at the same speeds [ln], and when [s]; None where little is driven alike before and after."""
     speed, command, opening = (cells.wheels(leaf) for leaf in ("v", "u", "u_applied"))
-    if speed.shape[1] < _WHEELS:
+    if len(cells.driven) < _WHEELS:
         return None
     used = np.where(np.isfinite(opening), opening, command)
     found = responses_of(cells, speed, used, cells.reference, over_time=False)
-    own = found.own
+    own = found.own[:, cells.driven]
     known = np.isfinite(own).sum(axis=1) >= _KNOWN * own.shape[1]
     common = np.full(len(own), np.nan)
     common[known] = np.nanmedian(own[known], axis=1)

@@ -211,6 +211,7 @@ def assess_response(
             width * dt,
         )
         for w in judged
+        if not judged[w].data.unpowered
     }
     weak = {w: without_consequences(found, w, judged, width) for w, found in weak.items()}
     late = late_wheels(judged, width * dt)
@@ -232,7 +233,8 @@ def assess_response(
     kept = {w: [x for x in spells if x not in nobodys[w]] for w, spells in kept.items()}
     kept = {w: [x for x in spells if not late_neighbour(x, w, late, width)] for w, spells in kept.items()}
     parts = {
-        w: sides_of(j, kept[w], (weak[w], late[w]), (left_out[w], together), limits, dt) for w, j in judged.items()
+        w: sides_of(j, kept[w], (weak.get(w, []), late[w]), (left_out[w], together), limits, dt)
+        for w, j in judged.items()
     }
     parts = {
         w: (

@@ -50,6 +50,8 @@ class MachineIdentity(TypedDict):
 class MachineRow(MachineIdentity, Worded):
     """The machine, where its settings come from, and in `assumed` which numbers are the paper's machine's for want of its own.
 
+    `unpowered` has the wheels without a drive, of which only the speed is judged; absent where all have one.
+
     Speeds are in `words.speed_unit`, which is m/s but for joints.
     """
 
@@ -58,6 +60,7 @@ class MachineRow(MachineIdentity, Worded):
     geometry: dict[str, WheelPlace] | None
     source: str
     assumed: list[str]
+    unpowered: NotRequired[list[str]]
 
 
 class ReadingRow(TypedDict):
