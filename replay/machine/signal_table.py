@@ -94,11 +94,11 @@ class CanonicalSignal:
 _OF_DRIVES = frozenset({"u", "u_applied", "effort", "psi", "pressure_a", "pressure_b"})
 _VALVE_POSITION = Named(
     0,
-    r"(valve|spool)_?(\d+_)?(act|actual|fb|feedback|meas|measured|pos|position|ist)|(act|actual|fb|feedback|meas|measured|ist)_?valve|spool|^u_?applied",
+    r"(valve|spool)_?(\d+_)?(act|actual|fb|feedback|meas|measured|pos|position|ist)|(act|actual|fb|feedback|meas|measured|ist)_?valve|spool|^u_?applied|^u_?(act|actual|ist|meas|fb)$",
 )
 _VALVE = Named(
     1,
-    r"valve_?(\d+_)?(cmd|command|out|set|ref|soll)|(cmd|command|set|ref|soll)_?valve|valve$|^u_?cmd|control_?(out|cmd)|^u$",
+    r"valve_?(\d+_)?(cmd|command|out|set|ref|soll)|(cmd|command|set|ref|soll)_?valve|valve$|^u_?cmd|^u_?(set|ref|soll|des|target)$|control_?(out|cmd)|^u$",
 )
 _SPEED_COMMAND = (
     r"(velo(city)?|speed|vel|rpm|drehzahl|geschw\w*)_?(ref|cmd|command|set|des|target|soll)|"
@@ -151,8 +151,22 @@ CANONICAL: tuple[CanonicalSignal, ...] = (
     _Entry("steer", "u", "fraction", "valve command u_s", 9, _VALVE),
     _Entry("steer", "u_applied", "fraction", "measured valve position", 11, _VALVE_POSITION),
     _Entry("imu", "yaw_rate", "rotation", "measured yaw rate", 12, Named(0, _YAW_RATE)),
-    _Entry("gnss", "lat", "position_deg", "latitude", None, Named(1, r"(gnss|gps).*lat")),
-    _Entry("gnss", "lon", "position_deg", "longitude", None, Named(2, r"(gnss|gps).*lon")),
+    _Entry(
+        "gnss",
+        "lat",
+        "position_deg",
+        "latitude",
+        None,
+        Named(1, r"(gnss|gps).*lat|(^|_)(latitude|breitengrad)(_(deg|grad))?$"),
+    ),
+    _Entry(
+        "gnss",
+        "lon",
+        "position_deg",
+        "longitude",
+        None,
+        Named(2, r"(gnss|gps).*lon|(^|_)(longitude|laengengrad)(_(deg|grad))?$"),
+    ),
     _Entry(
         "gnss",
         "speed",

@@ -31,7 +31,8 @@ from replay.signals.steering_command import turn_by_steering
 from replay.signals.to_si import Converted, choose_motor_or_wheel, convert, usable_unit
 from replay.signals.unfilled import unfilled, unfilled_note
 from replay.signals.unit_doubts import Doubt, doubt, questions
-from replay.signals.unsure_names import NOT_USED, Unsure, unsure
+from replay.signals.unsure_kinds import Unsure
+from replay.signals.unsure_names import NOT_USED, unsure
 
 #: Why a signal is missing for which nothing was found.
 NO_CHANNEL = "no channel fits by its name or message type"
