@@ -28,6 +28,7 @@ from diagnosis.results.assessment import CODE
 from diagnosis.results.clearing import Checked, clearing_rows
 from diagnosis.results.detectability import Detectability, detectability_table
 from diagnosis.results.document import SCHEMA, CoverageRow, MachineRow, ReportDocument
+from diagnosis.results.event_times import event_rows
 from diagnosis.results.loss import loss_rows
 from diagnosis.results.machine_event import GYRO_OTHERWISE, MachineEvent
 from diagnosis.results.result import FaultInterval, to_json
@@ -176,6 +177,8 @@ def report_of_mission(judged: Judged, identity: MachineRow) -> ReportDocument:
         ),
         "limits": to_json(machine.limits),
     }
+    if events := _events(judged):
+        report["events"] = event_rows(events, timeline.size * timeline.dt)
     plain: ReportDocument = to_json(report)
     return plain
 

@@ -11,6 +11,7 @@ from typing import Final, Literal, NotRequired, TypedDict
 from diagnosis.results.clearing_rows import ClearingRow, DetectabilityTable
 from diagnosis.results.comparison_document import PreviousRow
 from diagnosis.results.document_numbers import Probability, Seconds
+from diagnosis.results.event_row import EventRow
 from diagnosis.results.fleet_note_row import FleetNoteRow
 from diagnosis.results.log_rows import LogRow
 from diagnosis.results.loop_rows import MetricsRow
@@ -265,7 +266,7 @@ class ReportDocument(TypedDict):
     """`report.json`: one mission, its verdict, faults, states, coverage and data.
 
     `previous` is there where the mission was compared with another one of the machine; `fleet` in the newest report of an audited machine
-    where the fleet knows more than the mission.
+    where the fleet knows more than the mission; `events` where something happened to the machine as a whole, the verdict's first.
     """
 
     schema: Literal["mfhca-report/1"]
@@ -275,6 +276,7 @@ class ReportDocument(TypedDict):
     readings: list[ReadingRow]
     verdict: VerdictRow
     intervals: list[IntervalRow]
+    events: NotRequired[list[EventRow]]
     states: list[StateRow]
     phases: list[PhaseRow]
     coverage: list[CoverageRow]
