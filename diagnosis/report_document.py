@@ -36,6 +36,7 @@ from diagnosis.results.vocabulary import Kind, Tier
 from replay.control.loop import Replay
 from replay.faults import Side, State
 from replay.machine.config import Machine
+from replay.machine.unpowered import is_contradicted
 from replay.mission import Mission
 from replay.setup.places import place_doubts
 from replay.signals.like_wheels import WHICH
@@ -229,6 +230,7 @@ def _decision(
         events=_events(judged),
         hints=(
             *_of_units(judged),
+            *(f"{note}." for note in judged.mission.signals.notes if is_contradicted(note)),
             *(h.text for h in judged.hints),
             *([s.gross] if (s := judged.scale) is not None and s.gross else []),
         ),

@@ -59,10 +59,40 @@ def check_unpowered(
         )
 
 
+_CONTRADICTED = "by machine.unpowered has no drive, and the log has what would be its drive's"
+
+
+def drive_in_log(found: Mapping[str, str], unpowered: Collection[str]) -> tuple[str, ...]:
+    """Sentences on wheels without a drive of which a log has an opening, an effort or a pressure that changes.
+
+    Parameters
+    ----------
+    found : Mapping[str, str]
+        Labels of channels that change and may be signals by their names, by signal.
+    unpowered : Collection[str]
+        Wheels without a drive.
+    """
+    of: dict[str, str] = {}
+    for name, label in found.items():
+        if is_of_no_drive(name, unpowered):
+            of.setdefault(name.split(".")[1], label)
+    return tuple(f"{wheel} {_CONTRADICTED} ({label}): correct the machine file" for wheel, label in of.items())
+
+
+def is_contradicted(note: str) -> bool:
+    """Whether a note is one of `drive_in_log`."""
+    return _CONTRADICTED in note
+
+
+def is_of_no_drive(name: str, unpowered: Collection[str]) -> bool:
+    """Whether a signal is of the drive of a wheel that has none."""
+    entry = find_signal(name)
+    return entry is not None and entry.of_drive and name.split(".")[1] in unpowered
+
+
 def check_name(section: str, name: str, unpowered: Collection[str]) -> None:
     """Raise `ConfigError` where a signal is of the drive of a wheel that has none."""
-    entry, part = find_signal(name), name.split(".")[1]
-    if entry is not None and entry.of_drive and part in unpowered:
+    if is_of_no_drive(name, unpowered):
         raise ConfigError(
-            f"[{section}] {name!r} is of a drive, and machine.unpowered says that {part} has none: leave out one of the two"
+            f"[{section}] {name!r} is of a drive, and machine.unpowered says that {name.split('.')[1]} has none: leave out one of the two"
         )

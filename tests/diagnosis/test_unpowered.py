@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from functools import cache
+from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from diagnosis.clearing.forecast import forecast
 from diagnosis.decision.quality import missing_rows
-from diagnosis.pipeline import diagnose_mission
+from diagnosis.pipeline import diagnose, diagnose_mission
 from diagnosis.report.machine_picture import machine_picture
 from diagnosis.report.timeline import timeline
 from diagnosis.results.document import ReportDocument
@@ -105,3 +108,17 @@ def test_no_fault_of_its_drive_can_be_injected() -> None:
     fault = FaultSpec("RR", Side.ACTUATOR, FaultMode.NO_SIGNAL, 5.0, 8.0)
     with pytest.raises(ConfigError, match="RR: it has no drive"):
         check_faults([fault], TRUCK, mission().signals, 60.0, InjectionOptions())
+
+
+@pytest.mark.parametrize(("moves", "cleared"), [(True, False), (False, True)])
+def test_a_drive_that_is_in_the_log_all_the_same_keeps_the_machine_in(
+    tmp_path: Path, moves: bool, cleared: bool
+) -> None:
+    one = simulated("direct", (), 40.0, 100.0)
+    kept = {n: x for n, x in one.columns.items() if re.search(KEPT, n) or n == "wheel.RR.u"}
+    if not moves:  # a controller that logs four channels, and uses two
+        kept["wheel.RR.u"] = np.zeros(one.stamps.size)
+    pd.DataFrame({"time": (one.stamps - one.stamps[0]) * 1e-9, **kept}).to_csv(tmp_path / "a.csv", index=False)
+    verdict = diagnose([tmp_path / "a.csv"], TRUCK).report["verdict"]
+    assert verdict["cleared"] is cleared
+    assert moves is ("RR by machine.unpowered has no drive, and the log has" in verdict["text"])

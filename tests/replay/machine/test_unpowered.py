@@ -10,6 +10,7 @@ from replay.errors import ConfigError
 from replay.machine.config import Machine
 from replay.machine.toml_file import load_machine
 from replay.machine.toml_text import dump_machine
+from replay.machine.unpowered import drive_in_log, is_contradicted
 
 TRUCK = """
 [machine]
@@ -66,3 +67,14 @@ def test_mistakes_are_named(tmp_path: Path, value: str, said: str) -> None:
     with pytest.raises(ConfigError) as error:
         load(tmp_path, TRUCK.replace('["RR", "RL"]', value))
     assert said in str(error.value)
+
+
+def test_a_log_with_what_drives_it_is_told() -> None:
+    found = {"wheel.RR.u": "u_RR", "wheel.RR.u_applied": "pos_RR", "wheel.FR.u": "u_FR", "wheel.RL.v": "v_RL"}
+    (note,) = drive_in_log(found, ("RR", "RL"))
+    assert (
+        note
+        == "RR by machine.unpowered has no drive, and the log has what would be its drive's (u_RR): correct the machine file"
+    )
+    assert is_contradicted(note)
+    assert drive_in_log(found, ()) == ()
