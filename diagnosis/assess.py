@@ -10,6 +10,7 @@ from diagnosis.channels.liveness import alive_sources
 from diagnosis.evidence import ACTUATOR, SENSOR, MissionView, Part
 from diagnosis.families import AXLES, SINGLE, whole
 from diagnosis.results.assessment import Assessment, unassessed
+from diagnosis.results.free_wheels import only_rolls
 from diagnosis.results.limited import believed
 from diagnosis.results.machine_event import MachineEvent
 from diagnosis.results.machine_words import HYDRAULIC, MachineWords, machine_words
@@ -59,8 +60,14 @@ def assess_components(
     mission = _measured(mission)
     for family in whole(mission):
         mission = mission.after(family.assess(mission))
-    parts = [(component, side) for component in (*chosen, *machine.axles) for side in (SENSOR, ACTUATOR)]
+    parts = [
+        (component, side)
+        for component in (*chosen, *machine.axles)
+        for side in (SENSOR, ACTUATOR)
+        if side == SENSOR or component not in machine.unpowered
+    ]
     found = {part: mission.known.get(part) or _without_evidence(mission, *part) for part in parts}
+    found = {part: only_rolls(a) if part[0] in machine.unpowered else a for part, a in found.items()}
     words = machine_words(machine, timeline.signals if logged is None else logged)
     return ComponentResult(
         {part: worded(believed(a), words) for part, a in found.items()},

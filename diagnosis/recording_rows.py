@@ -84,7 +84,7 @@ def machine_row(machine: Machine, mission: Mission, source: str, machine_id: str
         geometry = {
             w: {"x": g.x, "y": g.y, "offset": g.offset, "axle": g.axle} for w, g in machine.geometry.wheels.items()
         }
-    return {
+    row: MachineRow = {
         "name": machine.name,
         "id": machine_id or stated_machine(f.summary.metadata for f in mission.files) or machine.id,
         "wheels": list(machine.wheels),
@@ -94,3 +94,6 @@ def machine_row(machine: Machine, mission: Mission, source: str, machine_id: str
         "assumed": assumed_words(machine),
         "words": machine_words(machine, mission.signals.items).row(),
     }
+    if machine.unpowered:
+        row["unpowered"] = list(machine.unpowered)
+    return row

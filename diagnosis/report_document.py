@@ -28,6 +28,7 @@ from diagnosis.results.assessment import CODE
 from diagnosis.results.clearing import Checked, clearing_rows
 from diagnosis.results.detectability import Detectability, detectability_table
 from diagnosis.results.document import SCHEMA, CoverageRow, MachineRow, ReportDocument
+from diagnosis.results.event_times import event_rows
 from diagnosis.results.loss import loss_rows
 from diagnosis.results.machine_event import GYRO_OTHERWISE, MachineEvent
 from diagnosis.results.result import FaultInterval, to_json
@@ -35,6 +36,7 @@ from diagnosis.results.vocabulary import Kind, Tier
 from replay.control.loop import Replay
 from replay.faults import Side, State
 from replay.machine.config import Machine
+from replay.machine.unpowered import is_contradicted
 from replay.mission import Mission
 from replay.setup.places import place_doubts
 from replay.signals.like_wheels import WHICH
@@ -176,6 +178,8 @@ def report_of_mission(judged: Judged, identity: MachineRow) -> ReportDocument:
         ),
         "limits": to_json(machine.limits),
     }
+    if events := _events(judged):
+        report["events"] = event_rows(events, timeline.size * timeline.dt)
     plain: ReportDocument = to_json(report)
     return plain
 
@@ -226,6 +230,7 @@ def _decision(
         events=_events(judged),
         hints=(
             *_of_units(judged),
+            *(f"{note}." for note in judged.mission.signals.notes if is_contradicted(note)),
             *(h.text for h in judged.hints),
             *([s.gross] if (s := judged.scale) is not None and s.gross else []),
         ),

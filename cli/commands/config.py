@@ -13,6 +13,7 @@ from cli.terminal.options import Json, MachineFile
 from diagnosis.api.inputs import machine_of, mission_paths
 from replay.errors import ConfigError
 from replay.machine.questions import open_questions
+from replay.machine.unpowered import is_contradicted
 from replay.progress import Stage
 from replay.setup.preset import Preset
 from replay.signals.unit_conflicts import unit_conflict
@@ -94,6 +95,7 @@ def check(
         asked = first_question(signals) if signals.questions else ""
         if not asked:
             against, doubts, doubted = _contradictions(signals, machine)
+            against = (*against, *(note for note in signals.notes if is_contradicted(note)))
         document |= {
             "ok": not (lost or asked or against),
             "signals": signals_document(files, signals, machine, source),
@@ -117,7 +119,13 @@ def check(
     count = len(machine.signals)
     still = open_questions(file)
     open_ = _still_asked(still)
-    terminal.show(f"{file}: valid. {machine.name}, wheels {', '.join(machine.wheels)}, {count} signals given.{open_}")
+    parts = f"{machine.part}s {', '.join(machine.wheels)}{_free(machine)}"
+    terminal.show(f"{file}: valid. {machine.name}, {parts}, {count} signals given.{open_}")
+
+
+def _free(machine: Machine) -> str:
+    """Which of the wheels have no drive, in brackets; empty where all have one."""
+    return f" ({', '.join(machine.unpowered)} without a drive)" if machine.unpowered else ""
 
 
 def _still_asked(questions: int) -> str:

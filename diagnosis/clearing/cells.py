@@ -133,6 +133,11 @@ class Cells:
         return None if geometry is None else [geometry.wheels[wheel].x for wheel in self.machine.wheels]
 
     @property
+    def driven(self) -> list[int]:
+        """Places of the wheels with a drive among the machine's wheels."""
+        return [i for i, wheel in enumerate(self.machine.wheels) if wheel not in self.machine.unpowered]
+
+    @property
     def reference(self) -> Array:
         """Commanded speed of every wheel, shape (cells, wheels)."""
         return self.once("reference", lambda: self.of(self.replay.v_ref))

@@ -61,14 +61,19 @@ def forecast(
     """
     opened = {n for n in logged if n.rpartition(".")[2] in ("u", "u_applied")} if doubted else set[str]()
     logged = [n for n in logged if n not in opened]
-    speeds = sum(f"wheel.{w}.v" in logged for w in machine.wheels)
+    every = sum(f"wheel.{w}.v" in logged for w in machine.wheels)
+    driven = sum(f"wheel.{w}.v" in logged for w in machine.driven)
     commanded = "cmd.v" in logged or any(f"wheel.{w}.v_ref" in logged for w in machine.wheels)
     groups: dict[tuple[Kind, Side, bool, str, tuple[str, ...]], list[str]] = {}
     for kind, prefix, names in ((Kind.WHEEL, "wheel", machine.wheels), (Kind.STEER, "steer", machine.axles)):
         for name in names:
             has = {signal.rpartition(".")[2] for signal in logged if signal.startswith(f"{prefix}.{name}.")}
+            if kind is Kind.WHEEL and name in machine.unpowered:
+                free = _free_sensor(has, every, commanded)
+                groups.setdefault((kind, Side.SENSOR, *free), []).append(name)
+                continue
             if kind is Kind.WHEEL:
-                sides = _wheel_sensor(has, speeds, words, commanded), _wheel_drive(has, speeds, words, commanded)
+                sides = _wheel_sensor(has, driven, words, commanded), _wheel_drive(has, driven, words, commanded)
             else:
                 told_where = "phi_ref" in has or {"cmd.v", "cmd.omega"} <= set(logged)
                 bare = machine.control.law == "none" and not has & {"u", "u_applied"}
@@ -120,6 +125,23 @@ def _wheel_sensor(has: set[str], speeds: int, words: MachineWords, commanded: bo
         "a loss shows beside the other {wheels}, mostly as one of sensor or {valve}, and not where it is all {wheels}'",
         more,
     )
+
+
+def _free_sensor(has: set[str], speeds: int, commanded: bool) -> _Told:
+    """The only side of a wheel without a drive."""
+    if "v" not in has:
+        return False, "not judged: no speed is logged", ("wheel.*.v",)
+    if "v_true" in has:
+        return True, "told while the machine moves, against its second measurement; it has no drive", ()
+    more = ("wheel.*.v_true",)
+    if not commanded:
+        shown = (
+            "what departs from the other {wheels} shows"
+            if speeds > 1
+            else "only one that is frozen, wild or noisy shows"
+        )
+        return False, f"{shown}: no command is logged; it has no drive", ("cmd.v", *more)
+    return True, "told where it departs from the commanded speed or from the other {wheels}; it has no drive", more
 
 
 def _wheel_drive(has: set[str], speeds: int, words: MachineWords, commanded: bool) -> _Told:

@@ -52,6 +52,8 @@ class Gauges:
         Whether it points where the machine goes.
     lasting : dict[Deviation, float]
         Smallest sizes over the whole mission by what is usual of it.
+    unpowered : bool
+        Whether it is a wheel without a drive.
     """
 
     kind: Kind
@@ -66,11 +68,12 @@ class Gauges:
     still: Still | None = None
     straight: Straight | None = None
     lasting: dict[Deviation, float] = field(default_factory=dict)
+    unpowered: bool = False
 
     @property
     def told(self) -> Side:
         """The side that the checks name."""
-        return self.side if self.reference is not None else Side.SENSOR_OR_ACTUATOR
+        return self.side if self.reference is not None or self.unpowered else Side.SENSOR_OR_ACTUATOR
 
     @property
     def _jumps(self) -> bool:
@@ -147,7 +150,7 @@ def _wheels(cells: Cells) -> Iterator[Gauges]:
         moving = (np.abs(motion) > resp.MOVING * top / resp.USUAL_TOP) & ~cells.told(name)
         ratio = None
         lasting: dict[Deviation, float] = {}
-        if _known(used[:, i]) and speed.shape[1] > resp.OTHERS and (tells or not (twice and measured)):
+        if _known(used[:, i]) and len(cells.driven) > resp.OTHERS and (tells or not (twice and measured)):
             limit = limits[i]
             off = np.where(cells.explained(name), np.nan, responses.windows[:, i])
             usual, back = responses.usual[i], (~responses.ahead[:, i]).astype(np.intp)
@@ -162,7 +165,18 @@ def _wheels(cells: Cells) -> Iterator[Gauges]:
         second_one = _reference(cells, name, (v, x, wheels.FLOOR * top), clear_at) if measured else None
         own = Rough(cells.frame, rough.quick[:, i], rough.size[:, i], rough.limit[:, i], cells.width)
         about = (Kind.WHEEL, name)
-        yield Gauges(*about, Side.SENSOR, "m/s", moving, v, ratio, second_one, own, lasting={**lasting, **late_by})
+        yield Gauges(
+            *about,
+            Side.SENSOR,
+            "m/s",
+            moving,
+            v,
+            ratio,
+            second_one,
+            own,
+            lasting={**lasting, **late_by},
+            unpowered=name in cells.machine.unpowered,
+        )
         if twice:
             asked = _reference(cells, name, (a, followed[:, i], wheels.OPENING), wheels.VALVE * clear_at)
             yield Gauges(*about, Side.ACTUATOR, "1", moving, a, None, asked)

@@ -157,7 +157,8 @@ def supply_gone(cells: Cells) -> MachineEvent | None:
     edges = np.flatnonzero(np.diff(np.r_[False, still, False].astype(np.int8))) * cells.dt
     spells = [f"{a:.1f}–{b:.1f} s" for a, b in zip(edges[::2], edges[1::2], strict=True)]
     when = ", ".join(spells[:3]) + (f" and {len(spells) - 3} more times" if len(spells) > 3 else "")
-    return not_following(
+    found = not_following(
         f"No {{wheel}} moved at {when} although most {{valve}}s were commanded to open, or every steered axle to turn: what supplies them all "
         "had stopped, as an engine that stalls does; no part is blamed for that time."
     )
+    return found.at([*zip(edges[::2], edges[1::2], strict=True)])

@@ -140,7 +140,7 @@ def _beside(cells: Cells, sums: _Sums, opened: Array, *, over_time: bool) -> Res
     frame, ahead = cells.frame, sums.ahead
     ratio = np.where(sums.enough, sums.moved / np.maximum(opened, 1e-3 * frame.length), np.nan)
     with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
-        log = np.log(np.maximum(ratio, 1e-3) / others_at(ratio))
+        log = np.log(np.maximum(ratio, 1e-3) / others_at(ratio, cells.driven))
         alone = np.log(np.maximum(ratio, 1e-3))
     off = np.full(log.shape, np.nan)
     lasting: list[Usual] = []
@@ -230,12 +230,12 @@ def largest(windows: Array) -> Array:
     return np.where(np.isfinite(most), np.maximum(most, 0.0), np.nan)
 
 
-def others_at(x: Array) -> Array:
-    """Median of the other wheels at the same time, shape (windows, wheels)."""
+def others_at(x: Array, among: Sequence[int] | None = None) -> Array:
+    """Median of the other wheels at the same time, shape (windows, wheels); `among`: wheels that can be compared, None: all."""
     columns = range(x.shape[1])
     out = np.full(x.shape, np.nan)
     for i in columns:
-        rest = x[:, [j for j in columns if j != i]]
+        rest = x[:, [j for j in (columns if among is None else among) if j != i]]
         enough = np.isfinite(rest).sum(axis=1) >= min(OTHERS, rest.shape[1])
         out[enough, i] = np.nanmedian(rest[enough], axis=1)
     return out

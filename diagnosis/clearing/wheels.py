@@ -79,7 +79,7 @@ def wheel_checks(cells: Cells, clear_at: float) -> Iterator[Checked]:
     by_file, for_a_part = beside_plant(cells, used, responses)
     most_off = [float(x) for x in largest(offsets[0])], [float(x) for x in offsets[1]]
     delays, made = late(speed, reference, cells.dt), made_of_commands(cells, speed, reference)
-    either = Side.SENSOR_OR_ACTUATOR
+    powered = len(cells.driven)
     top = cells.machine.max_speed
     slow_off = [compared(cells, y, x, CREEPING * top).off for y, x in zip(speed.T, second.T, strict=True)]
     creeping = less_at_starts(np.column_stack(slow_off))
@@ -87,6 +87,7 @@ def wheel_checks(cells: Cells, clear_at: float) -> Iterator[Checked]:
     apart_from_second = off_second(cells, speed, second, FLOOR * top)
     for i, wheel in enumerate(cells.machine.wheels):
         about = (Kind.WHEEL, wheel)
+        either = Side.SENSOR if wheel in cells.machine.unpowered else Side.SENSOR_OR_ACTUATOR
         if not _known(speed[:, i]):
             continue
         if twice[i][1]:
@@ -109,7 +110,7 @@ def wheel_checks(cells: Cells, clear_at: float) -> Iterator[Checked]:
             yield max(whole, part, key=times)
         # where an opening is no speed, what it gives says nothing of a wheel whose sides are both measured twice
         # of two wheels, each is the other's measure: enough for what lies behind drives that are measured twice
-        enough = speed.shape[1] > OTHERS or (speed.shape[1] == OTHERS and all(twice[i]))
+        enough = powered > OTHERS or (powered == OTHERS and all(twice[i]))
         if _known(used[:, i]) and enough and (tells or not all(twice[i])):
             own = limits[i]
             response = (*about, either, Check.RESPONSE)

@@ -90,17 +90,17 @@ def _common(cells: Cells) -> _Common:
 
 def _of_all(cells: Cells) -> _Common:
     speed, command, opening = (cells.wheels(leaf) for leaf in ("v", "u", "u_applied"))
-    if speed.shape[1] < _WHEELS:
+    if len(cells.driven) < _WHEELS:
         nothing, never = np.full(cells.frame.starts.size, np.nan), np.zeros(cells.frame.starts.size, np.bool_)
         return _Common(nothing, (nothing, nothing), (never, never), cells.frame.hop * cells.dt)
     used = np.where(np.isfinite(opening), opening, command)
     found = responses_of(cells, speed, used, cells.reference, over_time=False)
-    own = found.own
+    own = found.own[:, cells.driven]
     known = np.isfinite(own).sum(axis=1) >= _KNOWN * own.shape[1]
     common = np.full(len(own), np.nan)
     common[known] = np.nanmedian(own[known], axis=1)
     common[np.column_stack([cells.explained(wheel) for wheel in cells.machine.wheels]).any(axis=1)] = np.nan
-    levels = cells.frame.mean(_median(speed)), cells.frame.mean(_median(used))
+    levels = cells.frame.mean(_median(speed)), cells.frame.mean(_median(used[:, cells.driven]))
     ways = np.asarray(found.ahead.all(axis=1)), np.asarray(~found.ahead.any(axis=1))
     return _Common(common, levels, ways, cells.frame.hop * cells.dt)
 

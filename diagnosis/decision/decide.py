@@ -207,9 +207,15 @@ def _reservations(
             for p, a in assessments.items()
             if (a.unexplained_s >= _UNEXPLAINED_S if p in wheels else a.unexplained_s > 0.0 and _mostly_open(a))
         ),
-        not_compared=own_model and model is not None and len(model.plants) < _COMPARED_WHEELS,
+        not_compared=own_model and model is not None and _compared(model, assessments) < _COMPARED_WHEELS,
         damage=tuple(damage),
     )
+
+
+def _compared(model: WheelModelFit, assessments: Mapping[Part, Assessment]) -> int:
+    """How many wheels a model compares: none of those without a drive."""
+    free = {c for c, _ in assessments if (c, Side.ACTUATOR.value) not in assessments}
+    return len(model.plants) - len(free)
 
 
 def _mostly_open(assessment: Assessment) -> bool:
@@ -296,7 +302,17 @@ def _without_faults(
         text = f"No fault was identified, but this mission does not exclude one: {open_words(against.open)}."
         return Decision(Verdict.NOT_ASSESSED, "No fault found, not cleared", text)
     least = min((decided_s[part] for part in assessments if part[0] not in axles), default=0.0)
-    text = against.words.fill(
-        f"The {{wheel.sensor}} and the {{wheel.actuator}} of every {{wheel}} were judged healthy over at least {least:.0f} s of {{moving}}."
+    return Decision(
+        Verdict.READY, "No fault found", against.words.fill(_healthy(assessments, axles, least)), cleared=True
     )
-    return Decision(Verdict.READY, "No fault found", text, cleared=True)
+
+
+def _healthy(assessments: Mapping[Part, Assessment], axles: Sequence[str], least_s: float) -> str:
+    """What was judged healthy, a sentence with words of the machine in braces: wheels without a drive have a sensor alone."""
+    wheels = list(dict.fromkeys(c for c, _ in assessments if c not in axles))
+    free = [w for w in wheels if (w, Side.ACTUATOR.value) not in assessments]
+    both = "The {wheel.sensor} and the {wheel.actuator} of every {wheel}"
+    if free:
+        has = "has" if len(free) == 1 else "have"
+        both += f" with a drive, and the {{wheel.sensor}}{'' if len(free) == 1 else 's'} of {join_words(free)}, which {has} none,"
+    return f"{both} were judged healthy over at least {least_s:.0f} s of {{moving}}."

@@ -62,7 +62,7 @@ def sensors_alone(
     for part in against.short:
         drives.setdefault(assessments[part].reasons.get(State.NOT_ASSESSED, ""), []).append(part[0])
     steering = [a for (c, _), a in assessments.items() if c in axles and a.tier is Tier.NONE]
-    wheels = {c for c, _ in assessments if c not in axles}
+    wheels = {c for c, side in assessments if c not in axles and side == Side.ACTUATOR}
     said = [f"{_drives(who, wheels)} not judged, for {why.partition(', and ')[0]}" for why, who in drives.items()]
     if steering:
         why = main_reason(steering[0], main_state(steering[0]))

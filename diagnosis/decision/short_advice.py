@@ -76,7 +76,8 @@ def act_of_wheel(
     }
     if lack is Lack.DRIVE:
         return words.fill(
-            "look whether the {wheel} has a {valve} at all: one that has is without power, or its effort is not logged"
+            "look whether the {wheel} has a {valve} at all: one that has is without power, or its effort is not logged; name one that has "
+            "none under [machine] unpowered"
         )
     if lack is Lack.ECHO:
         return words.fill("record what the {wheels} measure (/joint_states, encoder counts) as wheel.{c}.v")
@@ -106,7 +107,9 @@ def act_of_axle(side: str, state: State | None, lack: Lack | None) -> str:
 def _of_silent(sensor: bool, state: State | None, lack: Lack | None) -> str:
     """What to log for a part of which nothing is judged."""
     if state is State.NO_DATA or lack is Lack.COMMAND:
-        return "log wheel.{c}.v" if sensor else "log wheel.{c}.u"
+        return (
+            "log wheel.{c}.v" if sensor else "log wheel.{c}.u, or name wheels without a drive under [machine] unpowered"
+        )
     return "log wheel.{c}.u or wheel.{c}.v_ref" if sensor else "log wheel.{c}.v"
 
 

@@ -125,6 +125,8 @@ def with_plants(
     wheels = dict(machine.plant.wheels)
     mapped = maps.plants if maps is not None else (None,) * len(machine.wheels)
     for w, fit, mapped_fit, error in zip(machine.wheels, fits, mapped, spoiled, strict=True):
+        if w in machine.unpowered:
+            continue
         before = wheels.get(w)
         found = None if fit is not None and fit.refused else mapped_fit  # its windows contradict each other
         for name, unit in _PLANT:

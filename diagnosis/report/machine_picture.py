@@ -11,6 +11,7 @@ from markupsafe import Markup
 
 from diagnosis.pages.labels import span
 from diagnosis.pages.svg import badge, text
+from diagnosis.report.judged_parts import unpowered
 from diagnosis.report.standing import Standing, standings_of
 from diagnosis.results.candidates import label_of, symbol_of
 from diagnosis.results.document import IntervalRow, ReportDocument, WheelPlace
@@ -145,7 +146,14 @@ def _conditions(report: ReportDocument) -> dict[str, Condition]:
     """What the picture says of every wheel and axle, by name."""
     machine, faults, standings = report["machine"], report["intervals"], standings_of(report)
     parts = ((Kind.WHEEL, machine["wheels"]), (Kind.STEER, machine["axles"]))
-    return {c: condition(c, kind, faults, standings, words_of(machine)) for kind, names in parts for c in names}
+    found = {c: condition(c, kind, faults, standings, words_of(machine)) for kind, names in parts for c in names}
+    free = unpowered(machine)
+    return {c: _free(f, words_of(machine).part) if c in free else f for c, f in found.items()}
+
+
+def _free(c: Condition, part: str) -> Condition:
+    """What the picture says of a wheel without a drive."""
+    return Condition(c.state, (*c.lines, f"free {part}"), c.fault, f"{c.title}; free {part}, without a drive")
 
 
 def machine_picture(report: ReportDocument) -> Markup:

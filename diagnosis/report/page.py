@@ -31,6 +31,7 @@ from diagnosis.report.driven_path import driven_path
 from diagnosis.report.evidence import evidence_of
 from diagnosis.report.fleet_note import fleet_section, repaired_faults
 from diagnosis.report.healthy_lanes import healthy_lanes
+from diagnosis.report.machine_lane import machine_lane
 from diagnosis.report.machine_picture import axles_in_words, machine_picture, places_in_words
 from diagnosis.report.path_picture import path_picture
 from diagnosis.report.plot_data import Axis, axis_of, blocks_of, channels_of, figures_of, packed_intervals, view, worst
@@ -180,6 +181,7 @@ def _pictures(
             "heads": HEADS,
         },
         "timeline": timeline(report, duration, {f["id"] for f in detailed}),
+        "machine_lane": machine_lane(report, duration),
         "duration": duration,
         "lane_details": healthy_lanes(report),
         "picture": machine_picture(report),

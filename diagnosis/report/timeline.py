@@ -10,7 +10,7 @@ from itertools import groupby
 import numpy as np
 
 from diagnosis.pages.labels import clock, fault_title, span
-from diagnosis.report.judged_parts import kind_of
+from diagnosis.report.judged_parts import kind_of, sides_of_parts
 from diagnosis.report.standing import Standing, standings_of
 from diagnosis.results.candidates import label_of, symbol_of
 from diagnosis.results.document import IntervalRow, PhaseRow, ReportDocument
@@ -242,10 +242,7 @@ def timeline(report: ReportDocument, duration: float, bars: Collection[str] | No
 def _spans_by_lane(report: ReportDocument) -> dict[tuple[str, Kind, str], list[Span]]:
     """States of each component and side, in the machine's order; none where nothing was recorded."""
     machine = report["machine"]
-    parts = [(c, Kind.WHEEL) for c in machine["wheels"]] + [(c, Kind.STEER) for c in machine["axles"]]
-    out: dict[tuple[str, Kind, str], list[Span]] = {
-        (c, kind, side): [] for c, kind in parts for side in (Side.SENSOR, Side.ACTUATOR)
-    }
+    out: dict[tuple[str, Kind, str], list[Span]] = {part: [] for part in sides_of_parts(machine)}
     for s in report["states"]:
         lane = out.setdefault((s["component"], kind_of(s["component"], machine), s["side"]), [])
         lane.append((s["state"], s["start_s"], s["stop_s"]))

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,7 +36,16 @@ from diagnosis.response.inputs import FollowerData, cell_of, cells
 from diagnosis.response.joint import rolling
 from diagnosis.response.joint_gain import scaled_channels, told_gain, without_gains
 from diagnosis.response.late import late_neighbour, late_wheels, left_open, smallest_delay
-from diagnosis.response.machine import Judged, lasting_losses, otherwise, paused, standstills, unexplained, unlike
+from diagnosis.response.machine import (
+    Judged,
+    lasting_losses,
+    otherwise,
+    paused,
+    pauses,
+    standstills,
+    unexplained,
+    unlike,
+)
 from diagnosis.response.models import BLOCK_S, Beside, Blocks
 from diagnosis.response.motionless import motionless, not_moving
 from diagnosis.response.nearer import nearer_to_its_command
@@ -86,7 +95,7 @@ _EXCHANGED = (
 class Judgement:
     """Both sides of each wheel that could be judged, and what happened to the machine as a whole, to its gyro, to all speeds and to those of one side, a sentence each.
 
-    `apart` says which wheels read another share of the motion than the others, or nothing, all through; `unrelated` says that speeds and commands are of sizes that nothing relates.
+    `when` has the times of what happened to the machine, by its sentence [s]; `apart` says which wheels read another share of the motion than the others, or nothing, all through; `unrelated` says that speeds and commands are of sizes that nothing relates.
     """
 
     parts: Mapping[str, tuple[Assessment, Assessment]]
@@ -96,6 +105,7 @@ class Judgement:
     unrelated: tuple[str, ...] = ()
     scaled: tuple[str, ...] = ()
     apart: tuple[str, ...] = ()
+    when: Mapping[str, Sequence[tuple[float, float]]] = field(default_factory=dict)
 
 
 def assess_response(
@@ -141,7 +151,8 @@ def assess_response(
         stood = standstills(idle, dt)
         ignored = () if stood or seen else unexplained(drives, limits, dt)
         ignored, said = witnessed(ignored, witness, seen, drives, speeds, (width, limits, dt))
-        return Judgement({}, stood, (), said, () if stood else ignored)
+        still = {text: [(a * dt, b * dt) for a, b in idle] for text in stood}
+        return Judgement({}, stood, (), said, () if stood else ignored, when=still)
     rest = {w: samples_of(d.y, d.fresh) for w, d in data.items() if w not in found}
     found = by_each_other(found, width * dt, rest)
     holds = {w: holds_of(j.wheel.samples, MOVES * limits.driving_speed, dt) for w, j in found.items()}
@@ -211,6 +222,7 @@ def assess_response(
             width * dt,
         )
         for w in judged
+        if not judged[w].data.unpowered
     }
     weak = {w: without_consequences(found, w, judged, width) for w, found in weak.items()}
     late = late_wheels(judged, width * dt)
@@ -232,7 +244,8 @@ def assess_response(
     kept = {w: [x for x in spells if x not in nobodys[w]] for w, spells in kept.items()}
     kept = {w: [x for x in spells if not late_neighbour(x, w, late, width)] for w, spells in kept.items()}
     parts = {
-        w: sides_of(j, kept[w], (weak[w], late[w]), (left_out[w], together), limits, dt) for w, j in judged.items()
+        w: sides_of(j, kept[w], (weak.get(w, []), late[w]), (left_out[w], together), limits, dt)
+        for w, j in judged.items()
     }
     parts = {
         w: (
@@ -247,7 +260,7 @@ def assess_response(
     }
     if len(data) == 1:
         parts = {w: (either(a, judged[w], MOVES * limits.driving_speed), b) for w, (a, b) in parts.items()}
-    astray, lasts = otherwise(judged, width * dt, witness.there)
+    astray, lasts, elsewhere = otherwise(judged, width * dt, witness.there)
     remarks = (*astray, *left_notes, *((_TURNED,) if any(turned.values()) else ()))
     doubts = {w: Reason(j.odd) for w, j in judged.items() if j.odd and not any(side.findings for side in parts[w])}
     doubts |= {w: j.joint.unlike for w, j in judged.items() if j.joint is not None and j.joint.unlike}
@@ -281,15 +294,17 @@ def assess_response(
         w: (by_the_gyro(w, sensor, judged, sought, turning, open_to), drive) for w, (sensor, drive) in parts.items()
     }
     ignored = () if any(j.response.answered for j in judged.values()) else unexplained(drives, limits, dt)
-    stood = standstills(idle, dt) or (
-        paused([f for side in parts.values() for f in side[0].findings], dt) if len(data) == 1 else ()
-    )
+    of_one = [f for side in parts.values() for f in side[0].findings] if len(data) == 1 else []
+    stood = standstills(idle, dt) or paused(of_one, dt)
+    rests = idle or [(f.start, f.stop) for f in pauses(of_one)]
+    times = [(a * dt, b * dt) for a, b in rests]
+    when = dict.fromkeys(stood, times) | dict.fromkeys(astray, elsewhere)
     ignored, said = witnessed(ignored, witness, seen, drives, speeds, (width, limits, dt))
     scaled = told(sought, turning, width * dt)
     parts |= {w: told_gain(parts[w], data[w].name, gain) for w, gain in scales.items() if w in parts}
     told_of_it = tuple(x.text for x in gyro)
     events = (*stood, *(astray if lasts else ()))
-    return Judgement(parts, events, told_of_it, said, ignored, scaled, contradicting(apart, none_read))
+    return Judgement(parts, events, told_of_it, said, ignored, scaled, contradicting(apart, none_read), when)
 
 
 def _turned_by(wheel: str, found: Mapping[str, Judged]) -> bool:

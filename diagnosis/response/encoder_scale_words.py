@@ -60,7 +60,7 @@ def by_the_gyro(
         untold = not np.isfinite(one.data.asked).any() and len(judged) > 1
         return replace(sensor, hidden=_UNTOLD) if untold else sensor
     several = len(judged) > 1
-    if several or one.view is None:
+    if (several or one.view is None) and not one.data.unpowered:  # which closes no loop
         sensor = replace(
             sensor, hidden=unseen(sought, several=several and not (turning is None and one.yaw is not None))
         )

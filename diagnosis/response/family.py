@@ -67,7 +67,7 @@ class ResponseEvidence:
                 if spans and side == SENSOR and _is_odometry(machine, wheel):
                     parts[wheel, side] = doubted(part, spans, _TURNS_OTHERWISE)
         events = (
-            *map(not_following, judged.events),
+            *(not_following(text).at(judged.when.get(text, ())) for text in judged.events),
             *map(not_related, judged.unrelated),
             *map(not_shown, judged.unshown),
             *map(one_side_otherwise, judged.scaled),

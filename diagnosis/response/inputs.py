@@ -51,6 +51,8 @@ class FollowerData:
         Whether its channel tells no direction, so that `y` has that of its command.
     echo : bool
         Whether its channel repeats the command and measures nothing.
+    unpowered : bool
+        Whether the machine file says that it has no drive.
     """
 
     y: Array
@@ -64,6 +66,7 @@ class FollowerData:
     stretch: Array | None = None
     undirected: bool = False
     echo: bool = False
+    unpowered: bool = False
 
 
 def cell_of(dt: float) -> int:
@@ -128,6 +131,7 @@ def followers(mission: MissionView) -> dict[str, FollowerData]:
             stretch,
             undirected,
             echo,
+            w in machine.unpowered,
         )
     return out
 

@@ -95,9 +95,14 @@ def standstills(idle: Sequence[tuple[int, int]], dt: float) -> tuple[str, ...]:
     )
 
 
+def pauses(findings: Sequence[Finding]) -> list[Finding]:
+    """Findings of the only drive that it stood still, or its sensor was dead."""
+    return [f for f in findings if f.mode is FaultMode.NO_SIGNAL and f.side is Side.SENSOR_OR_ACTUATOR]
+
+
 def paused(findings: Sequence[Finding], dt: float) -> tuple[str, ...]:
     """A sentence where the only drive stood still for a time although it was commanded to move, by what was found of it; `dt` in s."""
-    spans = [f for f in findings if f.mode is FaultMode.NO_SIGNAL and f.side is Side.SENSOR_OR_ACTUATOR]
+    spans = pauses(findings)
     if not spans:
         return ()
     longest = max(spans, key=lambda f: f.stop - f.start)
@@ -136,8 +141,10 @@ def unexplained(drives: Sequence[FollowerData], limits: Limits, dt: float) -> tu
     )
 
 
-def otherwise(judged: Mapping[str, Judged], block_s: float, followed: Flags) -> tuple[tuple[str, ...], bool]:
-    """A sentence where all drives together did something else than their commands, and whether so long that it is the machine's state.
+def otherwise(
+    judged: Mapping[str, Judged], block_s: float, followed: Flags
+) -> tuple[tuple[str, ...], bool, list[tuple[float, float]]]:
+    """A sentence where all drives together did something else than their commands, whether so long that it is the machine's state, and when [s].
 
     No wheel is blamed for it. `block_s` is the length of a block [s]; `followed`, shape (b,), are those in which a receiver shows that
     the machine went as it was told.
@@ -145,20 +152,20 @@ def otherwise(judged: Mapping[str, Judged], block_s: float, followed: Flags) -> 
     off = []
     for j in judged.values():
         if not j.response.answered:
-            return (), False
+            return (), False, []
         b = j.wheel.blocks
         off.append(np.abs(b.mean - np.clip(b.mean, b.low, b.high)) > _ELSEWHERE * np.nanquantile(np.abs(b.mean), 0.99))
     edge = np.flatnonzero(np.diff(np.r_[False, np.logical_and.reduce(off) & ~followed, False].astype(np.int8)))
     spans = [(a, b) for a, b in zip(edge[::2] * block_s, edge[1::2] * block_s, strict=True) if b - a >= _ELSEWHERE_S]
     if len(judged) < 2 or not spans:
-        return (), False
+        return (), False, []
     longest = max(spans, key=lambda s: s[1] - s[0])
     text = (
         f"For {sum(b - a for a, b in spans):.1f} s all drives together did something else than their commands (longest "
         f"{longest[0]:.1f}–{longest[1]:.1f} s): commands that are held or ignored, another source of commands, or a slope; no {{wheel}} is "
         "blamed for it."
     )
-    return (text,), bool(longest[1] - longest[0] >= _STATE_S)
+    return (text,), bool(longest[1] - longest[0] >= _STATE_S), spans
 
 
 def unlike(judged: Mapping[str, Judged]) -> dict[str, Reason]:

@@ -11,6 +11,7 @@ from typing import Final, Literal, NotRequired, TypedDict
 from diagnosis.results.clearing_rows import ClearingRow, DetectabilityTable
 from diagnosis.results.comparison_document import PreviousRow
 from diagnosis.results.document_numbers import Probability, Seconds
+from diagnosis.results.event_row import EventRow
 from diagnosis.results.fleet_note_row import FleetNoteRow
 from diagnosis.results.log_rows import LogRow
 from diagnosis.results.loop_rows import MetricsRow
@@ -50,6 +51,8 @@ class MachineIdentity(TypedDict):
 class MachineRow(MachineIdentity, Worded):
     """The machine, where its settings come from, and in `assumed` which numbers are the paper's machine's for want of its own.
 
+    `unpowered` has the wheels without a drive, of which only the speed is judged; absent where all have one.
+
     Speeds are in `words.speed_unit`, which is m/s but for joints.
     """
 
@@ -58,6 +61,7 @@ class MachineRow(MachineIdentity, Worded):
     geometry: dict[str, WheelPlace] | None
     source: str
     assumed: list[str]
+    unpowered: NotRequired[list[str]]
 
 
 class ReadingRow(TypedDict):
@@ -262,7 +266,7 @@ class ReportDocument(TypedDict):
     """`report.json`: one mission, its verdict, faults, states, coverage and data.
 
     `previous` is there where the mission was compared with another one of the machine; `fleet` in the newest report of an audited machine
-    where the fleet knows more than the mission.
+    where the fleet knows more than the mission; `events` where something happened to the machine as a whole, the verdict's first.
     """
 
     schema: Literal["mfhca-report/1"]
@@ -272,6 +276,7 @@ class ReportDocument(TypedDict):
     readings: list[ReadingRow]
     verdict: VerdictRow
     intervals: list[IntervalRow]
+    events: NotRequired[list[EventRow]]
     states: list[StateRow]
     phases: list[PhaseRow]
     coverage: list[CoverageRow]

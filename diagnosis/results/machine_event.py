@@ -29,6 +29,8 @@ class MachineEvent:
         What to do before a mission may be judged again.
     model : bool
         Whether the wheel model alone is in doubt: what axles show without it stands.
+    spans : tuple[tuple[float, float], ...]
+        Begin and end of each time at which it was so [s], where these are more than the text states.
     """
 
     title: str
@@ -36,6 +38,11 @@ class MachineEvent:
     doubt: str
     act: str
     model: bool = False
+    spans: tuple[tuple[float, float], ...] = ()
+
+    def at(self, spans: Sequence[tuple[float, float]]) -> MachineEvent:
+        """The same with the times at which it was so [s]."""
+        return replace(self, spans=tuple((float(a), float(b)) for a, b in spans))
 
     def worded(self, words: MachineWords) -> MachineEvent:
         """With the machine's own words."""

@@ -92,7 +92,7 @@ def assess_wheels(data: WheelsData, limits: Limits, *, gains: bool) -> WheelsJud
         claimed = or_off(claimed, path.y, expected)
         sensor, actuator = _assessments(data, i, path, claimed, gains=gains)
         out[i] = sensor, actuator if measured[i] else replace(actuator, loss=losses[i])
-    events = ((swinging(swings.sentence),) if swings.spans else ()) + (
+    events = ((swinging(swings.sentence).at(swings.spans),) if swings.spans else ()) + (
         (foreign(doubted.sentence),) if doubted.wheels else ()
     )
     return WheelsJudged(out, events)

@@ -25,7 +25,8 @@ class WheelEvidence:
         """Judge the wheels of a machine that has several."""
         timeline, replay, machine = mission.timeline, mission.replay, mission.machine
         channels = _channels(mission)
-        if len(machine.wheels) < 2 or (channels.has_true & channels.has_applied).all():
+        driven = [w not in machine.unpowered for w in machine.wheels]
+        if len(machine.wheels) < 2 or (channels.has_true & channels.has_applied)[driven].all():
             return Contribution({})
         mission.progress(Progress(Stage.IDENTIFYING_WHEELS))
         if mission.angle is None or mission.doubtful is None:

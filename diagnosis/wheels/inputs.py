@@ -142,7 +142,7 @@ def wheels_data(
         The body by its own sensors.
     """
     y, u, dt = channels.speed, channels.opening, timeline.dt
-    given = [machine.plant.wheels.get(w) is not None for w in machine.wheels]
+    given = [w in machine.unpowered or machine.plant.wheels.get(w) is not None for w in machine.wheels]
     names = channels.names(machine.wheels)
     status = np.zeros(y.shape, dtype=np.int8)
     quiet = np.ones(y.shape, dtype=np.bool_)

@@ -49,7 +49,7 @@ def wheel_fit(
     if not (any_finite(channels.opening).any() and any_finite(channels.speed).any()):
         return None
     given = {i: p for i, w in enumerate(machine.wheels) if (p := machine.plant.wheels.get(w)) is not None}
-    if len(given) < len(machine.wheels):
+    if len(given) < len(machine.driven):
         found = identified(wheel_drive(channels, replay, timeline, machine, angle, body), machine, given)
         if found is not None:
             return found

@@ -51,6 +51,7 @@ _WHEEL_DETAIL = (
     Replayed("psi_implied_squared", "implied_squared", "1"),
     Replayed("psi_forcing", "forcing", "1"),
 )
+_OF_FREE_WHEELS = (*_WHEEL[:2], _WHEEL_DETAIL[0])  # without a drive, there is no law of it
 _AXLE = (
     Replayed("phi_ref", "phi_ref", "rad", full_rate=True),
     Replayed("u", "steer_u", OPENING, full_rate=True),
@@ -94,7 +95,8 @@ def replay_columns(timeline: Timeline, replay: Replay, machine: Machine, *, deta
     steering = tuple(q for q in _AXLE if machine.control.law != "none" or q.leaf == "phi_ref")
     for parts, quantities in ((machine.wheels, _WHEEL + (_WHEEL_DETAIL if detail else ())), (machine.axles, steering)):
         for i, part in enumerate(parts):
-            for quantity in quantities:
+            free = part in machine.unpowered
+            for quantity in (q for q in quantities if not free or q in _OF_FREE_WHEELS):
                 values = getattr(replay, quantity.field)[:, i]
                 if quantity.full_rate:
                     values = envelope(values, bucket)

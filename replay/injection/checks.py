@@ -111,6 +111,8 @@ def _check(fault: FaultSpec, machine: Machine, signals: Signals, length: float, 
     if fault.side is Side.SENSOR:
         _need(who, name, signals)
         return
+    if fault.component in machine.unpowered:
+        raise ConfigError(f"{who}: it has no drive (machine.unpowered)")
     wheel = fault.component in machine.wheels
     if name not in signals.items and not (options.plant and wheel):
         also = "; or let the recorded speed answer by the machine file's wheel model with --plant" if wheel else ""

@@ -19,6 +19,7 @@ from replay.machine.plant import Plant as Plant
 from replay.machine.plant import WheelPlant as WheelPlant
 from replay.machine.quantities import DEGREES
 from replay.machine.signal_table import names_of, signal_of
+from replay.machine.unpowered import check_name, check_unpowered
 
 Law = Literal["auto", "signed", "opposed", "printed", "sign_abs", "none"]
 PsiMode = Literal["auto", "printed", "implied", "event_reset", "forced"]
@@ -166,6 +167,8 @@ class Machine:
         What moves them, for the words of a report: ``valve``, ``motor``, or ``auto``, which goes by the signals of the log.
     part : str
         What moves, for the words of a report: ``wheel`` or ``joint``.
+    unpowered : tuple[str, ...]
+        Those of `wheels` that have no drive and only roll along: of them only the speed is judged.
     speed_unit : str
         Unit in which their speeds, and all limits of speed, are given and shown: ``m/s`` at the rim, else ``rad/s`` or ``deg/s``.
     advice : Mapping[str, str]
@@ -211,6 +214,7 @@ class Machine:
     part: MovedPart = "wheel"
     speed_unit: SpeedUnit = "m/s"
     advice: Mapping[str, str] = field(default_factory=dict)
+    unpowered: tuple[str, ...] = ()
     assumed: tuple[str, ...] = field(default=(), compare=False)
     questions: tuple[str, ...] = field(default=(), compare=False)
 
@@ -240,6 +244,7 @@ class Machine:
         check_range("geometry.gear_ratio", self.gear_ratio, 1e-3, 1e4, "")
         check_range("geometry.max_speed", self.max_speed, 1e-6, 1e6, self.speed_unit)
         check_range("geometry.max_steer", self.max_steer, 0.0, 3.2, "rad", mistaken=(DEGREES,))
+        check_unpowered(self.unpowered, self.wheels, self.part, {"plant": self.plant.wheels, "drive": self.drives})
         self._check_drives()
         for section, names in (("signals", self.signals), ("noise", self.noise)):
             for name in names:
@@ -256,12 +261,18 @@ class Machine:
     def _check_name(self, section: str, name: str) -> None:
         """Raise where a signal is not known or names no part of this machine."""
         signal_of(name)
+        check_name(section, name, self.unpowered)
         group, _, rest = name.partition(".")
         part = rest.partition(".")[0]
         if group == "wheel" and part not in self.wheels:
             raise ConfigError(f"[{section}] {name!r}: no wheel {part!r}; machine.wheels has {list(self.wheels)}")
         if group == "steer" and self.geometry is not None and part not in self.axles:
             raise ConfigError(f"[{section}] {name!r}: no steering axle {part!r}; geometry has {list(self.axles)}")
+
+    @property
+    def driven(self) -> tuple[str, ...]:
+        """Wheels with a drive, in the order of `wheels`."""
+        return tuple(w for w in self.wheels if w not in self.unpowered)
 
     @property
     def axles(self) -> tuple[str, ...]:
@@ -275,7 +286,7 @@ class Machine:
 
     def canonical_signals(self) -> tuple[str, ...]:
         """Every signal name that this machine can have, in reading order."""
-        return names_of(self.wheels, self.axles)
+        return names_of(self.wheels, self.axles, self.unpowered)
 
 
 def haulotte() -> Machine:

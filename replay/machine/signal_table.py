@@ -6,7 +6,7 @@ what a log's symbols are called and which signals clocks are compared by are loo
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
@@ -76,6 +76,11 @@ class CanonicalSignal:
         return f"{self.group}.{self.leaf}"
 
     @property
+    def of_drive(self) -> bool:
+        """Whether it is of what moves a wheel, so that one that only rolls along has none."""
+        return self.group == "wheel" and self.leaf in _OF_DRIVES
+
+    @property
     def unit(self) -> str:
         """SI unit."""
         return SI_UNITS[self.quantity]
@@ -86,13 +91,14 @@ class CanonicalSignal:
         return OPENING if self.quantity == "fraction" else self.unit
 
 
+_OF_DRIVES = frozenset({"u", "u_applied", "effort", "psi", "pressure_a", "pressure_b"})
 _VALVE_POSITION = Named(
     0,
-    r"(valve|spool)_?(\d+_)?(act|actual|fb|feedback|meas|measured|pos|position|ist)|(act|actual|fb|feedback|meas|measured|ist)_?valve|spool|^u_?applied",
+    r"(valve|spool)_?(\d+_)?(act|actual|fb|feedback|meas|measured|pos|position|ist)|(act|actual|fb|feedback|meas|measured|ist)_?valve|spool|^u_?applied|^u_?(act|actual|ist|meas|fb)$",
 )
 _VALVE = Named(
     1,
-    r"valve_?(\d+_)?(cmd|command|out|set|ref|soll)|(cmd|command|set|ref|soll)_?valve|valve$|^u_?cmd|control_?(out|cmd)|^u$",
+    r"valve_?(\d+_)?(cmd|command|out|set|ref|soll)|(cmd|command|set|ref|soll)_?valve|valve$|^u_?cmd|^u_?(set|ref|soll|des|target)$|control_?(out|cmd)|^u$",
 )
 _SPEED_COMMAND = (
     r"(velo(city)?|speed|vel|rpm|drehzahl|geschw\w*)_?(ref|cmd|command|set|des|target|soll)|"
@@ -145,8 +151,22 @@ CANONICAL: tuple[CanonicalSignal, ...] = (
     _Entry("steer", "u", "fraction", "valve command u_s", 9, _VALVE),
     _Entry("steer", "u_applied", "fraction", "measured valve position", 11, _VALVE_POSITION),
     _Entry("imu", "yaw_rate", "rotation", "measured yaw rate", 12, Named(0, _YAW_RATE)),
-    _Entry("gnss", "lat", "position_deg", "latitude", None, Named(1, r"(gnss|gps).*lat")),
-    _Entry("gnss", "lon", "position_deg", "longitude", None, Named(2, r"(gnss|gps).*lon")),
+    _Entry(
+        "gnss",
+        "lat",
+        "position_deg",
+        "latitude",
+        None,
+        Named(1, r"(gnss|gps).*lat|(^|_)(latitude|breitengrad)(_(deg|grad))?$"),
+    ),
+    _Entry(
+        "gnss",
+        "lon",
+        "position_deg",
+        "longitude",
+        None,
+        Named(2, r"(gnss|gps).*lon|(^|_)(longitude|laengengrad)(_(deg|grad))?$"),
+    ),
     _Entry(
         "gnss",
         "speed",
@@ -164,14 +184,18 @@ CANONICAL: tuple[CanonicalSignal, ...] = (
 BY_KIND = {entry.kind: entry for entry in CANONICAL}
 
 
-def names_of(wheels: Sequence[str], axles: Sequence[str]) -> tuple[str, ...]:
-    """Every name that a machine with these wheels and axles can have, in reading order: one part after the other."""
+def names_of(wheels: Sequence[str], axles: Sequence[str], unpowered: Collection[str] = ()) -> tuple[str, ...]:
+    """Every name that a machine with these wheels and axles can have, in reading order: one part after the other.
+
+    `unpowered`: wheels without a drive, which have no signals of one.
+    """
     parts = {Scope.WHEEL: wheels, Scope.AXLE: axles, Scope.MACHINE: ("",)}
     names = []
     for group in dict.fromkeys(entry.group for entry in CANONICAL):
         entries = [entry for entry in CANONICAL if entry.group == group]
         for part in parts[entries[0].scope]:
-            names += [f"{group}.{part}.{entry.leaf}" if part else entry.kind for entry in entries]
+            own = [entry for entry in entries if part not in unpowered or not entry.of_drive]
+            names += [f"{group}.{part}.{entry.leaf}" if part else entry.kind for entry in own]
     return tuple(names)
 
 

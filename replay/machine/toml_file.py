@@ -20,13 +20,14 @@ from replay.machine.geometry import Geometry, WheelGeometry, four_wheel_geometry
 from replay.machine.quantities import UNITS
 from replay.machine.questions import questions_of
 from replay.machine.units import known_unit, si_factor
+from replay.machine.unpowered import unpowered_of
 from replay.toml_text import MAX_BYTES, TomlError, parse_toml
 
 _T = TypeVar("_T")
 _SECTIONS = {
     "machine", "geometry", "control", "plant", "drive", "steering", "noise", "limits", "sources", "signals", "advice",
 }  # fmt: skip
-_HEAD = {"name", "id", "wheels", "drive", "part", "speed_unit"}
+_HEAD = {"name", "id", "wheels", "unpowered", "drive", "part", "speed_unit"}
 _STANDARD = ("wheelbase", "joint_spacing", "wheel_offset")
 _LONGEST = 1000
 _SIDES = tuple(side.value for side in Side)
@@ -111,6 +112,7 @@ def _machine(data: Mapping[str, Any]) -> Machine:
         part=head.get("part", "wheel"),
         speed_unit=_speed_unit(head, signals),
         advice=_advice(data.get("advice", {}), (*wheels, *axles)),
+        unpowered=unpowered_of(head.get("unpowered", [])),
     )
     machine = dataclasses.replace(machine, assumed=_assumed(machine, data))
     _check_units(machine)

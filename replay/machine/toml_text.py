@@ -78,7 +78,8 @@ def _kind(machine: Machine) -> list[str]:
     """What moves the machine, where that is not what a machine file without these lines means."""
     usual = {"drive": "auto", "part": "wheel", "speed_unit": "m/s" if machine.part == "wheel" else ""}
     given = {key: getattr(machine, key) for key in usual}
-    return [f"{key} = {text_of(value)}" for key, value in given.items() if value != usual[key]]
+    lines = [f"unpowered = [{', '.join(text_of(w) for w in machine.unpowered)}]"] if machine.unpowered else []
+    return lines + [f"{key} = {text_of(value)}" for key, value in given.items() if value != usual[key]]
 
 
 def _comments(lines: Sequence[str]) -> list[str]:

@@ -13,7 +13,8 @@ from replay.machine.quantities import SI_UNITS
 from replay.machine.signal_table import quantity_of
 from replay.signals.name_parts import wheel_of
 from replay.signals.name_words import english, role, tokens
-from replay.signals.unsure_names import Open, Unsure, unsure
+from replay.signals.unsure_kinds import Open, Unsure
+from replay.signals.unsure_names import unsure
 
 
 def asked_columns(channels: Mapping[str, Channel], machine: Machine, used: Sequence[str]) -> dict[str, str]:

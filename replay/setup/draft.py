@@ -18,6 +18,7 @@ from replay.setup.asked_columns import asked_columns, motions_of_body, where_com
 from replay.setup.by_the_body import radius_by_body
 from replay.setup.contradictions import in_turn_with_commands, units_by_positions
 from replay.setup.draft_notes import Draft
+from replay.setup.free_wheels import ask_about_drives
 from replay.setup.given import ask_about_odometry, given_signals, odometry, table_sources
 from replay.setup.lengths import largest_angle, limits_for, wheel_places, wheel_radius, with_speeds, without_size
 from replay.setup.motion import WheelMotion, wheel_motion
@@ -146,6 +147,7 @@ def draft_machine(logs: Sequence[RawLog], preset: Preset | None = None) -> Draft
     origins = in_one_direction(draft, structure, found, motions)
     origins = {name: signal.origin for name, signal in every.items.items()} | origins
     _ask_for_what_is_missing(draft, every, channels)
+    ask_about_drives(draft, every.items)
     ask_for_more_wheels(draft, like_wheels({n: c for n, c in channels.items() if n not in empty}, origins))
     motions = in_turn_with_commands(draft, structure, found, motions, origins)
     straight = [w for w, p in (structure.places or {}).items() if p.axle == "fixed"]

@@ -25,6 +25,8 @@ class Draft:
         As the machine finds them in the log.
     notes : dict[str, list[str]]
         Comments by section of the machine file.
+    unpowered : tuple[str, ...]
+        Wheels that may have no drive.
     """
 
     machine: Machine
@@ -32,6 +34,7 @@ class Draft:
     questions: list[str] = field(default_factory=list)
     signals: Signals = field(default_factory=lambda: Signals({}, {}))
     notes: dict[str, list[str]] = field(default_factory=dict)
+    unpowered: tuple[str, ...] = ()
 
     def say(self, section: str, text: str) -> None:
         """Add a sentence, also as a comment of a section."""

@@ -42,6 +42,7 @@ def machine_text(draft: Draft, logs: str, rows: Sequence[ChannelRow] = ()) -> st
         *_said(draft, "machine"),
         f"name = {text_of(machine.name)}",
         f"wheels = [{', '.join(text_of(w) for w in machine.wheels)}]",
+        *([f"# unpowered = [{', '.join(text_of(w) for w in draft.unpowered)}]"] if draft.unpowered else []),
         "",
         "[geometry]",
         *_said(draft, "geometry"),

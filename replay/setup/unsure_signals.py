@@ -10,12 +10,17 @@ from replay.log.source_options import SignalSource
 from replay.machine.config import Machine
 from replay.setup.draft_notes import Draft
 from replay.signals.signal import Signals
-from replay.signals.unsure_names import Open, Unsure, unsure
+from replay.signals.unsure_kinds import Open, Unsure
+from replay.signals.unsure_names import unsure
 
 _QUESTIONS = {
     Open.SPEED: "are {names} speeds of the wheels? Their names tell the wheel, but not what; they are taken so.",
     Open.POSITION: "are {names} positions of the wheels{unit}? They are taken so, and the speeds are their slopes.",
     Open.SECOND: "are {names} second sensors of what {beside} and the like measure? They are taken so: what both say is believed.",
+    Open.YAW_RATE: "is {names} the yaw rate of the machine, in {turns}? It is taken so.",
+    Open.PLACE: "are {names} places by a satellite receiver, in degrees? They are taken so.",
+    Open.ANGLE: "are {names} steering angles, in {angles}? They are taken so.",
+    Open.DRIVERS: "is {names} the angle of the wheel that the driver turns, as its name says? Then it is geared to the axle's, and it is not taken.",
     Open.OPENING: "are {names} what valves or pumps are told, or where they stand (1 is fully open)? They are taken so.",
 }
 
@@ -49,8 +54,18 @@ def unsure_signals(
         if kind in _QUESTIONS:
             bare = any(one.origin.unit == "rad" for one in ones)
             names, beside = _few([one.origin.label for one in ones]), ones[0].beside
-            draft.ask("signals", _QUESTIONS[kind].format(names=names, beside=beside, unit=" in rad" if bare else ""))
-    return {one.signal: one.origin for ones in kinds.values() for one in ones}
+            unit = ones[0].origin.unit
+            draft.ask(
+                "signals",
+                _QUESTIONS[kind].format(
+                    names=names,
+                    beside=beside,
+                    unit=" in rad" if bare else "",
+                    turns=unit or "rad/s",
+                    angles=unit,
+                ),
+            )
+    return {one.signal: one.origin for kind, ones in kinds.items() if kind is not Open.DRIVERS for one in ones}
 
 
 def _few(labels: Sequence[str]) -> str:

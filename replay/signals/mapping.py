@@ -20,6 +20,7 @@ from replay.log.raw_log import Channel, LogSummary, RawLog, TopicInfo
 from replay.log.source_options import SignalSource
 from replay.machine.config import Machine
 from replay.machine.units import known_unit
+from replay.machine.unpowered import drive_in_log, is_of_no_drive
 from replay.signals.candidate import Candidate
 from replay.signals.file_names import in_its_file, named_channels
 from replay.signals.name_parts import wheel_said
@@ -31,7 +32,8 @@ from replay.signals.steering_command import turn_by_steering
 from replay.signals.to_si import Converted, choose_motor_or_wheel, convert, usable_unit
 from replay.signals.unfilled import unfilled, unfilled_note
 from replay.signals.unit_doubts import Doubt, doubt, questions
-from replay.signals.unsure_names import NOT_USED, Unsure, unsure
+from replay.signals.unsure_kinds import Unsure
+from replay.signals.unsure_names import NOT_USED, unsure
 
 #: Why a signal is missing for which nothing was found.
 NO_CHANNEL = "no channel fits by its name or message type"
@@ -121,12 +123,16 @@ def map_signals(logs: Sequence[RawLog], machine: Machine) -> Signals:
     for name, source in machine.signals.items():
         _take_given(draft, name, source, logs)
     by_signal: dict[str, list[tuple[Candidate, RawLog]]] = {}
+    driven: dict[str, str] = {}  # what would be the drives of wheels without one
     for log, channels in zip(logs, named_channels(logs), strict=True):
         empty = unfilled(channels)
         draft.notes += [unfilled_note(array) for array in dict.fromkeys(empty.values())]
         for found in candidates({n: c for n, c in channels.items() if n not in empty}, machine):
             candidate = replace(found, origin=in_its_file(found.origin, log))
             by_signal.setdefault(candidate.signal, []).append((candidate, log))
+            if is_of_no_drive(found.signal, machine.unpowered) and _changes(channels.get(found.origin.label)):
+                driven.setdefault(found.signal, found.origin.label)
+    draft.notes += drive_in_log(driven, machine.unpowered)
     for name in machine.canonical_signals():
         if name not in machine.signals:
             _take_guess(draft, name, by_signal.get(name, []))
@@ -148,6 +154,14 @@ def map_signals(logs: Sequence[RawLog], machine: Machine) -> Signals:
         )
     draft.notes += filter(None, [scale_doubt(items, machine)])
     return Signals(items, draft.missing, tuple(dict.fromkeys(draft.notes)), asked, store=store)
+
+
+def _changes(channel: Channel | None) -> bool:
+    """Whether a channel has more than one value."""
+    if channel is None or channel.values.dtype.kind not in "fiu":
+        return False
+    known = channel.values[np.isfinite(channel.values)]
+    return bool(known.size and np.ptp(known.astype(np.float64)) > 0.0)
 
 
 def _name_the_unsure(draft: _Draft, logs: Sequence[RawLog]) -> None:

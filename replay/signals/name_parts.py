@@ -13,6 +13,7 @@ from replay.signals.named_units import bare_name
 _LONG = {
     "front": "front", "fore": "front", "fwd": "front", "vorne": "front", "vorn": "front",
     "rear": "rear", "back": "rear", "aft": "rear", "hinten": "rear",
+    "frnt": "front", "lft": "left", "rgt": "right", "rght": "right",
     "left": "left", "links": "left", "right": "right", "rechts": "right",
     "middle": "middle", "mid": "middle", "center": "middle", "centre": "middle", "mitte": "middle", "mittig": "middle",
     "vorder": "front", "va": "front", "hinter": "rear", "ha": "rear", "av": "front", "ar": "rear", "li": "left", "re": "right",

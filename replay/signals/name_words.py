@@ -38,6 +38,8 @@ _PARTS = (
 )  # fmt: skip
 _TOGETHER = re.compile(rf"(?:{'|'.join(_PARTS)})+")
 _PART = re.compile("|".join(sorted(_PARTS, key=len, reverse=True)))
+# A letter of a quantity and what is asked or measured of it, written as one: vset, nsoll, phiist.
+_LETTER = re.compile(r"(v|n|w|u|phi|omega)(set|soll|ist|ref|cmd|act|des|target|meas)")
 _MEANINGS = {
     "ref": "soll sollwert vorgabe vorg consigne cons ohje gewenst",
     "cmd": "ansteuerung commande",
@@ -52,11 +54,11 @@ _MEANINGS = {
     "current": "strom courant curr",
     "voltage": "spannung tension",
     "press": "druck pression",
-    "wheel": "roue rueda ruota roda wiel hjul pyora pyoera kolo",
+    "wheel": "whl roue rueda ruota roda wiel hjul pyora pyoera kolo",
     "drive": "antrieb drv",
     "motor": "moteur motore",
     "axle": "achse achs essieu",
-    "yaw_rate": "gierrate drehrate lacet gier",
+    "yaw_rate": "gierrate drehrate lacet gier yawrate",
     "joystick": "fahrhebel manche",
 }
 _ENGLISH = {word: meaning for meaning, words in _MEANINGS.items() for word in words.split()}
@@ -102,7 +104,16 @@ def tokens(name: str) -> list[str]:
 def _tokens(name: str) -> tuple[str, ...]:
     parted = _JOINED.sub(r"\1_", _PREFIX.sub("", folded(name)))
     found = [t.lower() for t in re.findall(r"[A-Z]{1,}(?![a-z])|[A-Z]?[a-z]+|\d+", parted)]
-    return tuple(part for word in found for part in (_PART.findall(word) if _TOGETHER.fullmatch(word) else (word,)))
+    return tuple(part for word in found for part in _parted(word))
+
+
+def _parted(word: str) -> Sequence[str]:
+    """A lower-case word, or those that are written together in it."""
+    if _TOGETHER.fullmatch(word):
+        found: list[str] = _PART.findall(word)
+        return found
+    joined = _LETTER.fullmatch(word)
+    return (word,) if joined is None else joined.groups()
 
 
 def english(words: Sequence[str]) -> list[str]:

@@ -20,9 +20,12 @@ _EFFORT_UNITS = (("A", r"current|(^|_)amp"), ("V", r"volt"), ("%", r"duty|pwm"))
 # Fields of messages that are no measured values.
 _NO_VALUE = re.compile(r"(^|[._])(header|stamp|seq|covariance|timestamp|time|layout)([._\[]|$)")
 _VALVE = re.compile(r"valve|spool")
+_DRIVERS = re.compile(r"(^|_)(steer(ing)?|str)_(wheel|rad)(_|$)")  # that the driver turns
 _ELECTRIC = frozenset(("current", "voltage"))
 # What is derived from a signal, or bounds it, is not the signal.
-_NO_SIGNAL = re.compile(r"^(err(or)?|diff|max(imum)?|ecart|erreur|seuil)$|fehler|abweichung|limit|grenz|schwelle")
+_NO_SIGNAL = re.compile(
+    r"^(err(or)?|diff|rel(ative)?|max(imum)?|ecart|erreur|seuil)$|fehler|abweichung|limit|grenz|schwelle"
+)
 # Words beside which a single unit of speed or angle says what a part's channel holds: nIst, VL, Rad_VL.soll.
 _PLAIN = (
     ASKING
@@ -215,6 +218,8 @@ def _leaf(said: _Said) -> str | None:
         return None
     patterns = _PART_PATTERNS[Scope.AXLE if said.steering else Scope.WHEEL]
     leaf = next((leaf for leaf, pattern in patterns if re.search(pattern, "_".join(last))), None)
+    if leaf in ("phi", "phi_ref") and _DRIVERS.search(said.text):  # which is geared to the axle
+        return None
     if _is_valve_current(said):  # no effort of its wheel, and no opening
         return None
     quantity = UNITS[known] if (known := known_unit(said.unit)) is not None else ("", 1.0)

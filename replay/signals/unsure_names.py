@@ -8,17 +8,14 @@ from __future__ import annotations
 
 import re
 from collections import defaultdict
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from enum import StrEnum
 
 import numpy as np
 
 from replay.log.raw_log import Channel
-from replay.log.source_options import SignalSource
 from replay.machine.config import Machine
 from replay.machine.quantities import UNITS
-from replay.machine.toml_text import signal_line
 from replay.machine.units import known_unit
 from replay.signals.candidate import source_of
 from replay.signals.name_parts import (
@@ -35,61 +32,14 @@ from replay.signals.named_units import bare_name, unit_by_end
 from replay.signals.rules import MESSAGE_TYPES, candidates
 from replay.signals.second_ones import number_of, seconds
 from replay.signals.symbol_rules import valve_current
+from replay.signals.unsure_body import angles, openings, places, turns
+from replay.signals.unsure_kinds import Open, Unsure
 from replay.signals.unsure_openings import unsure_opening
 
 #: Begin of the note that names such channels.
 NOT_USED = "not used, for their names leave open what they hold"
 
 
-class Open(StrEnum):
-    """What a name leaves open."""
-
-    CURRENT = "current"
-    COUNTS = "counts"
-    POSITION = "position"
-    SPEED = "speed"
-    SECOND = "second"
-    MOTION = "motion"
-    OPENING = "opening"
-
-
-@dataclass(frozen=True)
-class Unsure:
-    """A channel that may hold a signal, once somebody says what its name leaves open.
-
-    Attributes
-    ----------
-    signal : str
-        Canonical name.
-    origin : SignalSource
-        The channel, with the conversion that it would have; an empty unit where that is open too.
-    kind : Open
-        What its name leaves open.
-    beside : str
-        Label of the channel that it goes with; may be empty.
-    """
-
-    signal: str
-    origin: SignalSource
-    kind: Open
-    beside: str = ""
-
-    @property
-    def reason(self) -> str:
-        """Why it is not taken, and the line of [signals] to write if it is what it seems."""
-        line = signal_line(self.signal, _as_written(self))
-        return f"{self.origin.label!r} {_REASONS[self.kind].format(beside=self.beside, unit=self.origin.unit)}, write {line}"
-
-
-_REASONS = {
-    Open.CURRENT: "is a valve's current or voltage, which is no opening by itself; with gain = 1 / the one that opens it fully",
-    Open.COUNTS: "counts an encoder's steps, and how many make a turn is not known; with gain = 6.2832 / the steps of a turn",
-    Open.POSITION: "may be the position of a wheel, whose slope is its speed; if it is, and in {unit}",
-    Open.SPEED: "has no word for what it holds; if it is a speed, with its unit (m/s, rad/s, rpm, mm/s)",
-    Open.MOTION: "may be what the machine is told to do, or what it does (odom.v is its measured speed); if it is the command",
-    Open.SECOND: "may be a second sensor beside {beside!r}; if it is",
-    Open.OPENING: "may be what a valve or pump is told, or where it stands (1 is fully open); if it is",
-}
 _LETTERS = frozenset(("v", "w", "n", "omega"))  # that stand for a speed
 _THINGS = frozenset(("wheel", "rad", "motor", "drive", "hub", "side", "track", "joint", "chain", "crawler", "st", "fb"))
 _STEPS = frozenset(
@@ -137,10 +87,47 @@ def unsure(channels: Mapping[str, Channel], machine: Machine) -> list[Unsure]:
         else:
             out += _motion(channel, measured)
     out += _of_any_log(channels, machine)
+    wheels_of_drivers = {name: c for name, c in channels.items() if c.topic}
+    out = [*_numbered(out), *_beside_others(bare, wheels_of_drivers, machine, sure)]
     first: dict[str, Unsure] = {}
     for found in out:
         first.setdefault(found.signal, found)
     return [*first.values()]
+
+
+def _beside_others(
+    columns: Mapping[str, Channel], fields: Mapping[str, Channel], machine: Machine, sure: Mapping[str, set[str]]
+) -> Iterator[Unsure]:
+    """Yield what other columns, or their values, make of names of a letter or two, of places, turns and steering."""
+    named = {signal: label for label, signals in sure.items() for signal in signals}
+    free = {name: c for name, c in columns.items() if name not in sure}
+    for signal, name, unit in turns(free):
+        yield Unsure(signal, source_of(free[name], unit), Open.YAW_RATE)
+    for signal, name in places(free):
+        yield Unsure(signal, source_of(free[name], "deg"), Open.PLACE)
+    every = {**free, **fields}
+    for signal, name, unit, drivers in angles(every, machine):
+        yield Unsure(signal, source_of(every[name], unit), Open.DRIVERS if drivers else Open.ANGLE)
+    for signal, name, unit in openings(columns, machine, named):
+        if name in free:
+            yield Unsure(signal, source_of(free[name], unit), Open.OPENING)
+
+
+def _numbered(found: Sequence[Unsure]) -> list[Unsure]:
+    """The same, but of two that may be one speed and differ by a number in their names the later one as a second sensor."""
+    alike: dict[tuple[str, str], list[Unsure]] = defaultdict(list)
+    for one in found:
+        if one.kind is Open.SPEED and one.signal.endswith(".v"):
+            alike[one.signal, re.sub(r"(?<=[A-Za-z])\d+", "", one.origin.label)].append(one)
+    out = {id(one): one for one in found}
+    for ones in alike.values():
+        if len(ones) == 2:
+            first, second = sorted(ones, key=lambda one: one.origin.label != re.sub(r"\d+", "", one.origin.label))
+            if first.origin.label == re.sub(r"\d+", "", first.origin.label):
+                out[id(second)] = replace(
+                    second, signal=f"{second.signal}_true", kind=Open.SECOND, beside=first.origin.label
+                )
+    return [*out.values()]
 
 
 def _of_any_log(channels: Mapping[str, Channel], machine: Machine) -> Iterator[Unsure]:
@@ -259,9 +246,3 @@ def _seconds(channels: Mapping[str, Channel], machine: Machine, sure: Mapping[st
 
 def _unit(channel: Channel) -> str:
     return (channel.unit or "") or bare_name(channel.name)[1] or unit_by_end(channel.name)
-
-
-def _as_written(found: Unsure) -> SignalSource:
-    """The origin with what stands in for what is open."""
-    unit = {Open.COUNTS: "rad", Open.SPEED: found.origin.unit or "…"}.get(found.kind, found.origin.unit)
-    return replace(found.origin, unit=unit)

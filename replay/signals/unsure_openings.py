@@ -14,7 +14,9 @@ from replay.signals.name_parts import axle_of, is_place, is_steering, speaks_of_
 from replay.signals.name_words import ASKING, MEASURED, english, role, tokens
 from replay.signals.named_units import bare_name
 
-_OPENED = frozenset(("pump", "pumpe", "pompe", "swash", "swashplate", "schwenk", "spool", "valve", "vlv"))
+_OPENED = frozenset(
+    ("pump", "pumpe", "pompe", "swash", "swashplate", "schwenk", "spool", "valve", "vlv", "opening", "oeffnung")
+)
 _SAID = frozenset(
     (
         "position",
@@ -52,11 +54,16 @@ def unsure_opening(channel: Channel, machine: Machine) -> tuple[str, str] | None
     words = {w for p in parts for w in p}
     named = {w.lower() for w in machine.wheels}
     last = {w for w in parts[-1] if not is_place(w) and not w.isdigit()} - named
-    if part is None or not _OPENED & words or speaks_of_no_wheel(name):
+    opened = _OPENED | {"u"} if steering else _OPENED  # u_steer_rear
+    if part is None or not opened & words or speaks_of_no_wheel(name):
         return None
-    if not last <= _OPENED | _SAID | ASKING | MEASURED | frozenset(("steer",)):
+    if not last <= opened | _SAID | ASKING | MEASURED | frozenset(("steer",)):
         return None
-    asked = role([*last, *(w for p in parts if {*p} <= ASKING for w in p)])
+    asked = (
+        "ref"
+        if "u" in last and not MEASURED & last
+        else role([*last, *(w for p in parts if {*p} <= ASKING for w in p)])
+    )
     unit = _unit(channel, stated)
     if unit is None or asked == "both":
         return None

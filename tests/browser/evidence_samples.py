@@ -31,6 +31,22 @@ def decided() -> tuple[dict[str, Any], samples.Columns]:
     return report, {k: np.asarray(v) for k, v in columns.items()}
 
 
+def machine_events(*, faults: bool = True) -> tuple[dict[str, Any], samples.Columns]:
+    """A mission of whose machine as a whole two things are told, one of them throughout."""
+    report, columns = decided() if faults else samples.no_faults()
+    spans = [{"start_s": 30.0, "stop_s": 36.0}, {"start_s": 80.0, "stop_s": 100.0}]
+    report["events"] = [
+        {"id": "M1", "title": "The machine did not follow its commands", "text": "For 26 s …", "spans": spans},
+        {"id": "M2", "title": "The gyro contradicts the wheels", "text": "Throughout.", "spans": []},
+    ]
+    return report, columns
+
+
+def machine_events_alone() -> tuple[dict[str, Any], samples.Columns]:
+    """The same of a mission without a fault."""
+    return machine_events(faults=False)
+
+
 def many_faults(count: int, spans: int) -> tuple[dict[str, Any], samples.Columns]:
     """Faults of falling severity one after the other on two wheels, and as many states as wanted."""
     report, columns = samples.five_faults()

@@ -1,5 +1,5 @@
 "use strict";
-// What the address asks for: fault, time, chosen signals; and what of it the page does not have.
+// What the address asks for: fault, event of the machine, time, chosen signals; and what of it the page does not have.
 const Address = {
   text(fault, range, plots, view) {
     const parts = fault ? [`fault=${encodeURIComponent(fault)}`] : [];
@@ -15,7 +15,7 @@ const Address = {
     const plain = (s) => { try { return decodeURIComponent(s); } catch { return ""; } };
     const t = read("t") ? read("t").split(",").map(Number) : [], around = t.length === 1 ? [t[0] - 0.5, t[0] + 0.5] : t;
     const range = around.length === 2 && around.every(Number.isFinite) && around[1] > around[0] ? around : undefined, plots = read("plots");
-    return { has: read("fault"), id: plain(read("fault")), t: plain(read("t")) || read("t"), range, plots: plots ? plots.split(";").map((p) => p.split(",").map(plain)) : null, view: read("view") };
+    return { event: plain(read("event")), has: read("fault"), id: plain(read("fault")), t: plain(read("t")) || read("t"), range, plots: plots ? plots.split(";").map((p) => p.split(",").map(plain)) : null, view: read("view") };
   },
 
   cut: (s) => (s.length > 60 ? `${s.slice(0, 60)}…` : s),

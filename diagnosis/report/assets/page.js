@@ -150,6 +150,26 @@
     Data.later().then(() => { if (current === id) { choices(f); return drawEvidence(); } });
   }
 
+  // What the machine did as a whole: its time in all plots; the address keeps the time, and the event while nothing else is chosen.
+  function showEvent(bar, scroll) {
+    for (const e of all(".mev[aria-current]")) e.removeAttribute("aria-current");
+    bar.setAttribute("aria-current", "true");
+    const span = [Number(bar.dataset.from), Number(bar.dataset.to)], pad = Math.max(0.5, (span[1] - span[0]) * 0.25), range = [Math.max(0, span[0] - pad), Math.min(view.duration, span[1] + pad)];
+    if (current) select(current, { range, scroll });
+    else {
+      shared = range;
+      const figure = loop ?? explorer?.figure;
+      if (figure?.drawn) figure.zoom(range);
+      else if (loop) drawLoop(loopKey);
+      if (scroll) Sight.go(loop ? "#loop" : "#timeline", scroll === "at once");
+    }
+    bar.setAttribute("aria-current", "true");
+    try { history.replaceState(null, "", bar.getAttribute("href")); } catch { /* browsers limit how often */ }
+    one("#live").textContent = bar.title;
+  }
+
+  const barOf = (id, t) => { const mine = all(`.mev[data-e="${CSS.escape(id)}"]`); return mine.find((b) => t && Number(b.dataset.from) === t[0] && Number(b.dataset.to) === t[1]) ?? mine[0]; };
+
   function step(by) {
     const ids = [...faults.keys()], at = ids.indexOf(current);
     select(ids[Math.min(ids.length - 1, Math.max(0, at + by))], { step: true });
@@ -214,8 +234,9 @@
   };
 
   document.addEventListener("click", (e) => {
-    const target = e.target.closest("[data-f], [data-act], [data-loop]");
+    const target = e.target.closest("[data-f], [data-act], [data-loop], [data-e]");
     if (!target) return;
+    if (target.dataset.e) { e.preventDefault(); showEvent(target, true); return; }
     if (target.dataset.act) actions[target.dataset.act](target);
     else if (target.dataset.loop) drawLoop(target.dataset.loop);
     else { e.preventDefault(); select(target.dataset.f, { scroll: true, step: true }); }
@@ -239,14 +260,15 @@
   });
 
   function fromAddress(hash, scroll) {
-    const { has, t, range, plots, view: shown, id } = Address.read(hash), wanted = plots ?? [];
-    if (faults.has(id)) select(id, { range, scroll });
+    const { event, has, t, range, plots, view: shown, id } = Address.read(hash), wanted = plots ?? [], bar = event && barOf(event, range);
+    if (bar) { if (!current && faults.size) select(faults.keys().next().value); showEvent(bar, scroll); } else if (faults.has(id)) select(id, { range, scroll });
     else if (!current && faults.size) select(faults.keys().next().value, { range });
     else if (!faults.size && range) shared = range;
     if (explorer && plots) one("#signals-view").value = ["xy", "spectrum"].find((v) => v === shown) ?? "time";
     if (explorer && (plots || faults.has(id)) && JSON.stringify(wanted) !== JSON.stringify(explorer.plots)) explorer.set(wanted);
     const lacking = explorer ? [...new Set(wanted.flat())].filter((n) => !explorer.meaning(n)) : [];
     Address.tell([
+      event && !bar ? `There is no event ${Address.cut(event)} of the machine in this report.` : "",
       has && !faults.has(id) ? `There is no fault ${Address.cut(id || has)} in this report${current ? `: ${current} is shown` : ""}.` : "",
       t && !range ? `“${Address.cut(t)}” is not a time: expected t=seconds or t=from,to.` : "",
       lacking.length ? `There is no signal ${lacking.slice(0, 3).map(Address.cut).join(", ")}${lacking.length > 3 ? ` and ${lacking.length - 3} more` : ""} in this report.` : "",

@@ -90,6 +90,12 @@ def test_wheels_that_all_read_a_speed_at_rest_are_told_but_not_those_of_stated_f
     leaves = {"v": rests + 0.3, "u": rests, "u_applied": np.full((size, 4), np.nan)}
     machine = SimpleNamespace(wheels=wheels, max_speed=top)
     cells = SimpleNamespace(
-        size=size, dt=0.1, machine=machine, reference=rests, wheels=leaves.get, told=lambda _: np.full(size, stated)
+        size=size,
+        dt=0.1,
+        machine=machine,
+        reference=rests,
+        wheels=leaves.get,
+        told=lambda _: np.full(size, stated),
+        driven=range(len(wheels)),
     )
     assert bool(list(_at_rest(cast(Cells, cells)))) is said

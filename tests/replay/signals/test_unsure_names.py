@@ -15,7 +15,8 @@ from replay.machine.geometry import Geometry, WheelGeometry
 from replay.mission import read_signals
 from replay.readers.tables.columns import unit_of
 from replay.signals.rules import candidates
-from replay.signals.unsure_names import Open, unsure
+from replay.signals.unsure_kinds import Open
+from replay.signals.unsure_names import unsure
 
 STAMPS = np.arange(3, dtype=np.int64)
 TWO = replace(
