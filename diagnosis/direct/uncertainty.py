@@ -204,7 +204,7 @@ def _noise(
 def _relative_white(pair: Pair, growth: NoiseGrowth, size: Array, counted: Array) -> Array:
     """Variance of the white noise at every sample as a share of that at standstill, shape (n,)."""
     if growth.share == 0.0 and not pair.habit.tick:
-        return np.ones(size.size)
+        return pair.store.keep(np.ones(size.size))
     floor = max(growth.floor, 1e-5 * pair.span)
     return pair.store.keep(1.0 + ((growth.share * size) ** 2 + counted) / floor**2)
 
@@ -219,7 +219,7 @@ def _explained(pair: Pair, paired: NDArray[np.bool_], noise: float, period: floa
 def _constant(pair: Pair, relative: Array, counted: Array, noise: float, constant: float) -> Array:
     """Variance of a stuck channel as a share of the least: a value may last as long as rounding hides the noise."""
     if not pair.habit.tick or pair.side is Side.ACTUATOR:
-        return np.ones(relative.size)
+        return pair.store.keep(np.ones(relative.size))
     from scipy.special import erf
 
     own = np.maximum(noise**2 * relative - counted, 1e-12)

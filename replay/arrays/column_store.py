@@ -48,7 +48,7 @@ class ColumnStore:
 
     block: int = BLOCK
     always: int = 16 << 20
-    room: int = 512 << 20
+    room: int = 256 << 20
     flush: int = 4 << 20
     used: int = field(default=0, init=False)
     _maps: weakref.WeakSet[mmap.mmap] = field(default_factory=weakref.WeakSet, init=False, repr=False)

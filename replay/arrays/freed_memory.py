@@ -10,7 +10,9 @@ import sys
 
 _TRIM_THRESHOLD, _MMAP_THRESHOLD = -1, -3  # of mallopt(3)
 _KEPT = 128 << 20  # freed at the top of the heap, that a process keeps [bytes]
-_LARGE = 32 << 20  # from here on memory comes from the system and goes back to it; the most that glibc takes [bytes]
+_LARGE = (
+    8 << 20
+)  # from here on memory comes from the system and goes back to it: columns of hours would leave gaps that nothing fits into [bytes]
 
 
 def keep_freed_memory() -> bool:

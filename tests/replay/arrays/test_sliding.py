@@ -7,6 +7,7 @@ import pytest
 from numpy.testing import assert_array_equal
 from scipy.ndimage import maximum_filter1d, minimum_filter1d, uniform_filter1d
 
+from diagnosis.channels.noise import moving_sum
 from replay.arrays.sliding import largest_within, mean_within, smallest_within
 
 _SIZES = (1, 2, 7, 100, 5003)
@@ -33,3 +34,22 @@ def test_extremes_of_what_came_before(size: int, width: int) -> None:
 def test_means(size: int, width: int) -> None:
     x = np.random.default_rng(size + width).normal(size=size) ** 2
     assert_array_equal(mean_within(x, width), uniform_filter1d(x, width, mode="constant"))
+
+
+@pytest.mark.parametrize("size", [16384, 32767, 32768, 50_001])
+@pytest.mark.parametrize("width", [1, 4, 301, 9000])
+def test_long_columns_in_parts(size: int, width: int) -> None:
+    x, before = np.random.default_rng(size + width).normal(size=size), width // 2
+    assert_array_equal(mean_within(x**2, width), uniform_filter1d(x**2, width, mode="constant"))
+    assert_array_equal(largest_within(x, before, before), maximum_filter1d(x, 2 * before + 1))
+    assert_array_equal(smallest_within(x, before, before), minimum_filter1d(x, 2 * before + 1))
+
+
+@pytest.mark.parametrize("size", [16384, 32767, 50_001])
+@pytest.mark.parametrize("width", [1, 4, 301, 9000])
+def test_sums_in_parts_are_those_of_one_piece(monkeypatch: pytest.MonkeyPatch, size: int, width: int) -> None:
+    x = np.random.default_rng(size + width).normal(size=size)
+    parted = moving_sum(x, width), moving_sum(x > 0, width)
+    monkeypatch.setattr("replay.arrays.sliding._PART", 1 << 20)
+    for a, b in zip(parted, (moving_sum(x, width), moving_sum(x > 0, width)), strict=True):
+        assert_array_equal(a, b)
