@@ -1,4 +1,4 @@
-"""Largest, smallest and mean value of sliding windows, in NumPy alone: importing `scipy.ndimage` takes longer than they do.
+"""Largest, smallest, middle and mean value of sliding windows, in NumPy alone: importing `scipy.ndimage` takes longer than they do.
 
 Long columns are worked on in parts that stay in the processor's cache; every sample goes through the same operations in the same
 order as it would in one piece.
@@ -13,25 +13,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+Beyond = Literal["constant", "edge", "symmetric"]
 
 _PART = 1 << 14  # samples at a time
 _WIDE = 4  # times the window, at least
 
 
-def largest_within(x: Array, before: int, after: int) -> Array:
+def largest_within(x: Array, before: int, after: int, beyond: Beyond = "symmetric") -> Array:
     """Largest of the samples i − before … i + after, shape (n,), as `scipy.ndimage.maximum_filter1d` has it.
 
-    Beyond the ends x goes on as its mirror image. `x` of shape (n,), n > 0, without NaN.
+    Beyond the ends x goes on as its mirror image, or as `np.pad` has it. `x` of shape (n,), n > 0, without NaN.
     """
-    return _extreme(x, before, after, np.maximum)
+    return _extreme(x, before, after, np.maximum, beyond)
 
 
-def smallest_within(x: Array, before: int, after: int) -> Array:
+def smallest_within(x: Array, before: int, after: int, beyond: Beyond = "symmetric") -> Array:
     """Smallest of the samples i − before … i + after, shape (n,); see `largest_within`."""
-    return _extreme(x, before, after, np.minimum)
+    return _extreme(x, before, after, np.minimum, beyond)
 
 
-def _extreme(x: Array, before: int, after: int, pick: np.ufunc) -> Array:
+def _extreme(x: Array, before: int, after: int, pick: np.ufunc, beyond: Beyond) -> Array:
     """Extremes of 1, 2, 4… samples are put together until two of them cover the window."""
     width = before + after + 1
 
@@ -42,7 +43,20 @@ def _extreme(x: Array, before: int, after: int, pick: np.ufunc) -> Array:
             length *= 2
         return np.asarray(pick(best[:size], best[width - length :]))
 
-    return windowed(extremes, x, before, after, "symmetric")
+    return windowed(extremes, x, before, after, beyond)
+
+
+def median_within(x: Array, reach: int) -> Array:
+    """Median of the samples i − reach … i + reach, shape (n,), as `scipy.ndimage.median_filter` has it beside its nearest values.
+
+    Of short windows; those of wide ones are slower than SciPy's. `x` of shape (n,), n > 0, without NaN.
+    """
+    width = 2 * reach + 1
+
+    def medians(line: Array, _: int) -> Array:
+        return np.asarray(np.partition(np.lib.stride_tricks.sliding_window_view(line, width), reach, axis=1)[:, reach])
+
+    return windowed(medians, x, reach, reach, "edge")
 
 
 def windowed(
@@ -50,7 +64,7 @@ def windowed(
     x: NDArray[Any],
     before: int,
     after: int,
-    beyond: Literal["constant", "symmetric"] = "constant",
+    beyond: Beyond = "constant",
 ) -> Array:
     """Apply a function of windows, part by part.
 
@@ -103,7 +117,7 @@ def _parts(size: int, width: int) -> list[tuple[int, int]]:
     return list(zip(starts, [*starts[1:], size], strict=True))
 
 
-def _beyond(x: NDArray[Any], start: int, stop: int, mode: Literal["constant", "symmetric"] = "constant") -> Array:
+def _beyond(x: NDArray[Any], start: int, stop: int, mode: Beyond = "constant") -> Array:
     """Samples start … stop − 1, also where these lie beyond the ends."""
     inside: Array = x[max(0, start) : stop]
     missing = max(0, -start), max(0, stop - x.size)

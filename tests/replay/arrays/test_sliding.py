@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
-from scipy.ndimage import maximum_filter1d, minimum_filter1d, uniform_filter1d
+from scipy.ndimage import maximum_filter1d, median_filter, minimum_filter1d, uniform_filter1d
 
 from diagnosis.channels.noise import moving_sum
-from replay.arrays.sliding import largest_within, mean_within, smallest_within
+from replay.arrays.sliding import largest_within, mean_within, median_within, smallest_within
 
 _SIZES = (1, 2, 7, 100, 5003)
 
@@ -27,6 +27,21 @@ def test_extremes_of_what_came_before(size: int, width: int) -> None:
     x, origin = np.random.default_rng(size + width).normal(size=size), (width - 1) // 2
     assert_array_equal(largest_within(x, width - 1, 0), maximum_filter1d(x, width, origin=origin))
     assert_array_equal(smallest_within(x, width - 1, 0), minimum_filter1d(x, width, origin=origin))
+
+
+@pytest.mark.parametrize("size", [*_SIZES, 40_000])
+@pytest.mark.parametrize("width", [1, 4, 61])
+def test_extremes_beside_nearest_values(size: int, width: int) -> None:
+    x, origin = np.random.default_rng(size + width).normal(size=size), (width - 1) // 2
+    expected = minimum_filter1d(x, width, mode="nearest", origin=origin)
+    assert_array_equal(smallest_within(x, width - 1, 0, "edge"), expected)
+
+
+@pytest.mark.parametrize("size", [*_SIZES, 40_000])
+@pytest.mark.parametrize("reach", [0, 3, 7])
+def test_medians(size: int, reach: int) -> None:
+    x = np.random.default_rng(size + reach).normal(size=size).cumsum()
+    assert_array_equal(median_within(x, reach), median_filter(x, 2 * reach + 1, mode="nearest"))
 
 
 @pytest.mark.parametrize("size", _SIZES)
