@@ -58,6 +58,7 @@ def assess_components(
     mission = MissionView(timeline, replay, machine, chosen, alive_sources(timeline), progress)
     mission = _measured(mission)
     for family in WHOLE:
+        timeline.store.release()
         mission = mission.after(family.assess(mission))
     parts = [(component, side) for component in (*chosen, *machine.axles) for side in (SENSOR, ACTUATOR)]
     found = {part: mission.known.get(part) or _without_evidence(mission, *part) for part in parts}
@@ -81,6 +82,7 @@ def _measured(mission: MissionView) -> MissionView:
     def single() -> MissionView:
         view = replace(mission, progress=say)
         for family in SINGLE:
+            view.timeline.store.release()
             view = view.after(family.assess(view))
         return view
 

@@ -23,6 +23,7 @@ from diagnosis.clearing.seconds import off_second
 from diagnosis.clearing.wild import wild_readings
 from diagnosis.results.clearing import Check, Checked
 from diagnosis.results.vocabulary import Kind
+from replay.arrays.blocks import release
 from replay.faults import Side
 
 FLOOR = 0.16  # of the top speed: a deviation is a share of at least this
@@ -205,7 +206,10 @@ def _echoes(cells: Cells, wheel: str) -> bool:
     """Whether a wheel's reading repeats its command."""
     timeline, name, at = cells.timeline, f"wheel.{wheel}.v", cells.machine.wheels.index(wheel)
     asked = cells.replay.v_ref[:, at]
-    return repeats_its_command(timeline.signals[name], timeline.fresh[name], asked, cells.machine.limits, timeline.dt)
+    y = timeline.signals[name]
+    found = repeats_its_command(y, timeline.fresh[name], asked, cells.machine.limits, timeline.dt)
+    release(y, asked)
+    return found
 
 
 def _known(x: Array) -> bool:

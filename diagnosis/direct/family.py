@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 
@@ -70,13 +70,20 @@ class DirectEvidence:
         store.release()
         parts |= dict(zip(identified, judged, strict=True))
         sensors = {wheel: found for (wheel, side), found in identified.items() if side == SENSOR}
-        told = without_low_speed_habit(sensors, {wheel: parts[wheel, SENSOR] for wheel in sensors})
-        told = without_shared_moments(sensors, told)
-        told = without_second_speeds_own(sensors, told, _openings(mission))
-        told = with_frozen_readings(sensors, told)
+        told = {wheel: parts[wheel, SENSOR] for wheel in sensors}
+        for of_sensors in (
+            without_low_speed_habit,
+            without_shared_moments,
+            partial(without_second_speeds_own, openings=_openings(mission)),
+            with_frozen_readings,
+        ):
+            told = of_sensors(sensors, told)
+            store.release()
         valves = {wheel: found for (wheel, side), found in identified.items() if side == ACTUATOR}
-        small = without_small_deviations(valves, {wheel: parts[wheel, ACTUATOR] for wheel in valves})
-        own = without_switching(valves, without_stays(valves, small))
+        own = {wheel: parts[wheel, ACTUATOR] for wheel in valves}
+        for of_valves in (without_small_deviations, without_stays, without_switching):
+            own = of_valves(valves, own)
+            store.release()
         parts |= {(wheel, SENSOR): a for wheel, a in told.items()} | {(wheel, ACTUATOR): a for wheel, a in own.items()}
         return Contribution(parts)
 
