@@ -164,6 +164,11 @@ class IdentifiedPair:
         return keep(first[moving].astype(small)), keep(length[moving].astype(small))
 
     @cached_property
+    def way(self) -> Array:
+        """Sum of the sizes of the reference up to each sample [unit], shape (n + 1,)."""
+        return self.pair.store.keep(np.r_[0.0, np.cumsum(np.abs(np.nan_to_num(self.samples.x)))])
+
+    @cached_property
     def texture(self) -> Texture:
         """Noise and rounding step of both measurements."""
         pair = self.pair
