@@ -59,6 +59,7 @@ def assess_components(
     mission = MissionView(timeline, replay, machine, chosen, alive_sources(timeline), progress)
     mission = _measured(mission)
     for family in whole(mission):
+        timeline.store.release()
         mission = mission.after(family.assess(mission))
     parts = [
         (component, side)
@@ -88,6 +89,7 @@ def _measured(mission: MissionView) -> MissionView:
     def single() -> MissionView:
         view = replace(mission, progress=say)
         for family in SINGLE:
+            view.timeline.store.release()
             view = view.after(family.assess(view))
         return view
 

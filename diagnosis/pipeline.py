@@ -181,7 +181,7 @@ def _walk(
     mission = replace(mission, timeline=timeline)
 
     def publish(stage: Progress) -> None:
-        timeline.store.release()
+        timeline.store.end_stage()
         progress(stage)
 
     publish(Progress(Stage.REPLAYING_LOOP))
@@ -201,7 +201,7 @@ def _walk(
     judged = _with_machine_events(_with_what_stands_out(judged))
     found = judged.found
     report = report_of_mission(judged, identity)
-    timeline.store.release()
+    timeline.store.end_stage()
     windows = closeups_of(shown, replay, machine, found.assessments, judged.intervals)
     if windows is not None:
         near = known_probability(report, windows.step * timeline.dt, timeline.dt, windows.columns)

@@ -144,6 +144,7 @@ def report_of_mission(judged: Judged, identity: MachineRow) -> ReportDocument:
     mission, machine, replay, found = judged.mission, judged.machine, judged.replay, judged.found
     timeline = mission.timeline
     moving = metrics.driving(replay, timeline, machine)
+    timeline.store.release()
     coverage, decided_s = metrics.coverage(found.assessments, moving, machine, timeline.dt)
     decision = _decision(judged, coverage, decided_s, metrics.open_states(found.assessments, moving, machine))
     report: ReportDocument = {

@@ -262,6 +262,7 @@ def load_mission(
     """
     files, signals = read_signals(paths, machine, progress=progress, store=store)
     check_units(signals)
+    signals.store.release()
     progress(Progress(Stage.ALIGNING_SIGNALS))
     require_use(files, signals)
     try:

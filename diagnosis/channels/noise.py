@@ -6,11 +6,13 @@ mission leave it alone.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
 from replay.arrays.blocks import blocks
-from replay.arrays.sliding import mean_within
+from replay.arrays.sliding import mean_within, windowed
 from replay.signals.resolution import rounding_step as rounding_step
 from replay.signals.resolution import white_noise as white_noise
 from replay.signals.resolution import windows as _windows
@@ -35,17 +37,25 @@ def moving_sum(x: NDArray[np.float64] | NDArray[np.bool_], width: int) -> Array:
     """
     width = min(width, x.size)
     if x.dtype == np.bool_:
-        upto = np.pad(np.concatenate(([0], np.cumsum(x))), (width // 2, max(0, width - 1) // 2), mode="edge")
-        return np.asarray(upto[width : width + x.size] - upto[: x.size], dtype=np.float64)
-    sums = np.pad(np.asarray(x, dtype=np.float64), (width // 2, max(0, width - 1) // 2))
-    out, start, length = np.zeros(x.size), 0, 1
-    while length <= width:
-        if width & length:
-            out += sums[start : start + x.size]
-            start += length
-        sums = sums[:-length] + sums[length:] if 2 * length <= width else sums
-        length *= 2
-    return out
+
+        def counts(line: NDArray[Any], size: int) -> Array:
+            upto = np.concatenate(([0], np.cumsum(line)))
+            return np.asarray(upto[width : width + size] - upto[:size], dtype=np.float64)
+
+        return windowed(counts, x, width // 2, max(0, width - 1) // 2)
+
+    def sums_of(line: Array, size: int) -> Array:
+        sums = np.asarray(line, dtype=np.float64)
+        out, start, length = np.zeros(size), 0, 1
+        while length <= width:
+            if width & length:
+                out += sums[start : start + size]
+                start += length
+            sums = sums[:-length] + sums[length:] if 2 * length <= width else sums
+            length *= 2
+        return out
+
+    return windowed(sums_of, x, width // 2, max(0, width - 1) // 2)
 
 
 def usual_rounding(values: Array) -> float:

@@ -38,6 +38,7 @@ def together_idle(mission: MissionView) -> Flags:
         else mission.values(n)
         for n, y, c in zip(names, readings, commands, strict=True)
     ]
+    mission.timeline.store.release()
     for start, stop in not_followed(speeds, commands, least, mission.timeline.dt, readings):
         out[start:stop] = True
     return out

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.results.clearing import after_s
-from replay.arrays.blocks import blocks, framed
+from replay.arrays.blocks import blocks, framed, release
 from replay.control.loop import Replay
 from replay.machine.config import Machine
 from replay.signals.timeline import Timeline
@@ -119,7 +119,9 @@ class Cells:
 
     def of(self, x: Array) -> Array:
         """The same of any column of the timeline, shape (cells, …)."""
-        return np.concatenate([_means(x[part], self.width) for part in blocks(len(x), self.width)])
+        means = np.concatenate([_means(x[part], self.width) for part in blocks(len(x), self.width)])
+        release(x)
+        return means
 
     @property
     def carried_shares(self) -> list[float]:

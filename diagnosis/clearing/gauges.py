@@ -138,7 +138,9 @@ def _wheels(cells: Cells) -> Iterator[Gauges]:
     used = np.where(np.isfinite(opening), opening, command)
     followed = as_followed(cells, opening, command, wheels.OPENING)
     responses = resp.responses_of(cells, speed, used, cells.reference, beyond_dead=True)
-    limits = response_limits(responses, measured_twice(cells), clear_at, cells.carried_shares, cells.ahead)
+    limits = response_limits(
+        responses, measured_twice(cells), clear_at, cells.carried_shares, cells.ahead, driven=len(cells.driven)
+    )
     tells = openings_tell(cells, responses)
     delays, rough = late(speed, cells.reference, cells.dt), wheels.roughness_of(cells, speed)
     for i, name in enumerate(cells.machine.wheels):

@@ -80,11 +80,14 @@ def response_limits(
     clear_at: float,
     carried: Sequence[float] | None = None,
     ahead: Sequence[float] | None = None,
+    *,
+    driven: int | None = None,
 ) -> list[Limits]:
     """Limits of every wheel [ln], lower where the other wheels deviate by much less.
 
     Arguments as of `usual_limits`; `carried` is the share of its speed that the ground gives each wheel [1], none by default, and `ahead`
-    where each is along the machine [m]: two abreast that lose together are held to the wheels of other axles. What is usual of a
+    where each is along the machine [m]: two abreast that lose together are held to the wheels of other axles. `driven` is how many wheels have a drive, all by
+    default. What is usual of a
     wheel that is measured once may be below the others' by no more than the loss that counts leaves to be seen beside the ground, or above by
     no more than such an excess does.
     """
@@ -96,7 +99,10 @@ def response_limits(
             lasting_above=min(limit.lasting_above, float(np.log1p(clear_at * (1.0 - held)))),
         )
         for limit, both, held in zip(
-            _beside_others(responses, twice, clear_at, ahead), twice, carried or [0.0] * len(twice), strict=True
+            _beside_others(responses, twice, clear_at, ahead, len(twice) if driven is None else driven),
+            twice,
+            carried or [0.0] * len(twice),
+            strict=True,
         )
     ]
 
@@ -124,7 +130,11 @@ def _seen(clear_at: float, carried: float) -> float:
 
 
 def _beside_others(
-    responses: Responses, twice: Sequence[tuple[bool, bool]], clear_at: float, ahead: Sequence[float] | None
+    responses: Responses,
+    twice: Sequence[tuple[bool, bool]],
+    clear_at: float,
+    ahead: Sequence[float] | None,
+    driven: int,
 ) -> list[Limits]:
     most = [[float(x) for x in largest(sign * responses.windows)] for sign in (-1.0, 1.0)]
     below = [usual.below for usual in responses.usual]
@@ -140,7 +150,7 @@ def _beside_others(
             changed=alone(responses.changes, i, limit.changed, changed, _CHANGED_ALONE),
             grown=alone(responses.grown, i, limit.grown, changed, _CHANGED_ALONE),
         )
-        if len(twice) == _PAIR and all(both):
+        if driven == _PAIR and all(both):
             limit = limit._replace(
                 changed=_OF_PAIR * limit.changed,
                 grown=_OF_PAIR * limit.grown,

@@ -23,6 +23,7 @@ from diagnosis.clearing.seconds import less_at_starts, off_second
 from diagnosis.clearing.wild import wild_readings
 from diagnosis.results.clearing import Check, Checked
 from diagnosis.results.vocabulary import Kind
+from replay.arrays.blocks import release
 from replay.faults import Side
 
 FLOOR = 0.16  # of the top speed: a deviation is a share of at least this
@@ -68,7 +69,7 @@ def wheel_checks(cells: Cells, clear_at: float) -> Iterator[Checked]:
     windows, lasting = responses.windows, responses.usual
     slow = responses_of(cells, speed, used, reference, CREEPING * USUAL_TOP, over_time=False, beyond_dead=True).windows
     slow[np.isfinite(windows)] = np.nan
-    limits = response_limits(responses, twice, clear_at, cells.carried_shares, cells.ahead)
+    limits = response_limits(responses, twice, clear_at, cells.carried_shares, cells.ahead, driven=len(cells.driven))
     long = longer(cells, -windows)
     long_most = [float(x) for x in largest(long)]
     tracking, rough = _tracking(cells, speed, reference), _rough_beside_others(roughness_of(cells, speed, reference))
@@ -205,7 +206,10 @@ def _echoes(cells: Cells, wheel: str) -> bool:
     """Whether a wheel's reading repeats its command."""
     timeline, name, at = cells.timeline, f"wheel.{wheel}.v", cells.machine.wheels.index(wheel)
     asked = cells.replay.v_ref[:, at]
-    return repeats_its_command(timeline.signals[name], timeline.fresh[name], asked, cells.machine.limits, timeline.dt)
+    y = timeline.signals[name]
+    found = repeats_its_command(y, timeline.fresh[name], asked, cells.machine.limits, timeline.dt)
+    release(y, asked)
+    return found
 
 
 def _known(x: Array) -> bool:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.clearing.cells import Array, Cells
+from replay.arrays.blocks import release
 
 _NOISES, _OF_TOP = 8.0, 0.1  # times the usual noise, and share of the top speed, from which on a reading is wild
 _FEW = 3  # in a window: fewer are a recorder's
@@ -48,6 +49,7 @@ def _wild(cells: Cells, name: str) -> tuple[NDArray[np.intp], Array]:
     if y is None or at.size < _FEW:
         return np.zeros(0, dtype=np.intp), np.zeros(0)
     v = y[at]
+    release(y)
     before, after = v[1:-1] - v[:-2], v[1:-1] - v[2:]
     alone = np.where(before * after > 0.0, np.minimum(np.abs(before), np.abs(after)), 0.0)
     usual = float(np.median(np.abs(before + after))) / 0.6745 / np.sqrt(6.0)

@@ -236,5 +236,6 @@ def _jitter_ms(signals: Signals, timeline: Timeline) -> float:
         if name.startswith("wheel.") and 0 < period < 2 * timeline.step_ns and signal.stamps.size > 2:
             if place not in seen:
                 out = max(out, float(np.quantile(np.abs(np.diff(signal.stamps) - period), 0.99)) * 1e-6)
+                release(signal.stamps)
             seen.add(place)
     return out

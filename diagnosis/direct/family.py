@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 
@@ -49,6 +49,7 @@ class DirectEvidence:
         habits = _habits(mission)
         for wheel in mission.wheels:
             one = _WheelPairs(mission, wheel)
+            mission.timeline.store.release()
             if (wheel, SENSOR) not in mission.known and one.logged("v_true") and one.logged("v"):
                 pairs[wheel, SENSOR] = one.speeds(habits[wheel])
             if (wheel, ACTUATOR) not in mission.known and one.logged("u_applied"):
@@ -59,16 +60,30 @@ class DirectEvidence:
                     parts[wheel, ACTUATOR] = unassessed(mission.timeline.size, State.NOT_ASSESSED, why, Lack.COMMAND)
         limits = mission.machine.limits
         identified = _identified(pairs, limits, mission)
-        judged = each(lambda found: assess_identified(found, limits), identified.values(), mission.timeline.size)
+        store = mission.timeline.store
+        judged = each(
+            lambda found: assess_identified(found, limits),
+            identified.values(),
+            mission.timeline.size,
+            lambda _: store.release(),
+        )
+        store.release()
         parts |= dict(zip(identified, judged, strict=True))
         sensors = {wheel: found for (wheel, side), found in identified.items() if side == SENSOR}
-        told = without_low_speed_habit(sensors, {wheel: parts[wheel, SENSOR] for wheel in sensors})
-        told = without_shared_moments(sensors, told)
-        told = without_second_speeds_own(sensors, told, _openings(mission))
-        told = with_frozen_readings(sensors, told)
+        told = {wheel: parts[wheel, SENSOR] for wheel in sensors}
+        for of_sensors in (
+            without_low_speed_habit,
+            without_shared_moments,
+            partial(without_second_speeds_own, openings=_openings(mission)),
+            with_frozen_readings,
+        ):
+            told = of_sensors(sensors, told)
+            store.release()
         valves = {wheel: found for (wheel, side), found in identified.items() if side == ACTUATOR}
-        small = without_small_deviations(valves, {wheel: parts[wheel, ACTUATOR] for wheel in valves})
-        own = without_switching(valves, without_stays(valves, small))
+        own = {wheel: parts[wheel, ACTUATOR] for wheel in valves}
+        for of_valves in (without_small_deviations, without_stays, without_switching):
+            own = of_valves(valves, own)
+            store.release()
         parts |= {(wheel, SENSOR): a for wheel, a in told.items()} | {(wheel, ACTUATOR): a for wheel, a in own.items()}
         return Contribution(parts)
 
@@ -93,6 +108,7 @@ def _identified(pairs: dict[Part, Pair], limits: Limits, mission: MissionView) -
         for (part, one), relation in zip(kind.items(), alike, strict=True):
             exceeds = usual is not None and one.own.exceeds(usual)
             louder = most is not None and one.model.noise > most
+            mission.timeline.store.release()
             if exceeds or louder or relation != one.relation:
                 found[part] = identify(one.pair, limits, usual if exceeds else None, relation, most)
         spread = usual_spread([found[part].own_spread for part in kind])

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -153,14 +153,20 @@ class IdentifiedPair:
         return gain_windows(self.samples, self.pair.dt)
 
     @cached_property
-    def holds(self) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    def holds(self) -> tuple[NDArray[np.signedinteger[Any]], NDArray[np.signedinteger[Any]]]:
         """Where y begins to hold a value other than 0, and for how many steps. Both of shape (k,)."""
         known = np.flatnonzero(self.pair.fresh & np.isfinite(self.pair.y))
         values = self.pair.y[known]
         first = known[np.flatnonzero(np.r_[True, values[1:] != values[:-1]])] if known.size else known
         length = np.diff(np.r_[first, self.pair.y.size])
         moving = self.pair.y[first] != 0.0
-        return first[moving], length[moving]
+        small, keep = np.int32 if self.pair.y.size < 1 << 31 else np.intp, self.pair.store.keep
+        return keep(first[moving].astype(small)), keep(length[moving].astype(small))
+
+    @cached_property
+    def way(self) -> Array:
+        """Sum of the sizes of the reference up to each sample [unit], shape (n + 1,)."""
+        return self.pair.store.keep(np.r_[0.0, np.cumsum(np.abs(np.nan_to_num(self.samples.x)))])
 
     @cached_property
     def texture(self) -> Texture:

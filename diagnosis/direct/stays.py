@@ -15,6 +15,7 @@ from diagnosis.channels.sample_status import PAIR
 from diagnosis.direct.identification import IdentifiedPair
 from diagnosis.direct.low_speed import left_open
 from diagnosis.results.assessment import Assessment, Finding
+from replay.arrays.sliding import largest_within, smallest_within
 from replay.faults import FaultMode
 
 _BRIEF_S, _STAYS_S = 0.6, 0.1  # longer is no stay; over so long a position stays ...
@@ -81,7 +82,6 @@ def _stays(one: IdentifiedPair) -> Sequence[tuple[int, int, float]]:
 
 
 def _range(z: NDArray[np.float64], width: int) -> NDArray[np.float64]:
-    from scipy.ndimage import maximum_filter1d, minimum_filter1d
-
-    filled = np.nan_to_num(z)
-    return np.asarray(maximum_filter1d(filled, width) - minimum_filter1d(filled, width))
+    filled, before = np.nan_to_num(z), width // 2
+    after = width - before - 1
+    return largest_within(filled, before, after) - smallest_within(filled, before, after)

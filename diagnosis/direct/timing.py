@@ -201,7 +201,7 @@ def _further(found: IdentifiedPair, run: Run, value: float, apart: NDArray[np.bo
     `value` is that reading, `apart` the other holds: at steady speed a coarse sensor repeats its reading, but that is right.
     """
     start, length = found.holds
-    way = np.r_[0.0, np.cumsum(np.abs(np.nan_to_num(found.samples.x)))]
+    way = found.way
     others = (way[start + length] - way[start])[apart]
     moved = others[others > 0.0]
     off = float(np.nanmedian(np.abs(found.pair.y - found.samples.x)[run.start : run.stop]))

@@ -145,7 +145,11 @@ def uncertainty_of(
         constant = max(lsb / math.sqrt(12), noise * min(1.0, max(_LEAST_CONSTANT, repeats)))
     moved = _moved(x, pair.dt)
     own = min(_motion_share(evened, moved, paired, pair.dt), _MOST_MOTION[pair.side]) if usual is None else usual.motion
-    mismatch = spread**2 + max(0.0, (_PLAY * relation.play) ** 2 - tolerance**2) + (own * moved) ** 2
+    play = max(0.0, (_PLAY * relation.play) ** 2 - tolerance**2)
+
+    def passing(spread: Array, moved: Array) -> Array:
+        return np.asarray(1.0 + np.nan_to_num(spread**2 + play + (own * moved) ** 2) / tolerance**2)
+
     rows = len(codes_of(pair.side)) - 1  # every one of both sides is as probable as the others
     model = ModeModel(
         noise=noise,
@@ -162,7 +166,7 @@ def uncertainty_of(
         model=model,
         lsb=lsb,
         white=relative,
-        passing=pair.store.keep(1.0 + np.nan_to_num(mismatch) / tolerance**2),
+        passing=pair.store.map(passing, spread, moved),
         constant=_constant(pair, relative, counted, noise, constant),
         own=HealthyNoise(growth.floor, growth.share, own),
     )
@@ -204,9 +208,13 @@ def _noise(
 def _relative_white(pair: Pair, growth: NoiseGrowth, size: Array, counted: Array) -> Array:
     """Variance of the white noise at every sample as a share of that at standstill, shape (n,)."""
     if growth.share == 0.0 and not pair.habit.tick:
-        return np.ones(size.size)
+        return pair.store.keep(np.ones(size.size))
     floor = max(growth.floor, 1e-5 * pair.span)
-    return pair.store.keep(1.0 + ((growth.share * size) ** 2 + counted) / floor**2)
+
+    def relative(size: Array, counted: Array) -> Array:
+        return np.asarray(1.0 + ((growth.share * size) ** 2 + counted) / floor**2)
+
+    return pair.store.map(relative, size, counted)
 
 
 def _explained(pair: Pair, paired: NDArray[np.bool_], noise: float, period: float) -> float:
@@ -219,7 +227,7 @@ def _explained(pair: Pair, paired: NDArray[np.bool_], noise: float, period: floa
 def _constant(pair: Pair, relative: Array, counted: Array, noise: float, constant: float) -> Array:
     """Variance of a stuck channel as a share of the least: a value may last as long as rounding hides the noise."""
     if not pair.habit.tick or pair.side is Side.ACTUATOR:
-        return np.ones(relative.size)
+        return pair.store.keep(np.ones(relative.size))
     from scipy.special import erf
 
     own = np.maximum(noise**2 * relative - counted, 1e-12)

@@ -7,6 +7,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from replay.arrays.sliding import median_within
+
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
@@ -120,9 +122,7 @@ def _wild(value: Array) -> Flags:
     """Readings that lie far off both their neighbourhoods, which agree with each other."""
     if value.size < 2 * _AROUND + 1:
         return np.zeros(value.size, np.bool_)
-    from scipy.ndimage import median_filter
-
-    usual = median_filter(value, 2 * _AROUND + 1, mode="nearest")
+    usual = median_within(value, _AROUND)
     off = np.abs(value - usual)
     top = float(np.quantile(np.abs(usual), 0.99))
     least = max(_WILD_SHARE * top, _WILD_NOISE * float(np.quantile(off, 0.75)), 1e-9)

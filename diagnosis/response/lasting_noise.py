@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.response.models import Blocks
+from replay.arrays.sliding import median_within
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -61,9 +62,7 @@ def quiet_level(blocks: Blocks, driving: Flags, block_s: float, others: Sequence
 
 def _split(level: Array, least: int) -> Flags | None:
     """Blocks of the louder level by one beginning and one end at most, shape (m,); None where a level is too short for it."""
-    from scipy.ndimage import median_filter
-
-    smooth = median_filter(level, _MEDIAN, mode="nearest")
+    smooth = median_within(level, _MEDIAN // 2)
     low, high = (float(np.quantile(smooth, q)) for q in (_LEAST / 2, 1.0 - _LEAST / 2))
     loud = _without_short(smooth > 0.5 * (low + high))
     if np.count_nonzero(np.diff(loud.astype(np.int8))) > _SWITCHES:

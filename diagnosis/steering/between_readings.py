@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from diagnosis.results.assessment import Finding
 from diagnosis.steering.inputs import AxleInputs
+from replay.arrays.sliding import largest_within, smallest_within
 from replay.faults import FaultMode
 
 _LEAVES, _FEW = 0.2, 10  # of the deviation's root mean square; samples
@@ -40,10 +41,8 @@ def between_readings(f: Finding, inputs: AxleInputs) -> bool:
 
 
 def _extreme(x: NDArray[np.float64], reach: int, *, highest: bool) -> NDArray[np.float64]:
-    from scipy.ndimage import maximum_filter1d, minimum_filter1d
-
     filled = np.where(np.isfinite(x), x, -np.inf if highest else np.inf)
-    return np.asarray((maximum_filter1d if highest else minimum_filter1d)(filled, 2 * reach + 1, mode="nearest"))
+    return (largest_within if highest else smallest_within)(filled, reach, reach)
 
 
 def _rms(x: NDArray[np.float64]) -> float:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from diagnosis.channels.liveness import alive
 from diagnosis.steering.blocks import SensorNoise, SteeringBlocks, block_length, blocks_of, sensor_noise
 from diagnosis.steering.redundancy import with_second_angle, with_valve_opening
+from replay.arrays.sliding import smallest_within
 from replay.control.loop import Replay
 from replay.machine.config import Machine, Noise
 from replay.signals.timeline import Timeline
@@ -142,12 +143,10 @@ def _replayed(timeline: Timeline, replay: Replay, machine: Machine, axle: int) -
     if timeline.get(f"steer.{machine.axles[axle]}.phi_ref") is not None or speed is None:
         return u
     least = max(machine.limits.driving_speed, _SLOW * machine.max_speed)
-    from scipy.ndimage import minimum_filter1d
-
     width = max(1, round(_SET_OFF_S / timeline.dt))
 
     def known(u: Array, v: Array) -> Array:
-        lately = minimum_filter1d(np.nan_to_num(np.abs(v)), width, mode="nearest", origin=(width - 1) // 2)
+        lately = smallest_within(np.nan_to_num(np.abs(v)), width - 1, 0, "edge")
         return np.where(lately < least, np.nan, u)
 
     return timeline.map(known, u, speed)

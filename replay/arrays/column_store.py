@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from replay.arrays.blocks import BLOCK, blocks, release, unload
+from replay.arrays.freed_memory import give_back
 from replay.errors import LogError
 
 State = TypeVar("State")
@@ -47,8 +48,8 @@ class ColumnStore:
     """
 
     block: int = BLOCK
-    always: int = 16 << 20
-    room: int = 512 << 20
+    always: int = 8 << 20
+    room: int = 128 << 20
     flush: int = 4 << 20
     used: int = field(default=0, init=False)
     _maps: weakref.WeakSet[mmap.mmap] = field(default_factory=weakref.WeakSet, init=False, repr=False)
@@ -156,9 +157,15 @@ class ColumnStore:
             raise _no_room(error) from error
 
     def release(self) -> None:
-        """Let go of the memory of all columns in temporary files until they are read again: for the end of a stage."""
+        """Let go of the memory of all columns in temporary files until they are read again."""
         for mapped in list(self._maps):
             unload(mapped)
+
+    def end_stage(self) -> None:
+        """Let go of all that nobody needs now: `release`, and of a long mission what was freed between arrays that are still in use."""
+        self.release()
+        if len(self._maps):
+            give_back()
 
     def _has_room(self, size: int) -> bool:
         """Whether a column of `size` bytes may stay in memory."""

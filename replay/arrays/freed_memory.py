@@ -7,10 +7,24 @@ top of the heap, and every page of it is asked for and zeroed again a moment lat
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable
 
 _TRIM_THRESHOLD, _MMAP_THRESHOLD = -1, -3  # of mallopt(3)
 _KEPT = 128 << 20  # freed at the top of the heap, that a process keeps [bytes]
-_LARGE = 32 << 20  # from here on memory comes from the system and goes back to it; the most that glibc takes [bytes]
+_LARGE = 8 << 20  # comes from the system and goes back to it: columns of hours would leave gaps in between [bytes]
+
+
+def _c_function(name: str) -> Callable[..., int] | None:
+    """A function of glibc; None elsewhere."""
+    if sys.platform != "linux":
+        return None
+    import ctypes
+
+    try:
+        found: Callable[..., int] = getattr(ctypes.CDLL(None), name)
+    except (OSError, AttributeError):  # musl has no such function
+        return None
+    return found
 
 
 def keep_freed_memory() -> bool:
@@ -21,12 +35,17 @@ def keep_freed_memory() -> bool:
     bool
         Whether the C library can do so: glibc on Linux.
     """
-    if sys.platform != "linux":
-        return False
-    import ctypes
+    set_option = _c_function("mallopt")
+    return set_option is not None and bool(set_option(_MMAP_THRESHOLD, _LARGE) and set_option(_TRIM_THRESHOLD, _KEPT))
 
-    try:
-        set_option = ctypes.CDLL(None).mallopt
-    except (OSError, AttributeError):  # musl has no such function
-        return False
-    return bool(set_option(_MMAP_THRESHOLD, _LARGE) and set_option(_TRIM_THRESHOLD, _KEPT))
+
+def give_back() -> bool:
+    """Give pages that are free between arrays in use back to the system: hundreds of megabytes after a stage of a long mission.
+
+    Returns
+    -------
+    bool
+        Whether there were any, and the C library can do so: glibc on Linux.
+    """
+    trim = _c_function("malloc_trim")
+    return trim is not None and bool(trim(0))

@@ -198,6 +198,7 @@ def align(signals: Signals, start_s: float | None = None, stop_s: float | None =
             if absurd:
                 notes.append(f"{name}: {absurd} values that are infinite or beyond {_LARGEST:g} count as no sample.")
             values[name], fresh[name] = _hold(signal, periods.of(signal.stamps), start, step, size, signals.store)
+            release(signal.stamps, signal.values, values[name])
     return Timeline(
         start_ns=start,
         step_ns=step,

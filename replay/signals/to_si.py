@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from replay.arrays.blocks import release
+from replay.arrays.blocks import blocks, release
 from replay.arrays.column_store import ColumnStore
 from replay.errors import ConfigError
 from replay.log.source_options import SignalSource
@@ -149,7 +149,7 @@ def _ordered(
 ) -> tuple[NDArray[np.int64], NDArray[Any], tuple[str, ...]]:
     """Sort by stamp, spread the ticks of a coarse clock, and keep the last of equal stamps."""
     notes = []
-    back = int((np.diff(stamps) < 0).sum())
+    back = _beside_the_next(np.less, stamps)
     if back:
         order = np.argsort(stamps, kind="stable")
         stamps, values = stamps[order], values[order]
@@ -158,9 +158,9 @@ def _ordered(
     if ticks is not None:
         stamps, tick = ticks
         notes.append(f"its clock ticks every {tick / 1e6:g} ms only; samples of one tick were spread evenly over it")
-    last = np.append(stamps[1:] != stamps[:-1], True) if len(stamps) else np.ones(0, np.bool_)
-    if not last.all():
-        n = int((~last).sum())
+    n = _beside_the_next(np.equal, stamps)
+    if n:
+        last = np.append(stamps[1:] != stamps[:-1], True)
         shared = (
             "1 sample shares its stamp with a later one and was"
             if n == 1
@@ -169,6 +169,15 @@ def _ordered(
         notes.append(f"{shared} dropped")
         stamps, values = stamps[last], values[last]
     return stamps, values, tuple(notes)
+
+
+def _beside_the_next(compared: np.ufunc, stamps: NDArray[np.int64]) -> int:
+    """How many stamps compare so with the one before them, block by block. Of shape (n,)."""
+    return sum(
+        int(np.count_nonzero(compared(near[1:], near[:-1])))
+        for part in blocks(len(stamps))
+        if len(near := stamps[max(0, part.start - 1) : part.stop])
+    )
 
 
 def slope(stamps: NDArray[np.int64], position: NDArray[np.float64]) -> NDArray[np.float64]:

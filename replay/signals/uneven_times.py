@@ -11,6 +11,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from replay.arrays.sliding import median_within
+
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
@@ -99,9 +101,7 @@ def _intervals(stamps: NDArray[np.int64]) -> tuple[Array, Array]:
 
 def _middle(x: Array) -> Array:
     """Running median, shape of `x`."""
-    from scipy.ndimage import median_filter
-
-    return np.asarray(median_filter(x, _AROUND, mode="nearest"), dtype=np.float64)
+    return median_within(x, _AROUND // 2)
 
 
 def _roughness(x: Array, triple: Flags) -> float:

@@ -65,6 +65,13 @@ def test_released_columns_keep_what_was_written(tiny: ColumnStore) -> None:
     assert_array_equal(whole[18:], np.arange(18.0, 10_000.0))
 
 
+def test_end_of_a_stage_leaves_all_columns_as_they_were(tiny: ColumnStore) -> None:
+    first, second = tiny.keep(np.arange(1000.0)), tiny.keep(np.arange(1000.0) ** 2)
+    tiny.end_stage()
+    assert_array_equal(first, np.arange(1000.0))
+    assert_array_equal(second, np.arange(1000.0) ** 2)
+
+
 def test_function_of_rows_in_blocks(tiny: ColumnStore) -> None:
     a, b = np.arange(50.0), np.arange(50.0)[::-1]
     assert_array_equal(tiny.map(np.subtract, a, b), a - b)
