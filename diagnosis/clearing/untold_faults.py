@@ -38,6 +38,13 @@ _ROWS = {
     },
     FaultMode.OUTSIDE_TABLE: {FaultMode.OUTSIDE_TABLE: 1.0},
 }
+#: The same of wheels that stand: of 16 (campaigns) 7 were dead or locked, 8 stuck within their dead band or against their command.
+_STANDS = {
+    FaultMode.NO_SIGNAL: 0.44,
+    FaultMode.STUCK: 0.44,
+    FaultMode.OUTSIDE_TABLE: 0.06,
+    FaultMode.INEFFICIENT: 0.06,
+}
 _BIASED = {
     FaultMode.OUTSIDE_TABLE: 0.7,
     FaultMode.INEFFICIENT: 0.15,
@@ -96,7 +103,8 @@ def fault_of_wheel(check: Checked, cells: Cells, *, alone: bool, agree: bool = F
     )
     sizes = Epsilon(float(middle), float(min(low, high)), float(max(low, high)))
     side, why = (Side.ACTUATOR, _BEHIND) if below and agree else (Side.SENSOR_OR_ACTUATOR, _UNTOLD)
-    return finding_of((start, stop), mode, sizes, (text, why), side, p=_P if below else _P_ABOVE)
+    rows = _STANDS if mode is FaultMode.NO_SIGNAL else None
+    return finding_of((start, stop), mode, sizes, (text, why), side, rows, p=_P if below else _P_ABOVE)
 
 
 _UNTOLD = (
