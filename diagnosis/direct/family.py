@@ -150,7 +150,7 @@ class _WheelPairs:
     def speeds(self, habit: Habit) -> Pair:
         """The speed sensor against the second one."""
         pair = self._pair(Side.SENSOR, "v", "v_true", self._quiet(), "m/s", 2.2 * self.mission.machine.max_speed)
-        return replace(pair, instruments=self._instruments, habit=habit)
+        return replace(pair, instruments=lambda: self._instruments, habit=habit)
 
     def openings(self) -> Pair:
         """The valve's position against its command."""
@@ -158,7 +158,7 @@ class _WheelPairs:
         u = self.mission.values(self.name("u"))
         idle = self.mission.timeline.map(lambda u: np.abs(without_nan(u)) < _IDLE * span, u)
         pair = self._pair(Side.ACTUATOR, "u_applied", "u", idle, "of full opening", span)
-        return replace(pair, instruments=self._instruments)
+        return replace(pair, instruments=lambda: self._instruments)
 
     def _pair(self, side: Side, y: str, x: str, quiet: Flags, unit: str, span: float) -> Pair:
         mission = self.mission

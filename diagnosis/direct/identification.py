@@ -118,8 +118,9 @@ class IdentifiedPair:
     @cached_property
     def instruments(self) -> Array | None:
         """Signals that drive x but know nothing of the fault; of a coarse log that has none x but for its quick part. Shape (n, k)."""
-        if not self.coarse or self.pair.instruments is not None:
-            return self.pair.instruments
+        known = None if self.pair.instruments is None else self.pair.instruments()
+        if not self.coarse or known is not None:
+            return known
         out = np.zeros((self.pair.y.size, 1))
         out[self.news] = _neighbours(self.samples.x[self.news])
         return out

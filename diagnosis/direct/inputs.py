@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -47,8 +48,9 @@ class Pair:
         Canonical names, for the text.
     known_noise : Noise
         From the machine file.
-    instruments : Array, shape (n, k), or None
-        Signals that drive x but know nothing of the fault; see `diagnosis.estimation.fault_size`.
+    instruments : Callable or None
+        Gives signals that drive x but know nothing of the fault, shape (n, k), for a pair that has one; see
+        `diagnosis.estimation.fault_size`.
     habit : Habit
         How y is updated.
     store : ColumnStore
@@ -67,7 +69,7 @@ class Pair:
     y_name: str
     x_name: str
     known_noise: Noise
-    instruments: Array | None = None
+    instruments: Callable[[], Array | None] | None = None
     habit: Habit = EVERY_SAMPLE
     store: ColumnStore = field(default_factory=ColumnStore, repr=False)
 

@@ -208,7 +208,7 @@ def _noise(
 def _relative_white(pair: Pair, growth: NoiseGrowth, size: Array, counted: Array) -> Array:
     """Variance of the white noise at every sample as a share of that at standstill, shape (n,)."""
     if growth.share == 0.0 and not pair.habit.tick:
-        return pair.store.keep(np.ones(size.size))
+        return pair.store.ones(size.size)
     floor = max(growth.floor, 1e-5 * pair.span)
 
     def relative(size: Array, counted: Array) -> Array:
@@ -227,7 +227,7 @@ def _explained(pair: Pair, paired: NDArray[np.bool_], noise: float, period: floa
 def _constant(pair: Pair, relative: Array, counted: Array, noise: float, constant: float) -> Array:
     """Variance of a stuck channel as a share of the least: a value may last as long as rounding hides the noise."""
     if not pair.habit.tick or pair.side is Side.ACTUATOR:
-        return pair.store.keep(np.ones(relative.size))
+        return pair.store.ones(relative.size)
     from scipy.special import erf
 
     own = np.maximum(noise**2 * relative - counted, 1e-12)

@@ -53,6 +53,7 @@ class ColumnStore:
     flush: int = 4 << 20
     used: int = field(default=0, init=False)
     _maps: weakref.WeakSet[mmap.mmap] = field(default_factory=weakref.WeakSet, init=False, repr=False)
+    _ones: dict[int, NDArray[np.float64]] = field(default_factory=dict, init=False, repr=False)
 
     def column(self, dtype: DTypeLike, width: tuple[int, ...] = (), rows: int | None = None) -> Column:
         """Return a growing column; see `Column`."""
@@ -155,6 +156,12 @@ class ColumnStore:
                 return self._mapped(file, size, kind).reshape(shape)
         except OSError as error:
             raise _no_room(error) from error
+
+    def ones(self, size: int) -> NDArray[np.float64]:
+        """Ones, shape (size,): one column for all that ask, who must not change it."""
+        if size not in self._ones:
+            self._ones[size] = self.keep(np.ones(size))
+        return self._ones[size]
 
     def release(self) -> None:
         """Let go of the memory of all columns in temporary files until they are read again."""

@@ -72,6 +72,12 @@ def test_end_of_a_stage_leaves_all_columns_as_they_were(tiny: ColumnStore) -> No
     assert_array_equal(second, np.arange(1000.0) ** 2)
 
 
+def test_all_that_ask_for_ones_get_the_same_ones(tiny: ColumnStore) -> None:
+    assert_array_equal(tiny.ones(1000), np.ones(1000))
+    assert tiny.ones(1000) is tiny.ones(1000)
+    assert tiny.ones(10).size == 10
+
+
 def test_function_of_rows_in_blocks(tiny: ColumnStore) -> None:
     a, b = np.arange(50.0), np.arange(50.0)[::-1]
     assert_array_equal(tiny.map(np.subtract, a, b), a - b)
