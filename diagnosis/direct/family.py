@@ -11,7 +11,8 @@ from diagnosis.channels.habit import Habit, identify_habit, of_kind
 from diagnosis.channels.relation import relations_of_kind, valves_of_kind
 from diagnosis.direct.assess import assess_identified
 from diagnosis.direct.at_once import without_shared_moments
-from diagnosis.direct.identification import IdentifiedPair, identify, usual_spread
+from diagnosis.direct.gain_spread import usual_spread
+from diagnosis.direct.identification import IdentifiedPair, identify
 from diagnosis.direct.inputs import Pair, make_pair
 from diagnosis.direct.low_speed import without_low_speed_habit
 from diagnosis.direct.one_value import with_frozen_readings

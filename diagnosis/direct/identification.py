@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -22,6 +21,7 @@ from diagnosis.channels.noise import (
 )
 from diagnosis.channels.relation import Relation, relation_of
 from diagnosis.channels.sample_status import BLIND, PAIR, SKIP, sample_status
+from diagnosis.direct.gain_spread import LEAST_SPREAD, GainSpread, GainWindows, gain_windows
 from diagnosis.direct.inputs import Pair
 from diagnosis.direct.uncertainty import HealthyNoise, uncertainty_of
 from diagnosis.estimation.fault_models import ModeModel
@@ -33,11 +33,6 @@ from replay.machine.config import Limits
 Array = NDArray[np.float64]
 
 _MAX_LAG_S = 0.05
-_GAIN_S, _GAIN_DRIVEN, _GAIN_WINDOWS = 1.0, 0.1, 6  # windows; of the span, from which on they move; the fewest of them
-_NORMAL_MEDIAN = 0.6745  # of the size of a normal variable of unit variance
-_MOST_SPREAD = 0.1  # of a gain: as much may a healthy one vary; more of it is a fault in other windows
-_LEAST_SPREAD = 0.005  # of a gain: two instruments agree no better, however steady they are
-_OF_FEW = 1.6  # times as wide are 95 % bounds by four channels (Student's t) as by many
 _WHOLE = 0.25
 _NEARLY_ALL = 0.8  # of the mission
 _JUMP = 3.5  # times the noise
@@ -103,7 +98,7 @@ class IdentifiedPair:
     unresolved: NDArray[np.bool_]
     unresolved_share: float = 0.0
     own: HealthyNoise = field(default_factory=HealthyNoise)
-    kind_spread: GainSpread = field(default_factory=lambda: GainSpread(_LEAST_SPREAD, 0.0))
+    kind_spread: GainSpread = field(default_factory=lambda: GainSpread(LEAST_SPREAD, 0.0))
 
     @property
     def lag(self) -> float:
@@ -177,73 +172,6 @@ class IdentifiedPair:
         y, x = pair.y[known], self.samples.x[known]
         white, own = (float(np.nan_to_num(white_noise(z, pair.dt))) for z in (y, x))
         return Texture(y.size, white, self.lsb, own)
-
-
-class GainSpread(NamedTuple):
-    """By how much y per reference of a healthy channel varies from second to second: that lasts, and does not average out.
-
-    Attributes
-    ----------
-    share : float
-        Standard deviation of the gain [1].
-    size : float
-        Root mean square of the reference where that was seen [unit of y].
-    """
-
-    share: float
-    size: float
-
-
-class GainWindows(NamedTuple):
-    """Sums over windows of a second.
-
-    Attributes
-    ----------
-    power, moved : Array, shape (windows,)
-        Σx² and Σxy [unit²].
-    width : int
-        Samples in a window.
-    """
-
-    power: Array
-    moved: Array
-    width: int
-
-    def spread(self, span: float, start: int = 0, stop: int = 0) -> GainSpread | None:
-        """Robust standard deviation of the gain Σxy/Σx² about 1; None where few windows move.
-
-        Parameters
-        ----------
-        span : float
-            Of the channel [unit of y].
-        start, stop : int
-            Samples of a fault: one that lasts for most of the driving would else be taken for the usual spread.
-        """
-        driven = self.power > self.width * (_GAIN_DRIVEN * span) ** 2
-        driven[start // self.width : -(-stop // self.width)] = False
-        if np.count_nonzero(driven) < _GAIN_WINDOWS:
-            return None
-        usual = float(np.median(np.abs(self.moved[driven] / self.power[driven] - 1.0)) / _NORMAL_MEDIAN)
-        size = float(np.sqrt(np.median(self.power[driven]) / self.width))
-        return GainSpread(min(max(usual, _LEAST_SPREAD), _MOST_SPREAD), size)
-
-
-def usual_spread(own: Sequence[GainSpread | None]) -> GainSpread:
-    """Spread of a healthy one of several channels of one kind, by that of each: the lower middle one, wider since they are few."""
-    known = [s for s in own if s is not None]
-    if not known:
-        return GainSpread(_LEAST_SPREAD, 0.0)
-    share, size = (float(x) for x in np.quantile(np.array(known), 0.5, axis=0, method="lower"))
-    return GainSpread(min(_OF_FEW * share, _MOST_SPREAD), size)
-
-
-def gain_windows(samples: Samples, dt: float) -> GainWindows:
-    """Windows of a channel and its reference, of samples of `dt` s."""
-    width = max(2, round(_GAIN_S / dt))
-    size = samples.y.size // width * width
-    use = (samples.status[:size] == PAIR) & ~samples.quiet[:size]
-    x, y = (np.where(use, np.nan_to_num(z[:size]), 0.0).reshape(-1, width) for z in (samples.x, samples.y))
-    return GainWindows(np.einsum("ij,ij->i", x, x), np.einsum("ij,ij->i", x, y), width)
 
 
 def identify(

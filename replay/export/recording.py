@@ -25,7 +25,7 @@ from replay.export.formats.rosbag2 import write_rosbag2
 from replay.export.formats.twincat import ScopeGroup, write_scope
 from replay.log.open_loop import COLUMN, TOPIC
 from replay.machine.signal_table import signal_of
-from replay.signals.mapping import sparse_rows
+from replay.signals.channel_data import sparse_rows
 from replay.signals.signal import Signals
 
 RECORDING_FORMATS = ("mcap", "bag", "rosbag2", "twincat", "csv", "parquet")

@@ -12,8 +12,8 @@ from replay.arrays.blocks import blocks
 from replay.log.raw_log import Channel, RawLog
 from replay.machine.config import Machine
 from replay.machine.units import known_unit
+from replay.signals.channel_data import sparse_rows
 from replay.signals.file_names import in_its_file, named_channels
-from replay.signals.mapping import sparse_rows
 from replay.signals.named_units import unit_by_end
 from replay.signals.rules import candidates
 from replay.signals.timeline import median_period

@@ -6,12 +6,8 @@ import difflib
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from fnmatch import fnmatch
-from pathlib import PurePath
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from replay.arrays.column_store import ColumnStore
 from replay.errors import ConfigError
@@ -22,6 +18,7 @@ from replay.machine.config import Machine
 from replay.machine.units import known_unit
 from replay.machine.unpowered import drive_in_log, is_of_no_drive
 from replay.signals.candidate import Candidate
+from replay.signals.channel_data import channel_data, find_channel, is_source, slashed
 from replay.signals.file_names import in_its_file, named_channels
 from replay.signals.name_parts import wheel_said
 from replay.signals.rules import candidates, wanted_type
@@ -59,7 +56,7 @@ def plan_topics(
     dict[str, tuple[str, ...] or None]
         By `LogSummary.source`: topics, or None where all is to be read (tables).
     """
-    given = {_slashed(s.topic) for s in machine.signals.values() if s.topic is not None}
+    given = {slashed(s.topic) for s in machine.signals.values() if s.topic is not None}
     plan: dict[str, tuple[str, ...] | None] = {}
     for summary in summaries:
         if all(t.encoding == "table" for t in summary.topics):
@@ -68,7 +65,7 @@ def plan_topics(
         plan[summary.source] = tuple(
             t.name
             for t in summary.topics
-            if _slashed(t.name) in given
+            if slashed(t.name) in given
             or (also is not None and also(t))
             or (not t.note and (t.encoding == "json" or wanted_type(t.type_name)))
         )
@@ -195,19 +192,19 @@ def by_number(items: Mapping[str, Signal], machine: Machine) -> list[str]:
 
 def _take_given(draft: _Draft, name: str, source: SignalSource, logs: Sequence[RawLog]) -> None:
     """Take a signal exactly from where the machine file says."""
-    chosen = [log for log in logs if _is_source(log.source, source.source)]
+    chosen = [log for log in logs if is_source(log.source, source.source)]
     if not chosen:
         draft.missing[name] = f"no source matches {source.source!r}"
         return
     for log in chosen:
-        channel = _find(log, source)
+        channel = find_channel(log, source)
         if channel is None:
             continue
         unit = source.unit or usable_unit(name, channel.unit) or ""
         if not unit and channel.unit:
             draft.notes.append(f"{name}: the recorded unit {channel.unit!r} is not known; SI is assumed")
         origin = replace(source, unit=unit)
-        converted = convert(name, _data(log, channel, origin), origin, draft.machine, log.store)
+        converted = convert(name, channel_data(log, channel, origin), origin, draft.machine, log.store)
         draft.take(name, log, channel, converted, origin, False)
         draft.given.setdefault((log.source, channel.name), name)
         return
@@ -222,14 +219,14 @@ def _take_guess(draft: _Draft, name: str, found: list[tuple[Candidate, RawLog]])
     reason = NO_CHANNEL
     ranked = sorted(found, key=lambda f: (f[0].rank, number_of(f[0].origin.label), -_size(f[1], f[0])))
     for i, (candidate, log) in enumerate(ranked):
-        channel = _find(log, candidate.origin)
+        channel = find_channel(log, candidate.origin)
         if channel is None:
             continue
         other = draft.given.get((log.source, channel.name))
         if other is not None:  # the machine file says what it is
             reason = f"{candidate.origin.label}, which would fit, is given as {other}"
             continue
-        data = _data(log, channel, candidate.origin)
+        data = channel_data(log, channel, candidate.origin)
         if not np.isfinite(data[1]).any():
             reason = f"{candidate.origin.label} {NO_NUMBER}"
             continue
@@ -266,74 +263,10 @@ def _as_sure(one: Candidate, other: Candidate) -> bool:
 
 
 def _is_given(draft: _Draft, log: RawLog, candidate: Candidate | Unsure) -> bool:
-    channel = _find(log, candidate.origin)
+    channel = find_channel(log, candidate.origin)
     return channel is not None and (log.source, channel.name) in draft.given
 
 
 def _size(log: RawLog, candidate: Candidate) -> int:
-    channel = _find(log, candidate.origin)
+    channel = find_channel(log, candidate.origin)
     return 0 if channel is None else len(channel.stamps)
-
-
-def _is_source(path: str, pattern: str | None) -> bool:
-    return pattern is None or fnmatch(PurePath(path).name, pattern) or fnmatch(path, pattern)
-
-
-def _slashed(topic: str) -> str:
-    return "/" + topic.lstrip("/")
-
-
-def _find(log: RawLog, source: SignalSource) -> Channel | None:
-    """Return the channel that a source names: by its name, for tables also by the shown name."""
-    if source.topic is not None:
-        parts = (source.field,) if source.field != "pose.pose.orientation" else ("pose.pose.orientation.w",)
-        for topic in (source.topic, _slashed(source.topic), source.topic.lstrip("/")):
-            for part in parts:
-                if (found := log.channels.get(f"{topic}.{part}")) is not None:
-                    return found
-        return None
-    wanted = (source.symbol or source.column or "").strip()
-    if wanted in log.channels:
-        return log.channels[wanted]
-    shown = [c for c in log.channels.values() if not c.topic and wanted in (c.field, c.name.partition(" [")[0])]
-    return shown[0] if len(shown) == 1 else None
-
-
-def _data(log: RawLog, channel: Channel, source: SignalSource) -> tuple[NDArray[np.int64], NDArray[Any]]:
-    """Stamps and values of a channel; a quaternion becomes its yaw."""
-    if source.field == "pose.pose.orientation":
-        parts = [log.channels.get(f"{channel.topic}.pose.pose.orientation.{a}") for a in "xyzw"]
-        if any(p is None for p in parts):
-            return channel.stamps, np.full(len(channel.stamps), np.nan)
-        x, y, z, w = (np.asarray(p.values, np.float64) for p in parts if p is not None)
-        yaw = np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
-        yaw[np.abs(x * x + y * y + z * z + w * w - 1) > 0.1] = np.nan
-        good = np.isfinite(yaw)
-        yaw[good] = np.unwrap(yaw[good])
-        return channel.stamps, yaw
-    values = np.asarray(channel.values)
-    if not channel.topic:
-        return _sparse(channel.stamps, values)
-    return channel.stamps, values
-
-
-def _sparse(stamps: NDArray[np.int64], values: NDArray[Any]) -> tuple[NDArray[np.int64], NDArray[Any]]:
-    """Drop the empty cells of a slow column beside fast ones; cells of a silent channel stay empty."""
-    if values.dtype.kind != "f":
-        return stamps, values
-    rows = sparse_rows(values)
-    return stamps[rows], values[rows]
-
-
-def sparse_rows(values: NDArray[Any]) -> NDArray[np.int64]:
-    """Rows of a slow column beside fast ones that hold its samples; all rows where the column is not slow.
-
-    From shape (n,) to (k,).
-    """
-    rows = np.flatnonzero(~np.isnan(values))
-    steps = np.diff(rows)
-    if len(rows) < 3 or len(rows) > 0.6 * len(values):
-        return np.arange(len(values))
-    usual = np.median(steps)
-    regular = float((np.abs(steps - usual) <= max(1.0, 0.2 * usual)).mean())
-    return rows if usual >= 2 and regular > 0.8 else np.arange(len(values))

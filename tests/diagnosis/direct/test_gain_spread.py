@@ -7,7 +7,7 @@ import pytest
 from numpy.typing import NDArray
 
 from diagnosis.channels.sample_status import PAIR
-from diagnosis.direct.identification import GainSpread, gain_windows, usual_spread
+from diagnosis.direct.gain_spread import GainSpread, gain_windows, usual_spread
 from diagnosis.estimation.samples import Samples
 
 DT = 0.01
