@@ -29,8 +29,8 @@ def judged(yaw: Array | None, seed: int = 3, wheel: str = "") -> Judgement:
     [
         (0.0, 0.0, "gives next to nothing"),
         (2.0, 0.0, "× what the"),
-        (1.0, 0.5, "rad/s more than"),
-        (0.0, 0.9, "stays at 0.9"),
+        (1.0, 0.5, "°/s more than"),
+        (0.0, 0.9, "stays at 52"),
     ],
 )
 def test_a_wrong_gyro_is_told_with_its_time_and_no_wheel_is_named(gain: float, constant: float, said: str) -> None:
@@ -62,7 +62,7 @@ def test_a_small_constant_is_told_where_rests_of_the_machine_show_that_it_comes_
     assert assess_response(followers_of(measured, asked, body), geometry(), yaw, Limits(), DT).gyro == ()
     yaw[FAULTY] += 0.1 * usual
     (text,) = assess_response(followers_of(measured, asked, body), geometry(), yaw, Limits(), DT).gyro
-    assert "rad/s more than the" in text
+    assert "°/s more than the" in text
     assert text.endswith("where they rest as well.")
 
 
