@@ -51,7 +51,9 @@ def in_one_row(findings: Sequence[Finding], measured: Measured) -> list[Finding]
     spells = f"In {len(levels)} such spells {measured.names[0]} had one"
     beside = f"while {measured.names[1]} was between {between}."
     if stuck <= least < float(np.min(np.abs(y))) and min(lost, offset) > max(_BETTER * stuck, least):
-        words = Sentence(About.SPELLS, f"{spells} value, about {amount(float(np.median(y)), measured.unit, 2)}, {beside}")
+        words = Sentence(
+            About.SPELLS, f"{spells} value, about {amount(float(np.median(y)), measured.unit, 2)}, {beside}"
+        )
         return [_stuck(f, words) if k in levels else f for k, f in enumerate(out)]
     if lost <= least and min(stuck, offset) > max(_BETTER * lost, least) and all(_either(out[k]) for k in levels):
         words = Sentence(About.SPELLS, f"{spells} share, {share:.2f}, of {measured.names[1]} {beside}")
