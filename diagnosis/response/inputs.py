@@ -51,6 +51,10 @@ class FollowerData:
         Whether its channel tells no direction, so that `y` has that of its command.
     echo : bool
         Whether its channel repeats the command and measures nothing.
+    share : Array or None, shape (n,)
+        What its readings are of usual ones [1], where that is 1 only for a time; None where nothing shows such a change.
+    joint_share : Array or None, shape (n,)
+        What they are of its joint's position [1], likewise: where its loop believes the channel, the position is what changes.
     """
 
     y: Array
@@ -64,6 +68,8 @@ class FollowerData:
     stretch: Array | None = None
     undirected: bool = False
     echo: bool = False
+    share: Array | None = None
+    joint_share: Array | None = None
 
 
 def cell_of(dt: float) -> int:
