@@ -49,6 +49,7 @@ from diagnosis.response.rivals import (
     others_fault,
     told_and_doing_alike,
 )
+from diagnosis.response.runaway import runaways
 from diagnosis.response.runs_on import running_on
 from diagnosis.response.share_findings import told_share
 from diagnosis.response.sides import sides_of
@@ -211,13 +212,14 @@ def assess_response(
     by_motion = {} if other_way else by_motion  # then a yaw rate confirms no wheel
     together = held_back_together(judged)
     like = {w: by_peers(w, judged, geometry, cell) for w in judged}
+    away = runaways(judged, efforts, width * dt)
     weak = {
         w: _drives(
             w,
             judged,
             (like[w], by_motion.get(w)),
             (spans.get(w, []), bool(mates[w]) or not _turned_by(w, found)),
-            efforts.get(w),
+            (efforts.get(w), away.get(w, [])),
             width * dt,
         )
         for w in judged
@@ -314,16 +316,16 @@ def _drives(
     judged: Mapping[str, Judged],
     known: tuple[Blocks | None, Beside | None],
     pull: tuple[list[tuple[int, int]], bool],
-    effort: Array | None,
+    effort: tuple[Array | None, list[Finding]],
     block_s: float,
 ) -> list[Finding]:
     """What is known to be a drive's fault, each time once.
 
     `known`: its blocks with what is expected of it, and how the ground moves; `pull`: blocks in which it pulls nothing, and whether it is dragged along then;
-    `effort` in blocks.
+    `effort` in blocks, and times in which it pulls away.
     """
-    idle = after_a_fault(idle_drives(judged[wheel], *pull, block_s), judged[wheel], effort, block_s)  # without power
-    told, blocks, share = idle, known[0], judged[wheel].data.share
+    idle = after_a_fault(idle_drives(judged[wheel], *pull, block_s), judged[wheel], effort[0], block_s)  # without power
+    told, blocks, share = idle + effort[1], known[0], judged[wheel].data.share
     if blocks is not None and share is not None:  # at a share of its speed it keeps none that it is not told
         blocks = blocks._replace(mean=as_usual(blocks.mean, share, round(block_s / judged[wheel].wheel.dt)))
     for more in (unanswered(wheel, judged, known, block_s), running_on(wheel, judged, blocks, block_s)):
