@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -58,11 +59,13 @@ def wheels_of(
     cell, _ = steps
     out: dict[str, Judged] = {}
     channels: dict[str, tuple[Samples, Response | None]] = {}
+    shares: dict[str, Array | None] = {}
     for w, d in data.items():
         y = np.where(hidden[w], np.nan, d.y)
         samples = samples_of(y, d.fresh)
         y[samples.step[samples.wild]] = np.nan
-        channels[w] = samples, _response(y, samples, d, cell, limits, dt)
+        response, share = _response(y, samples, d, cell, limits, dt)
+        channels[w], shares[w] = (samples, response), share
     answers = {w: found for w, (_, found) in channels.items() if found is not None}
     answers, doubts = mirrored(data, answers, geometry, cell, dt)
     several = len(answers) >= _LEAST_OTHERS
@@ -79,6 +82,7 @@ def wheels_of(
         response = without_command(-(-y.size // cell)) if found is None else found
         others = tuple(o.y for k, o in data.items() if k != w)
         seen = np.where(hidden[w], np.nan, y), samples
+        d = replace(d, share=shares[w])
         out[w] = in_blocks(d, response, seen, others, steps, limits, dt)._replace(odd=doubts.get(w, ""))
     return out
 
@@ -139,10 +143,28 @@ def _turns(y: Array, limits: Limits, dt: float) -> bool:
     return bool(np.count_nonzero(np.abs(np.nan_to_num(y)) > limits.driving_speed) * dt >= _TURNS_S)
 
 
-def _response(y: Array, samples: Samples, data: FollowerData, cell: int, limits: Limits, dt: float) -> Response | None:
-    """Response of a drive; a speed that is held for long says nothing of it, unless hardly any other is left."""
+def _response(
+    y: Array, samples: Samples, data: FollowerData, cell: int, limits: Limits, dt: float
+) -> tuple[Response | None, Array | None]:
+    """Response of a drive, and the share of usual readings that it goes with; a speed that is held for long says nothing of it, unless hardly any other is left."""
+    shares = [data.share] if data.share is not None or data.joint_share is None else [None, data.joint_share]
+    found = [(_answer(y if s is None else y / s, samples, data, cell, limits, dt), s) for s in shares]
+    known = [(r, s) for r, s in found if r is not None]
+    if not known:
+        return None, data.share
+    return min(known, key=lambda x: _misfit(y if x[1] is None else y / x[1], x[0], cell))
+
+
+def _answer(y: Array, samples: Samples, data: FollowerData, cell: int, limits: Limits, dt: float) -> Response | None:
     for source in (without_holds(y, samples, dt), y):
         found = identify_response(cells(source, cell), data.commands, cell * dt, limits.driving_speed)
         if found is not None:
             return found
     return None
+
+
+def _misfit(y: Array, found: Response, cell: int) -> float:
+    """Mean of what readings are off, beside what is expected [1]."""
+    off = np.abs(cells(y, cell) - found.expected)
+    known = np.isfinite(off)
+    return float(np.mean(off[known]) / max(float(np.mean(np.abs(found.expected[known]))), 1e-12))

@@ -58,7 +58,9 @@ from diagnosis.response.rivals import (
     others_fault,
     told_and_doing_alike,
 )
+from diagnosis.response.runaway import runaways
 from diagnosis.response.runs_on import running_on
+from diagnosis.response.share_findings import told_share
 from diagnosis.response.sides import sides_of
 from diagnosis.response.sideways import crossed, goes_sideways
 from diagnosis.response.spells import until_back, where_asked
@@ -66,6 +68,7 @@ from diagnosis.response.states import judge
 from diagnosis.response.turning import turning_of, turns_other_way, turns_with, unasked_turn, wrong_yaw_rate
 from diagnosis.response.unlike import contradicting, unlike_in_motion
 from diagnosis.response.uphill import lower_by_a_load
+from diagnosis.response.usual_times import as_usual, shares_by_commands, shares_by_positions
 from diagnosis.response.witness import witness_of, witnessed
 from diagnosis.response.wound_up import after_a_fault
 from diagnosis.results.assessment import Assessment, Finding, Reason
@@ -140,10 +143,17 @@ def assess_response(
         return Judgement({}, ())
     width, cell = max(1, round(BLOCK_S / dt)), cell_of(dt)
     data = without_gains(data, scales := scaled_channels(data, dt))
+    by_position = shares_by_positions(data, dt)
+    data = {w: replace(d, joint_share=by_position.get(w)) for w, d in data.items()}
     drives = list(data.values())
     left_out = standing(data, limits.driving_speed, dt)
     idle = spans_of(np.logical_or.reduce(list(left_out.values())))
     found = wheels_of(data, left_out, geometry, (cell, width), limits, dt)
+    if changed := shares_by_commands(found, width):
+        data = {
+            w: replace(d, share=changed.get(w, found[w].data.share if w in found else None)) for w, d in data.items()
+        }
+        found = wheels_of(data, left_out, geometry, (cell, width), limits, dt)
     witness = witness_of(speeds, drives, width, limits, dt)
     seen = [span for span in idle if witness.saw(*span, width)]
     idle = [span for span in idle if span not in seen]
@@ -180,7 +190,8 @@ def assess_response(
         for w, j in found.items()
     }
     names = {w: j.data.name for w, j in found.items()}
-    beside, by_motion, left_notes = views(names, {w: j.wheel.blocks for w, j in found.items()}, geometry, bodies)
+    usual = {w: as_usual(j.wheel.blocks.mean, j.data.share, width) for w, j in found.items()}
+    beside, by_motion, left_notes = views(names, {w: j.wheel.blocks for w, j in found.items()}, geometry, bodies, usual)
     judged = by_leaps({w: judge(j, beside.get(w), dt, width) for w, j in found.items()}, mates)
     turned = {w: [s for s in j.spells if unasked_turn(w, s, judged, geometry, yaw)] for w, j in judged.items()}
     slips = {w: [s for s in j.spells if by_slip(s, w, judged, bodies.yaw)] for w, j in judged.items()}
@@ -212,13 +223,14 @@ def assess_response(
     by_motion = {} if other_way else by_motion  # then a yaw rate confirms no wheel
     together = held_back_together(judged)
     like = {w: by_peers(w, judged, geometry, cell) for w in judged}
+    away = runaways(judged, efforts, width * dt)
     weak = {
         w: _drives(
             w,
             judged,
             (like[w], by_motion.get(w)),
             (spans.get(w, []), bool(mates[w]) or not _turned_by(w, found)),
-            efforts.get(w),
+            (efforts.get(w), away.get(w, [])),
             width * dt,
         )
         for w in judged
@@ -301,6 +313,7 @@ def assess_response(
     when = dict.fromkeys(stood, times) | dict.fromkeys(astray, elsewhere)
     ignored, said = witnessed(ignored, witness, seen, drives, speeds, (width, limits, dt))
     scaled = told(sought, turning, width * dt)
+    parts = {w: told_share(sides, judged[w]) for w, sides in parts.items()}
     parts |= {w: told_gain(parts[w], data[w].name, gain) for w, gain in scales.items() if w in parts}
     told_of_it = tuple(x.text for x in gyro)
     events = (*stood, *(astray if lasts else ()))
@@ -318,16 +331,18 @@ def _drives(
     judged: Mapping[str, Judged],
     known: tuple[Blocks | None, Beside | None],
     pull: tuple[list[tuple[int, int]], bool],
-    effort: Array | None,
+    effort: tuple[Array | None, list[Finding]],
     block_s: float,
 ) -> list[Finding]:
     """What is known to be a drive's fault, each time once.
 
     `known`: its blocks with what is expected of it, and how the ground moves; `pull`: blocks in which it pulls nothing, and whether it is dragged along then;
-    `effort` in blocks.
+    `effort` in blocks, and times in which it pulls away.
     """
-    idle = after_a_fault(idle_drives(judged[wheel], *pull, block_s), judged[wheel], effort, block_s)  # without power
-    told = idle
-    for more in (unanswered(wheel, judged, known, block_s), running_on(wheel, judged, known[0], block_s)):
+    idle = after_a_fault(idle_drives(judged[wheel], *pull, block_s), judged[wheel], effort[0], block_s)  # without power
+    told, blocks, share = idle + effort[1], known[0], judged[wheel].data.share
+    if blocks is not None and share is not None:  # at a share of its speed it keeps none that it is not told
+        blocks = blocks._replace(mean=as_usual(blocks.mean, share, round(block_s / judged[wheel].wheel.dt)))
+    for more in (unanswered(wheel, judged, known, block_s), running_on(wheel, judged, blocks, block_s)):
         told = told + [f for f in more if not any(f.start < g.stop and g.start < f.stop for g in told)]
     return told

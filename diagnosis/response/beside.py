@@ -56,7 +56,11 @@ class Bodies(NamedTuple):
 
 
 def views(
-    wheels: Mapping[str, str], blocks: Mapping[str, Blocks], geometry: Geometry | None, bodies: Bodies
+    wheels: Mapping[str, str],
+    blocks: Mapping[str, Blocks],
+    geometry: Geometry | None,
+    bodies: Bodies,
+    usual: Mapping[str, Array] | None = None,
 ) -> tuple[dict[str, Beside], dict[str, Beside], tuple[str, ...]]:
     """Views of each wheel that has one, of each wheel by the measured motion of the body, and a sentence on each sensor that was left out.
 
@@ -70,7 +74,10 @@ def views(
         Says which wheels are on one side.
     bodies : Bodies
         Sensors of the body.
+    usual : Mapping[str, Array] or None, each of shape (b,)
+        Readings in which gains are found [m/s]; those of `blocks` for None.
     """
+    usual = {w: b.mean for w, b in blocks.items()} if usual is None else usual
     means = {w: blocks[w].mean for w in wheels}
     made = [b for b in bodies.speeds if b.name == "odometry" and made_of(b, list(means.values()), bodies.stretch)]
     notes = tuple(f"Body sensor {b.name} left out: it is computed from the wheels' own speeds." for b in made)
@@ -81,11 +88,11 @@ def views(
     by_motion: dict[str, Beside] = {}
     for w in wheels:
         if bodies.sideways:
-            found = _by_all_others(w, wheels, blocks)
+            found = _by_all_others(w, wheels, blocks, usual)
             if found is not None:
                 out[w] = found
             continue
-        found = _by_wheels(w, wheels, blocks, geometry, bodies.yaw, by_body)
+        found = _by_wheels(w, wheels, blocks, (geometry, bodies.yaw, by_body), usual)
         found = _by_body(w, wheels, blocks, by_body) if found is None else found
         if found is not None:
             out[w] = found
@@ -122,13 +129,14 @@ def _by_wheels(
     w: str,
     wheels: Mapping[str, str],
     blocks: Mapping[str, Blocks],
-    geometry: Geometry | None,
-    yaw: Array | None,
-    by_body: Mapping[str, View],
+    body: tuple[Geometry | None, Array | None, Mapping[str, View]],
+    usual: Mapping[str, Array],
 ) -> Beside | None:
     """What the other wheels say of one."""
+    geometry, yaw, by_body = body
     others = [o for o in wheels if o != w and same_side(w, o, geometry)]
-    speeds = [s for o in others if (s := _scaled(blocks[w].mean, blocks[o].mean)) is not None]
+    gains = [(o, g) for o in others if (g := _gain(usual[w], usual[o])) is not None]
+    speeds = [g * blocks[o].mean for o, g in gains]
     speed: Array | None = None
     across: Array | None = None
     if speeds:
@@ -140,7 +148,8 @@ def _by_wheels(
     elif yaw is not None and (far := [o for o in wheels if o != w and not same_side(w, o, geometry)]):
         others = far
         across = np.asarray(np.mean([blocks[o].mean for o in far], axis=0))
-        speed = _turned(blocks[w].mean, across, yaw)
+        speed = _turned(usual[w], np.asarray(np.mean([usual[o] for o in far], axis=0)), yaw)
+        speed = None if speed is None else speed + across - np.mean([usual[o] for o in far], axis=0)
     if speed is None:
         return None
     nobody: Array | None = None
@@ -185,25 +194,29 @@ def turns_by_wheels(y: Array, x: Array) -> bool:
     return bool(np.count_nonzero((y * x < 0.0) & (np.abs(y) > least) & (np.abs(x) > least)) >= _AGAINST_BLOCKS)
 
 
-def _by_all_others(w: str, wheels: Mapping[str, str], blocks: Mapping[str, Blocks]) -> Beside | None:
+def _by_all_others(
+    w: str, wheels: Mapping[str, str], blocks: Mapping[str, Blocks], usual: Mapping[str, Array]
+) -> Beside | None:
     """What all other wheels together say of one, by how they belong together in most of the mission."""
     others = [o for o in wheels if o != w]
     if len(others) < _LEAST_TOGETHER:
         return None
-    y, table = blocks[w].mean, np.column_stack([blocks[o].mean for o in others])
+    y, table = usual[w], np.column_stack([usual[o] for o in others])
     use = np.isfinite(y) & np.isfinite(table).all(axis=1)
     if np.count_nonzero(use) < _LEAST_BLOCKS:
         return None
     kept = use.copy()
     speed = y
-    parts = table
+    weights = np.zeros(len(others))
     for _ in range(5):
-        parts = table * np.linalg.lstsq(table[kept], y[kept], rcond=None)[0]
-        speed = parts.sum(axis=1)
+        weights = np.linalg.lstsq(table[kept], y[kept], rcond=None)[0]
+        speed = table @ weights
         off = np.abs(y - speed)
         kept = use & (off <= np.quantile(off[use], 0.7))
     if np.median(np.abs(y - speed)[use]) > _TOGETHER * np.median(np.abs(y[use])):
         return None
+    parts = np.column_stack([blocks[o].mean for o in others]) * weights
+    speed = parts.sum(axis=1)
     blame, nobody = blame_by_commands(blocks[w], [blocks[o] for o in others], speed)
     rough = np.asarray(np.max([blocks[o].rough for o in others], axis=0))
     made = np.sqrt((parts**2).sum(axis=1))  # wheels may cancel each other, their errors do not
@@ -237,15 +250,15 @@ def same_side(a: str, b: str, geometry: Geometry | None) -> bool:
     return one.axle == two.axle == "fixed" and one.y * two.y > 0.0
 
 
-def _scaled(y: Array, x: Array) -> Array | None:
-    """x times the gain that brings it to y; None where they do not move together."""
+def _gain(y: Array, x: Array) -> float | None:
+    """The gain that brings x to y; None where they do not move together."""
     use = np.isfinite(y) & np.isfinite(x) & (np.abs(x) > 0.1 * np.nanquantile(np.abs(x), 0.9))
     use &= y != 0.0  # a wheel at rest, or a dead sensor, tells no gain, for however long
     if np.count_nonzero(use) < _LEAST_BLOCKS:
         return None
     gain = float(np.median(y[use] / x[use]))
     off = np.abs(y[use] - gain * x[use])
-    return gain * x if 0.5 < gain < 2.0 and np.median(off) < _ALIKE * np.median(np.abs(y[use])) else None
+    return gain if 0.5 < gain < 2.0 and np.median(off) < _ALIKE * np.median(np.abs(y[use])) else None
 
 
 def _turned(y: Array, x: Array, yaw: Array) -> Array | None:

@@ -11,7 +11,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnosis.response.effort_changes import answers, is_noise, unanswered
+from diagnosis.response.effort_changes import answers, goes_with, is_noise, unanswered
 from diagnosis.response.inputs import FollowerData
 from diagnosis.response.machine import Judged
 from diagnosis.results.assessment import Finding
@@ -155,7 +155,9 @@ def idle_spans(
         out[w] = [
             s
             for s, (a, b) in zip(grown, long, strict=True)
-            if unanswered(efforts[w], load, found[w].driving, s) and not answers(efforts[w], load, (a, b))
+            if unanswered(efforts[w], load, found[w].driving, s)
+            and not answers(efforts[w], load, (a, b))
+            and not goes_with(efforts[w], [efforts[o] for o in efforts if o != w], (a, b))
         ]
     return {
         w: [s for s in spans if not any(_most_of(s, x) for o, others in out.items() if o != w for x in others)]
@@ -233,7 +235,7 @@ def idle_drives(one: Judged, spans: list[tuple[int, int]], dragged: bool, block_
     return [
         _finding(one, a, b, dragged, block_s)
         for a, b in spans
-        if _sped_up(one, a, b) and (dragged or _astray(one, a, b))
+        if _sped_up(one, a, b, dragged) and (dragged or _astray(one, a, b))
     ]
 
 
@@ -246,15 +248,18 @@ def _smooth(share: Array) -> Array:
     return out
 
 
-def _sped_up(one: Judged, start: int, stop: int) -> bool:
-    """Whether the speed had to change in blocks [start, stop).
+def _sped_up(one: Judged, start: int, stop: int, dragged: bool) -> bool:
+    """Whether the speed had to change in blocks [start, stop), and did so, or went astray, where the wheel is dragged along.
 
-    At one speed two loops that hold the wheels of a side may share the load in any way; a change takes effort from each of them.
+    At one speed two loops that hold the wheels of a side may share the load in any way; a change takes effort from each of them. What is
+    asked at either end of the span only, where the effort comes and goes, is no change within it.
     """
     if not one.response.answered:
         return False
-    asked = (0.5 * (one.wheel.blocks.low + one.wheel.blocks.high))[start:stop]
-    return bool(np.ptp(asked) > _CHANGES * float(np.nanquantile(np.abs(one.wheel.blocks.mean), 0.99)))
+    b, least = one.wheel.blocks, _CHANGES * float(np.nanquantile(np.abs(one.wheel.blocks.mean), 0.99))
+    made = b.mean[start:stop][np.isfinite(b.mean[start:stop])]
+    moved = not dragged or bool(made.size and np.ptp(made) > least) or _astray(one, start, stop)
+    return moved and bool(np.ptp((0.5 * (b.low + b.high))[start:stop]) > least)
 
 
 def _astray(one: Judged, start: int, stop: int) -> bool:

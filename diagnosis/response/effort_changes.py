@@ -19,6 +19,7 @@ _MOST_CHANGE, _LEAVES, _FINEST = (
 _WINDOW, _APART = 8, 7.0  # blocks; standard errors by which means of so many differ, of the many that a span has
 _MANY, _CHANCE = 80, 3.5  # blocks; standard errors of a correlation that is none
 _USUAL = 0.9  # quantile of an effort that is its usual size
+_LEAST_ALIKE, _ALIKE = 12, 0.5  # blocks; correlation of an effort that takes its part in what another one does
 
 
 def unanswered(effort: Array, load: Array, driving: Flags, span: tuple[int, int]) -> bool:
@@ -57,6 +58,25 @@ def answers(effort: Array, load: Array, span: tuple[int, int]) -> bool:
     middle = sound[_WINDOW // 2 : _WINDOW // 2 + means.size]
     noise = float(np.std(middle - means)) / np.sqrt(1.0 - 1.0 / _WINDOW)
     return bool(np.ptp(means) > max(_APART * noise / np.sqrt(_WINDOW), 2.0 * finest))
+
+
+def goes_with(effort: Array, others: Sequence[Array], span: tuple[int, int]) -> bool:
+    """Whether an effort, small as it is in a span, goes up and down with that of another drive there: without power it cannot.
+
+    The inner drive of a curve carries little and takes its part in every change of the load. All of shape (b,).
+    """
+    own = effort[slice(*span)]
+    return any(_together(own, o[slice(*span)]) for o in others)
+
+
+def _together(a: Array, b: Array) -> bool:
+    """Whether two efforts agree in values and in changes, beyond chance and in good part. Both of one shape (k,)."""
+    known = np.isfinite(a) & np.isfinite(b)
+    if np.count_nonzero(known) < _LEAST_ALIKE:
+        return False
+    pairs = (a[known], b[known]), (np.diff(a)[known[1:] & known[:-1]], np.diff(b)[known[1:] & known[:-1]])
+    least = max(_ALIKE, _CHANCE / np.sqrt(np.count_nonzero(known)))
+    return all(x.size > 1 and min(np.std(x), np.std(y)) > 0.0 and np.corrcoef(x, y)[0, 1] > least for x, y in pairs)
 
 
 def is_noise(effort: Array, others: Sequence[Array]) -> bool:

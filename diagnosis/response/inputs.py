@@ -53,6 +53,10 @@ class FollowerData:
         Whether its channel repeats the command and measures nothing.
     unpowered : bool
         Whether the machine file says that it has no drive.
+    share : Array or None, shape (n,)
+        What its readings are of usual ones [1], where that is 1 only for a time; None where nothing shows such a change.
+    joint_share : Array or None, shape (n,)
+        What they are of its joint's position [1], likewise: where its loop believes the channel, the position is what changes.
     """
 
     y: Array
@@ -67,6 +71,8 @@ class FollowerData:
     undirected: bool = False
     echo: bool = False
     unpowered: bool = False
+    share: Array | None = None
+    joint_share: Array | None = None
 
 
 def cell_of(dt: float) -> int:

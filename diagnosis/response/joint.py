@@ -55,7 +55,9 @@ class Joint(NamedTuple):
         )
 
 
-def joint_of(blocks: Blocks, rolled: Array, beside: Beside | None, name: str) -> Joint | None:
+def joint_of(
+    blocks: Blocks, rolled: Array, beside: Beside | None, name: str, usual_mean: Array | None = None
+) -> Joint | None:
     """The position's view of a wheel; None where it hardly moves.
 
     Parameters
@@ -68,8 +70,10 @@ def joint_of(blocks: Blocks, rolled: Array, beside: Beside | None, name: str) ->
         Another view, which tells channels apart where no command does.
     name : str
         Signal that `rolled` is.
+    usual_mean : Array or None, shape (b,)
+        Readings in which the gain is found [m/s]; None for those of `blocks`.
     """
-    y = blocks.mean
+    y = blocks.mean if usual_mean is None else usual_mean
     use = np.isfinite(y) & np.isfinite(rolled)
     usual = float(np.quantile(np.abs(rolled[use]), 0.9)) if use.any() else 0.0
     moving = use & (np.abs(rolled) > _MOVES * usual)

@@ -40,6 +40,9 @@ _LEAST_P, _LEAST_S = 0.8, 3.0
 _SURE = 0.95
 _OWN = 0.95  # that it is the sensor's where another view shows how this wheel turns
 _LENGTH_S = 10.0
+_BETTER = (
+    1.0  # log-likelihood by which a delay explains a speed better beside the other view, which knows of no commands
+)
 _EXPLAINS = 0.5  # of the misfit that nothing explains: so much of it, at most, a delay leaves beside each of what it is held against
 
 
@@ -210,6 +213,7 @@ def left_open(late: Mapping[str, Sequence[Finding]], judged: Mapping[str, Judged
             for f in found
             if _by_ground(f, w, judged)
             or not _explained(f, judged[w])
+            or _with_the_others(f, judged[w])
             or at_its_limit(f, judged[w])
             or _by_a_load(f, judged[w])
         ]
@@ -265,6 +269,18 @@ def _explained(found: Finding, one: Judged) -> bool:
     part, block_s = slice(found.start // width, -(-found.stop // width)), width * one.wheel.dt
     each = (scores(one.wheel.blocks.mean, [p], block_s)[part].sum(axis=0) for p in pasts_of(one, block_s))
     return all(score[1:-1].max() >= _EXPLAINS * score[-1] for score in each)
+
+
+def _with_the_others(found: Finding, one: Judged) -> bool:
+    """Whether a speed is as little late beside its other view as none: then all that the view is made of does the same, as where commands cease."""
+    if one.speed is None:
+        return False
+    width = int(one.wheel.blocks.start[1])
+    part, block_s = slice(found.start // width, -(-found.stop // width)), width * one.wheel.dt
+    if not np.isfinite(one.speed[part]).all():
+        return False
+    score = scores(one.wheel.blocks.mean, pasts_of(one, block_s)[-1:], block_s)[part].sum(axis=0)
+    return bool(score[1:-1].max() < score[0] + _BETTER)
 
 
 def _by_a_load(found: Finding, one: Judged) -> bool:

@@ -11,6 +11,7 @@ from diagnosis.response.machine import Judged
 from diagnosis.response.models import MEAN_FAULTY_S, MEAN_HEALTHY_S, Beside, scores
 from diagnosis.response.rivals import jumped, shared
 from diagnosis.response.spells import spells_of
+from diagnosis.response.usual_times import as_usual
 
 _AT_A_JUMP = 0.1, 0.3  # probability that a fault begins, or ends, where the channel jumps
 
@@ -33,7 +34,8 @@ def judge(one: Judged, beside: Beside | None, dt: float, width: int) -> Judged:
     if beside is not None:  # what shakes other wheels too is no sensor's noise
         blocks = blocks._replace(usual=np.maximum(blocks.usual, beside.rough))
     rolled = one.data.rolled
-    joint = None if rolled is None else joint_of(blocks, cells(rolled, width), beside, f"{one.data.name}_position")
+    usual, name = as_usual(blocks.mean, one.data.joint_share, width), f"{one.data.name}_position"
+    joint = None if rolled is None else joint_of(blocks, cells(rolled, width), beside, name, usual)
     score = scores(blocks, one.driving, block_s, beside, None if joint is None else joint.view)
     places = one.wheel.samples.step[one.wheel.jumps.place] // width
     enters, leaves = np.full((2, len(score)), [[-np.expm1(-block_s / t)] for t in (MEAN_HEALTHY_S, MEAN_FAULTY_S)])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from diagnosis.response.effort_changes import answers
+from diagnosis.response.effort_changes import answers, goes_with
 
 SPAN = (100, 150)
 LOAD = np.where((np.arange(300) % 50) < 25, 5.0, 2.0)
@@ -35,3 +35,20 @@ def test_an_effort_that_goes_up_for_some_seconds_has_power() -> None:
 
 def test_where_nothing_is_known_nothing_is_said() -> None:
     assert not answers(np.full(300, np.nan), LOAD, SPAN)
+
+
+def test_the_little_that_the_inner_drive_of_a_curve_carries_goes_with_what_the_others_carry() -> None:
+    for seed in range(10):
+        rng = np.random.default_rng(seed)
+        other = 5.0 + np.convolve(rng.normal(size=300), np.ones(3) / 3.0, mode="same")
+        inner = 0.9 * (other - 5.0) + 0.1 * rng.normal(size=300)
+        assert goes_with(inner, [0.0 * other, other], SPAN)
+        assert not goes_with(0.2 * rng.normal(size=300), [other], SPAN)
+        assert not goes_with(-inner, [other], SPAN)
+
+
+def test_a_few_blocks_or_none_tell_of_no_agreement() -> None:
+    a = np.linspace(0.0, 1.0, 300) ** 2
+    assert not goes_with(a, [a], (100, 108))
+    assert not goes_with(np.full(300, np.nan), [a], SPAN)
+    assert not goes_with(0.0 * a, [a], SPAN)

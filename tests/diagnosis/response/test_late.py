@@ -111,3 +111,17 @@ def test_a_delay_is_told_only_where_it_explains_the_other_view_as_well() -> None
     wrong[start // width : stop // width] *= 3.0  # a neighbour that reads too much is no delay of this wheel
     part = [replace(told[0], start=start, stop=stop)]
     assert left_open({"RL": part}, {"RL": one._replace(speed=wrong)}) == {"RL": part}
+
+
+def test_where_commands_cease_before_the_speed_no_wheel_is_late() -> None:
+    """All wheels go on at one speed, as far as the log goes, while the command has fallen to nothing."""
+    for seed in (41, 42, 43):
+        measured, asked, body = speeds(seed)
+        last = round(4.0 / DT)
+        for w in measured:
+            measured[w][-last:] = 0.5 + np.random.default_rng(seed).normal(0.0, 0.01, last)
+            asked[w][-last:] = 0.5
+            asked[w][-round(1.5 / DT) :] = 0.0
+        body[-last:] = 0.5, 0.0
+        body[-round(1.5 / DT) :] = 0.0
+        assert not any("late" in f.evidence[0] for _, f in findings(judged(measured, asked, body)))
