@@ -206,7 +206,7 @@ def _by_all_others(
     if np.count_nonzero(use) < _LEAST_BLOCKS:
         return None
     kept = use.copy()
-    speed = y
+    speed: Array = y
     weights = np.zeros(len(others))
     for _ in range(5):
         weights = np.linalg.lstsq(table[kept], y[kept], rcond=None)[0]
