@@ -179,6 +179,8 @@ def finding_of(run: Run, found: IdentifiedPair, limits: Limits) -> Finding | Non
         small = min(epsilon.below(limits.min_epsilon), _MOST_HEALTHY)
         p *= 1.0 - small
         p[HEALTHY] += small
+        if p[HEALTHY] > p[run.row]:
+            return None
     if epsilon is not None and mode is not FaultMode.OUTSIDE_TABLE:
         epsilon = epsilon.as_share()
     lines = sentences(isolated, found, mode, epsilon)
