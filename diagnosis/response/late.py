@@ -40,7 +40,9 @@ _LEAST_P, _LEAST_S = 0.8, 3.0
 _SURE = 0.95
 _OWN = 0.95  # that it is the sensor's where another view shows how this wheel turns
 _LENGTH_S = 10.0
-_BETTER = 1.0  # log-likelihood by which a delay explains a speed better beside the other view, which knows of no commands
+_BETTER = (
+    1.0  # log-likelihood by which a delay explains a speed better beside the other view, which knows of no commands
+)
 _EXPLAINS = 0.5  # of the misfit that nothing explains: so much of it, at most, a delay leaves beside each of what it is held against
 
 
