@@ -207,9 +207,9 @@ def _by_all_others(
         return None
     kept = use.copy()
     speed = y
-    weights = np.zeros(len(others))
+    weights: Array = np.zeros(len(others))
     for _ in range(5):
-        weights = np.linalg.lstsq(table[kept], y[kept], rcond=None)[0]
+        weights = np.asarray(np.linalg.lstsq(table[kept], y[kept], rcond=None)[0], dtype=np.float64)
         speed = table @ weights
         off = np.abs(y - speed)
         kept = use & (off <= np.quantile(off[use], 0.7))
