@@ -52,6 +52,7 @@ from diagnosis.response.nearer import nearer_to_its_command
 from diagnosis.response.pairs import by_leaps
 from diagnosis.response.power import powers_of, unshown
 from diagnosis.response.ramps import only_a_ramp
+from diagnosis.response.reversed_sign import reversed_spans, told_reversed
 from diagnosis.response.rivals import (
     by_each_other,
     held_back_together,
@@ -314,6 +315,8 @@ def assess_response(
     ignored, said = witnessed(ignored, witness, seen, drives, speeds, (width, limits, dt))
     scaled = told(sought, turning, width * dt)
     parts = {w: told_share(sides, judged[w]) for w, sides in parts.items()}
+    other_sign = reversed_spans(judged, width * dt)
+    parts = {w: told_reversed(sides, judged[w], other_sign.get(w, [])) for w, sides in parts.items()}
     parts |= {w: told_gain(parts[w], data[w].name, gain) for w, gain in scales.items() if w in parts}
     told_of_it = tuple(x.text for x in gyro)
     events = (*stood, *(astray if lasts else ()))

@@ -117,7 +117,7 @@ def unwinds(spell: Spell, wheel: str, judged: Mapping[str, Judged], block_s: flo
 def stands_with_all(spell: Spell, wheel: str, judged: Mapping[str, Judged], asked: Mapping[str, Flags]) -> bool:
     """Whether a speed is silent while all others stand still, too, although they are to move, or read one value all the time.
 
-    Then the machine stands: a sensor that is held tells nothing of motion.
+    Then the machine stands: a sensor that is held tells nothing of motion, nor does the only one that reads any while three and more are silent.
 
     Parameters
     ----------
@@ -134,6 +134,15 @@ def stands_with_all(spell: Spell, wheel: str, judged: Mapping[str, Judged], aske
     if spell.mode is not FaultMode.NO_SIGNAL or spell.own or not others:
         return False
     part = slice(spell.start, spell.stop)
+    silent = [
+        any(
+            s.mode is FaultMode.NO_SIGNAL and overlaps((spell.start, spell.stop), (s.start, s.stop))
+            for s in judged[w].spells
+        )
+        for w in others
+    ]
+    if sum(silent) >= max(_LEAST_TOGETHER, len(others) - 1):
+        return True
     still = [
         ((j.wheel.blocks.zero == j.wheel.blocks.readings)[part] & asked[w][part]) | _stuck(j)[part]
         for w, j in judged.items()

@@ -137,3 +137,15 @@ def test_efforts_of_a_machine_that_stands_though_it_is_commanded_accuse_no_drive
         y[stop], told[stop], commands[stop] = 0.0, 0.8, np.column_stack([changes, np.zeros(changes.size)])
         data[w] = replace(one, y=y, asked=told, commands=commands, effort=effort)
     assert not any(found(data).values())
+
+
+def test_one_wheel_with_a_constant_makes_no_faults_of_a_machine_that_stands_though_it_is_commanded() -> None:
+    measured, asked, body = speeds(9)
+    stop, rng = slice(round(60 / DT), round(64 / DT)), np.random.default_rng(9)
+    body[stop] = 0.8, 0.0
+    for w in WHEELS:
+        asked[w][stop] = 0.8
+        measured[w][stop] = rng.normal(0.0, 0.001, stop.stop - stop.start)
+    measured["RL"] += 0.08
+    told = found(followers_of(measured, asked, body))
+    assert not any(f.mode is FaultMode.NO_SIGNAL for w in WHEELS for f in told[w])
