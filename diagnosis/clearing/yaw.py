@@ -19,7 +19,7 @@ from diagnosis.results.vocabulary import Kind
 from replay.faults import Side
 from replay.machine.config import Machine
 
-_FIXED = "fixed"  # axle of wheels that are not steered
+_FIXED, _ENDS = "fixed", 2  # axle of wheels that are not steered; ends of a machine
 _STILL, _STILL_S = 0.01, 1.0  # m/s; at rest for this long, a gyro shows its bias
 _MOVING = 0.25  # of the top speed
 OFF, LASTING_OFF = 0.06, 0.04  # rad
@@ -53,7 +53,7 @@ def yaw_checks(cells: Cells) -> Iterator[Checked]:
     lasting = lasting if turns is None else max(lasting, abs(float(np.nanmedian(turns))))
     told = bool(np.isfinite(windows).any()) and not (off.by_wheels and straight is None)  # in turns wheels slip
     sides = _by_sound_wheels(cells.machine) if off.by_wheels else 0.0
-    for end in ends_of(cells.machine).values():
+    for end in turning_ends(cells.machine).values():
         for axle in (name for name in end if name != _FIXED):  # one wheel's angle is a share of the mean of its end
             about, share = (Kind.STEER, axle, Side.SENSOR_OR_ACTUATOR), len(end)
             most, most_lasting = (max(limit, share * sides) for limit in (off.most, LASTING_OFF))
@@ -64,7 +64,7 @@ def yaw_checks(cells: Cells) -> Iterator[Checked]:
 
 def _by_sound_wheels(machine: Machine) -> float:
     """Angle [rad] by which a machine seems to turn whose sides' speeds differ by as much as sound wheels' may: tyres wear, and drives differ."""
-    ends = ends_of(machine)
+    ends = turning_ends(machine)
     wheels = [] if machine.geometry is None else list(machine.geometry.wheels.values())
     across = max((w.y for w in wheels), default=0.0) - min((w.y for w in wheels), default=0.0)
     return _SIDES * (max(ends) - min(ends)) / across if across > _SHORTEST else 0.0
@@ -84,6 +84,20 @@ def ends_of(machine: Machine) -> dict[float, list[str]]:
         x = float(np.mean([w.x for w in wheels if w.axle == axle]))
         ends.setdefault(next((e for e in ends if abs(e - x) < _SHORTEST), x), []).append(axle)
     return ends
+
+
+def turning_ends(machine: Machine) -> dict[float, list[str]]:
+    """The two ends whose angles turn a machine, by their place [m]; as many as there are of one that has fewer.
+
+    Where more axles than two are, the outer ones of those that are steered, or the only steered one and the middle of those that are not.
+    """
+    ends = ends_of(machine)
+    if len(ends) <= _ENDS:
+        return ends
+    steered = {x: names for x, names in ends.items() if names != [_FIXED]}
+    if len(steered) == 1:
+        return {**steered, float(np.mean([x for x in ends if x not in steered])): [_FIXED]}
+    return {x: steered[x] for x in (max(steered), min(steered))}
 
 
 def yaw_by_wheels(cells: Cells) -> Array:
@@ -184,12 +198,12 @@ def _path(cells: Cells) -> _Path | None:
     geometry, axles = cells.machine.geometry, cells.machine.axles
     if geometry is None:
         return None
-    ends = ends_of(cells.machine)
+    ends = turning_ends(cells.machine)
     yaw = cells.means("imu.yaw_rate")
     by_wheels = not np.isfinite(yaw).any()
     if by_wheels:
         yaw = yaw_by_wheels(cells)
-    if not axles or len(ends) != 2 or not np.isfinite(yaw).any():
+    if not axles or len(ends) != _ENDS or not np.isfinite(yaw).any():
         return None
     (first, one), (last, other) = ends.items()
     length, angles, speeds = first - last, cells.axles("phi"), cells.wheels("v")

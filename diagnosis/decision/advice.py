@@ -78,6 +78,10 @@ _GAIN = (
     "Compare scaling and sign of the channel in controller and machine file. Then compare the reading with {reference}: expected "
     "within 2 %."
 )
+_ZERO = (
+    "Command it to its middle, and to a third of its range both ways, and compare its position with the command: expected within 3 % of full "
+    "opening. Then compare zero, scaling and sign of the command and of the position in controller and machine file, and adjust the {valve}'s zero."
+)
 _EITHER = (
     "First tell the two apart: command a slow motion and watch the {part}. If it moves and the reading does not follow, the sensor is "
     "faulty; if it does not move, the {valve} is. "
@@ -137,7 +141,7 @@ def check_of(
     if side is Side.SENSOR_OR_ACTUATOR:
         text = _EITHER + _PLUG + " " + _SUPPLY
     elif mode not in _SENSOR:
-        text = _GAIN
+        text = _ZERO if side is Side.ACTUATOR else _GAIN
     else:
         text = (_SENSOR if side is Side.SENSOR else _ACTUATOR[words.drive])[mode]
     part = "axle" if steering else words.part

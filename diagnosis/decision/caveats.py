@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 from diagnosis.decision.explained import Explanation, When, explaining
 from diagnosis.decision.open_checks import open_words
-from diagnosis.decision.severity import halved_words, often_dead, unanswered
+from diagnosis.decision.severity import halved_words, often_dead, unanswered, unbounded_words
 from diagnosis.decision.short import main_reason, main_state, short_parts, unjudged_axles
 from diagnosis.decision.wording import MORE, count_words, join_words
 from diagnosis.results.assessed import Cut
@@ -199,7 +199,9 @@ def doubts_of(faults: Sequence[FaultInterval], words: MachineWords) -> list[tupl
         (f, f"the {words.part_words(f.kind, f.component, f.side)} {why}")
         for f in faults
         if f.severity in (Severity.MEDIUM, Severity.LOW)
-        and (why := "may not answer" if unanswered(f) else halved_words(f.side, f.mode, f.epsilon))
+        and (
+            why := "may not answer" if unanswered(f) else halved_words(f.side, f.mode, f.epsilon) or unbounded_words(f)
+        )
     ]
     told = {(f.component, f.side) for f, _ in out}
     for same in often_dead(faults):

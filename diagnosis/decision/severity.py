@@ -76,6 +76,10 @@ def severity_of(
         return _severity_of_total(finding, seconds, limits, words, kind)
     marked = finding.epsilon is not None and finding.epsilon.value >= _MARKED_EPSILON
     if finding.mode is FaultMode.OUTSIDE_TABLE:
+        if finding.side is Side.ACTUATOR and finding.epsilon is None:
+            return Severity.MEDIUM, words.fill(
+                "Check the zero and the response of the {valve}: no fault of the tables gives such a deviation."
+            )
         return (
             Severity.MEDIUM,
             "Check scaling and sign of the channel: no fault of the tables gives such a gain.",
@@ -153,6 +157,12 @@ def halved_words(side: Side, mode: FaultMode, epsilon: Epsilon | None) -> str:
     if mode.varying:
         return "may give more noise than signal" if side is Side.SENSOR else "may follow noise more than its command"
     return f"may have lost up to {round(100 * epsilon.high)} %" if mode.scaled else ""
+
+
+def unbounded_words(fault: FaultInterval) -> str:
+    """That nothing bounds what is left of a part whose fault is certain and in no row of the tables; else empty."""
+    open_ = fault.mode is FaultMode.OUTSIDE_TABLE and fault.epsilon is None and fault.severity is Severity.MEDIUM
+    return "deviates in a way of which no row says how much is left" if open_ else ""
 
 
 def unanswered(fault: FaultInterval) -> bool:

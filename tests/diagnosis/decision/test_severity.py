@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import cast
 
 import pytest
 
 from diagnosis.decision.caveats import doubts_of
 from diagnosis.decision.intervals import intervals_of
-from diagnosis.decision.severity import AGAIN, advised, severity_of
+from diagnosis.decision.severity import AGAIN, advised, severity_of, unbounded_words
 from diagnosis.results.machine_words import HYDRAULIC
-from diagnosis.results.result import Epsilon, Hypothesis
+from diagnosis.results.result import Epsilon, FaultInterval, Hypothesis
 from diagnosis.results.vocabulary import Severity, Verdict
 from replay.faults import FaultMode, Side
 from replay.machine.config import Limits
@@ -199,3 +201,19 @@ def test_a_sensor_that_is_dead_briefly_again_and_again_is_looked_at_before_the_m
     assert doubts == (["the FR speed sensor gave nothing usable 6 times, 3.6 s in all"] if often else [])
     told = advised(faults, Verdict.WATCH, cleared=not often)
     assert all((f.advice == AGAIN) is often for f in told)
+
+
+@pytest.mark.parametrize(
+    ("mode", "size", "severity", "told"),
+    [
+        (FaultMode.OUTSIDE_TABLE, None, Severity.MEDIUM, True),
+        (FaultMode.OUTSIDE_TABLE, None, Severity.LOW, False),
+        (FaultMode.OUTSIDE_TABLE, Epsilon(-0.3, -0.4, -0.2), Severity.MEDIUM, False),
+        (FaultMode.INEFFICIENT, None, Severity.MEDIUM, False),
+    ],
+)
+def test_what_no_row_bounds_is_not_cleared(
+    mode: FaultMode, size: Epsilon | None, severity: Severity, *, told: bool
+) -> None:
+    fault = cast(FaultInterval, SimpleNamespace(mode=mode, epsilon=size, severity=severity))
+    assert bool(unbounded_words(fault)) is told
