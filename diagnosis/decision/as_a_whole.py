@@ -37,6 +37,7 @@ _KNOWN = 0.5  # of a window
 _SPELL_S = (
     6.0  # for which the body is off without a break; healthy machines slip for up to four, of 34 + 20 tuning missions
 )
+_SAME, _VARIES = 1e-6, 0.5  # of the usual speed: a reading that is held; by which the wheels' speeds vary meanwhile
 _MANY = 20  # windows before and after a change, at least: ten seconds
 _FEW_CHANGE = 1.5  # times the change that counts, where there are few windows in turns
 _TURNS = 0.3  # of the usual yaw rate, root mean square over a window
@@ -212,6 +213,9 @@ def _beside_body(cells: Cells) -> Iterator[MachineEvent]:
         use = (v > _MOVES * usual) & (near >= np.isfinite(speeds).sum(axis=1) / 2)
     counts = _counts(cells)
     for body in bodies(cells):
+        if held := _held(cells, body.speed, speeds, usual):
+            yield body_otherwise(f"By {body.name} the machine goes {held}")
+            return
         course = _course(cells, np.abs(body.speed), v, use)
         text = course.changes("as fast as by its {wheels}", counts, _MANY)
         spell = course.longest(np.abs(np.nan_to_num(course.log - np.log(max(course.usual, FLOOR)))) >= counts, _SPELL_S)
@@ -221,6 +225,22 @@ def _beside_body(cells: Cells) -> Iterator[MachineEvent]:
         if text:
             yield body_otherwise(f"By {body.name} the machine goes {text}")
             return
+
+
+def _held(cells: Cells, speed: Array, wheels: Array, usual: float) -> str:
+    """That a body's speed (cells,) stays at one value, and for how long, while all wheels (cells, wheels) speed up or slow down by much; else empty."""
+    with np.errstate(invalid="ignore"):
+        same = np.abs(np.diff(speed)) <= _SAME * usual
+    edges = np.flatnonzero(np.diff(np.r_[False, same, False].astype(np.int8)))
+    for a, b in zip(edges[::2], edges[1::2], strict=True):
+        part = np.abs(wheels[a : b + 1])
+        known = np.isfinite(part).any(axis=0)
+        if (b - a) * cells.dt < _SPELL_S or np.count_nonzero(known) <= wheels.shape[1] / 2:
+            continue
+        if float(np.min(np.nanmax(part[:, known], axis=0) - np.nanmin(part[:, known], axis=0))) > _VARIES * usual:
+            at = f"{a * cells.dt:.0f}–{(b + 1) * cells.dt:.0f} s"
+            return f"at {abs(float(speed[a])):.2f} m/s at {at} to the last digit, while all its {{wheels}} speed up and slow down"
+    return ""
 
 
 def _beside_gyro(cells: Cells) -> Iterator[MachineEvent]:

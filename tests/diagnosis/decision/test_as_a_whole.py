@@ -12,7 +12,7 @@ import pytest
 from numpy.typing import NDArray
 
 from diagnosis.clearing.cells import Cells
-from diagnosis.decision.as_a_whole import _at_rest, as_a_whole
+from diagnosis.decision.as_a_whole import _at_rest, _held, as_a_whole
 from replay.machine.config import haulotte
 from replay.simulation.options import SimulatedMission
 from tests.diagnosis.clearing.missions import LENGTH, in_cells, simulated
@@ -99,3 +99,16 @@ def test_wheels_that_all_read_a_speed_at_rest_are_told_but_not_those_of_stated_f
         driven=range(len(wheels)),
     )
     assert bool(list(_at_rest(cast(Cells, cells)))) is said
+
+
+@pytest.mark.parametrize(
+    ("held", "moves", "said"), [((20, 100), True, True), ((20, 60), True, False), ((20, 100), False, False)]
+)
+def test_a_body_speed_that_is_held_while_all_wheels_change_theirs_is_told(
+    held: tuple[int, int], moves: bool, said: bool
+) -> None:
+    wheel = 1.0 + (0.6 * np.sin(np.arange(200) / 12.0) if moves else 0.01 * np.arange(200) % 0.05)
+    body = wheel.copy()
+    body[slice(*held)] = body[held[0]]
+    cells = cast(Cells, SimpleNamespace(dt=0.1))
+    assert bool(_held(cells, body, np.column_stack([wheel, 1.02 * wheel]), 1.5)) is said
