@@ -86,6 +86,8 @@ def machine_words(
         return f"Ready, fault {'comes and goes' if often else 'seen lately'}"
     if m["verdict"] == Verdict.READY and approaching:
         return "Ready, limit comes near"
+    if m["verdict"] == Verdict.READY and m.get("suspicions"):
+        return "Ready, but not settled what an earlier mission saw"
     return m["standing"]
 
 
