@@ -222,16 +222,15 @@ def _against_before(edge: Edge, pair: Pair, size: float) -> str:
     onset = edge.name == "onset"
     which, window, beside = ("First", "after", "before") if onset else ("Last", "before", "after")
     assert edge.shift is not None
-    was = f"{beside} it, where it was {pair.text(abs(edge.level))} off the {pair.words} already"
-    if not onset:
-        was = was.replace("was", "is").replace(" already", " still")
+    verb, yet = ("were", "already") if onset else ("are", "still")
+    was = f"the samples {beside} it, which {verb} {pair.text(abs(edge.level))} off the {pair.words} {yet}"
     if edge.noise is not None and edge.most < _APART * edge.noise:
         most = f"at most {pair.text(edge.most)}{_times(edge.most, edge)}"
-        return f"No sample of the {time_words(edge.reach)} {window} stands out of the noise against those {was}: {most}"
+        return f"No sample of the {time_words(edge.reach)} {window} stands out of the noise against {was}: {most}"
     total = abs(edge.shift[1] - edge.shift[0] + edge.level)
     text = (
         f"{which} faulty sample is {pair.text(total)} off the {pair.words}, a change of {number(size)}"
-        f"{_times(size, edge)} against those {was}"
+        f"{_times(size, edge)} against {was}"
     )
     if edge.most > 1.5 * size:
         text += f"; in the {time_words(edge.reach)} {window} the change is up to {number(edge.most)}{_times(edge.most, edge)}"

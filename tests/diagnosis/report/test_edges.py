@@ -124,14 +124,14 @@ def test_a_channel_that_is_off_before_its_onset_is_said_to_be() -> None:
     assert found is not None
     said = edge_words(found, pair)
     assert re.match(
-        r"First faulty sample is 0\.(49|5)\d* m/s off the .*, a change of 0\.\d+ \(\d+ σ\) against those before it",
+        r"First faulty sample is 0\.(49|5)\d* m/s off the .*, a change of 0\.\d+ \(\d+ σ\) against the samples before it",
         said,
     )
-    assert re.search(r"where it was 0\.(2|19)\d* m/s off the .* already", said)
+    assert re.search(r"which were 0\.(2|19)\d* m/s off the .* already", said)
 
     columns["wheel.FR.v"][1000:1200] += 0.3
     found, pair = edge("onset", columns)
     assert found is not None
     assert edge_words(found, pair).startswith(
-        "No sample of the 150 ms after stands out of the noise against those before it, where it was 0."
+        "No sample of the 150 ms after stands out of the noise against the samples before it, which were 0."
     )
