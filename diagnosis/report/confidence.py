@@ -152,7 +152,7 @@ def _why_none(report: ReportDocument) -> str:
         return ", for none was judged long enough"
     whole = next((row["reason"] for row in rows if not row["parts"]), "")
     if whole:
-        return f": {whole[:1].lower()}{whole[1:].rstrip('.')}"
+        return ", for something about the machine as a whole, or its log, is open, as said above"
     return ", for each that was judged has a fault or is named in what is open"
 
 

@@ -203,7 +203,7 @@ def test_parts_that_were_judged_and_those_that_were_cleared_are_counted_apart() 
         )
     about["to_clear"] = [{"reason": "Several wheels swing together.", "act": "lower the gains", "parts": []}]
     assert judged(samples.report_with(coverage=rows, intervals=[watched], verdict=about)) == (
-        "4 of 4 parts judged, none cleared: several wheels swing together"
+        "4 of 4 parts judged, none cleared, for something about the machine as a whole, or its log, is open, as said above"
     )
     brief = samples.report_with(coverage=[row("sensor", 20.0)], verdict=about)
     assert judged(brief).startswith("0 of 1 parts judged, none cleared, for none was judged long enough;")
