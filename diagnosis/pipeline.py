@@ -29,6 +29,7 @@ from diagnosis.clearing.standing_out import what_stands_out, with_findings, with
 from diagnosis.decision import quality
 from diagnosis.decision.as_a_whole import as_a_whole
 from diagnosis.decision.changing_rows import with_chains_as_one
+from diagnosis.decision.earlier_residuals import with_earlier_residuals
 from diagnosis.decision.episodes import with_episodes
 from diagnosis.decision.late_axles import as_late_axles
 from diagnosis.decision.mirrored import all_mirrored, axles_in_doubt, without_mirrored
@@ -228,6 +229,7 @@ def _outside_gaps(found: ComponentResult, axles: tuple[str, ...], timeline: Time
     joined = with_doubted_noise(with_episodes(seen, timeline.dt), axles, timeline.dt)
     joined = with_disturbances_as_one(with_chains_as_one(joined, timeline.dt), timeline.dt)
     joined = without_restated(joined, timeline.dt)
+    joined = with_earlier_residuals(joined, timeline.dt)
     return replace(found, assessments=with_second_onsets(joined, timeline.dt))
 
 

@@ -128,8 +128,10 @@ def _write(c: Any, k: int, s: Sample) -> None:
         )
 
 
-def write_report(folder: Path, name: str, cleared: bool | None = None, **limits: float) -> None:
-    """A report that says no more than the fleet asks of it."""
+def write_report(
+    folder: Path, name: str, cleared: bool | None = None, more: dict[str, Any] | None = None, **limits: float
+) -> None:
+    """A report that says no more than the fleet asks of it; `more` are further parts of it."""
     place = folder / "missions" / name
     place.mkdir(parents=True, exist_ok=True)
     machine = {"wheels": WHEELS, "axles": AXLES}
@@ -137,6 +139,7 @@ def write_report(folder: Path, name: str, cleared: bool | None = None, **limits:
         "limits": {"min_epsilon": 0.1, "min_assessed": 10.0, **limits},
         "machine": machine,
         "verdict": {"cleared": cleared},
+        **(more or {}),
     }
     (place / "report.json").write_text(json.dumps(said), encoding="utf-8")
     (place / "report.html").write_text(f"<title>{len(name)}</title>", encoding="utf-8")

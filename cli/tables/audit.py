@@ -66,15 +66,13 @@ def summary_parts(audited: Audited, found: Discovery, output: Path) -> list[Rend
     counted += [text(f"{s.words}: {states[s]}") for s in ENDS if s not in READ and states[s]]
     parts += [section("Missions"), Text(" · ").join(counted)]
     notes = [f"{len(ends)} in all, {audited.skipped} of them from an earlier run"]
-    notes += (
-        [f"{states['degraded']} with damage or parts that cannot be judged"] if states[MissionState.DEGRADED] else []
-    )
+    notes += [f"{states['degraded']} with damage, or in part left out"] if states[MissionState.DEGRADED] else []
     parts.append(text(", ".join(notes), "dim"))
     damaged = [end.name for end in ends if end.state is MissionState.DEGRADED]
-    if damaged:
-        rest = len(damaged) - _NAMED
-        more = f" and {rest} more" if rest > 0 else ""
-        parts.append(text(f"damaged, or in part not judged: {', '.join(damaged[:_NAMED])}{more}", "dim"))
+    parts += _named("damaged, or in part left out", damaged)
+    told = {end.name for end in ends} - set(damaged)
+    in_part = [name for m in audited.machines for name in m.in_part if name in told]
+    parts += _named("not every part of a wheel judged long enough", in_part)
     parts += [
         text(f"copies of one log, which count once: {', '.join(same)}", "dim") for same in _copies(audited)[:_NAMED]
     ]
@@ -85,6 +83,13 @@ def summary_parts(audited: Audited, found: Discovery, output: Path) -> list[Rend
     if audited.failed:
         files.append(("failures", output / "failures.txt"))
     return [*parts, "", key_values(files)]
+
+
+def _named(what: str, names: Sequence[str]) -> list[RenderableType]:
+    """A line with the first of some missions; none where there are none."""
+    rest = len(names) - _NAMED
+    more = f" and {rest} more" if rest > 0 else ""
+    return [text(f"{what}: {', '.join(names[:_NAMED])}{more}", "dim")] if names else []
 
 
 def _copies(audited: Audited) -> list[list[str]]:

@@ -14,7 +14,7 @@ from cli.tables.logs import log_parts
 from cli.tables.looks import mode_text, severity_text, verdict_title
 from diagnosis.comparison.words import OUTCOMES, are_several, headline
 from diagnosis.report.confidence import headline as verdict_words
-from diagnosis.report.confidence import sure_of
+from diagnosis.report.confidence import sure_of_action
 from diagnosis.report.tables import clearing_sentences, merged_caveats, other_caveats
 from diagnosis.results.candidates import label_of, symbol_of
 from diagnosis.results.comparison_document import FaultChangeRow, PreviousRow
@@ -115,8 +115,8 @@ def _actions(actions: Sequence[ActionRow], report: ReportDocument) -> Table:
             severity_text(action["severity"], action["n"]),
             Text.assemble(text(lead, "bold"), text(action["text"].removeprefix(lead)), "  ", (faults + more, "dim")),
         )
-        worst = next((intervals[f] for f in action["faults"] if f in intervals), None)
-        if worst is not None and (sure := sure_of(worst, report)):
+        own = [intervals[f] for f in action["faults"] if f in intervals]
+        if own and (sure := sure_of_action(own, report)):
             out.add_row("", text(f"{sure}.", "dim"))
         if check := action.get("check"):
             same = said.setdefault(check, action["n"])
@@ -169,9 +169,16 @@ def _lines(intervals: Sequence[IntervalRow], most: int | None = _SHOWN) -> list[
 
 
 def _spells(same: Sequence[IntervalRow], words: MachineWords, bounds: bool) -> tuple[object, ...]:
-    """One line for a fault that comes again and again: what its surest spell shows, and from when to when it comes."""
-    best = max(same, key=lambda i: i["probability"])
-    _, part, _, _, *rest = _fault(best, words, bounds)
+    """One line for a fault that comes again and again: from when to when, and between which values its spells lie."""
+    best = same[0]
+    _, part, _, _, *_ = _fault(best, words, bounds)
+    sats = {_sat(i["sat"], words) for i in same}
+    rest = (
+        _between([i["epsilon"]["value"] for i in same if i["epsilon"] is not None], 2),
+        sats.pop() if len(sats) == 1 else "differs",
+        _between([i["probability"] for i in same], 3),
+        severity_text(best["severity"]),
+    )
     first, last = min(i["start_s"] for i in same), max(i["stop_s"] for i in same)
     name = text(f"{same[0]['id']} …", "dim")
     return (
@@ -181,6 +188,14 @@ def _spells(same: Sequence[IntervalRow], words: MachineWords, bounds: bool) -> t
         f"{first:.2f}–{last:.2f}",
         *rest,
     )
+
+
+def _between(values: Sequence[float], digits: int) -> str:
+    """One value, or the least and the largest of several; a dash where there is none."""
+    if not values:
+        return "–"
+    said = dict.fromkeys(f"{x:.{digits}f}" for x in (min(values), max(values)))
+    return " to ".join(said).replace("-", "−")
 
 
 def _fault(fault: IntervalRow, words: MachineWords, bounds: bool) -> tuple[object, ...]:
@@ -201,7 +216,8 @@ def _epsilon(epsilon: EpsilonRow | None, bounds: bool) -> str:
     if epsilon is None:
         return "–"
     to = " to " if epsilon["low"] < 0 else "–"
-    return f"{epsilon['value']:.2f}" + (f" ({epsilon['low']:.2f}{to}{epsilon['high']:.2f})" if bounds else "")
+    said = f"{epsilon['value']:.2f}" + (f" ({epsilon['low']:.2f}{to}{epsilon['high']:.2f})" if bounds else "")
+    return said.replace("-", "−")
 
 
 def _sat(sat: SatRow | None, words: MachineWords) -> str:
@@ -209,6 +225,6 @@ def _sat(sat: SatRow | None, words: MachineWords) -> str:
         return "–"
     if sat["unit"] == OPENING:
         share = f"{100 * sat['mean']:+.1f}"
-        return ("0" if float(share) == 0 else share) + words.percent
+        return ("0" if float(share) == 0 else share.replace("-", "−")) + words.percent
     mean, unit = f"{sat['mean']:+.3f}", sat["unit"]
-    return ("0" if float(mean) == 0 else mean) + (f" {unit}" if unit else "")
+    return ("0" if float(mean) == 0 else mean.replace("-", "−")) + (f" {unit}" if unit else "")

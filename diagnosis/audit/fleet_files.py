@@ -17,7 +17,7 @@ from diagnosis.audit.fleet.first_seen import first_seen_times, newest_result_ns,
 from diagnosis.audit.fleet.fleet_types import FleetDocument
 from diagnosis.audit.fleet.gather import machines_of
 from diagnosis.audit.fleet.news import first_runs
-from diagnosis.audit.fleet.open_points import open_points
+from diagnosis.audit.fleet.open_points import open_points, suspected_parts
 from diagnosis.audit.fleet.read import Mission, content_mark, fleet_repairs, read_missions, read_notes, read_run
 from diagnosis.audit.fleet.runs import Limits
 from diagnosis.audit.fleet.table import fleet_csv
@@ -204,6 +204,7 @@ def _limits(path: Path) -> Limits:
             cleared=report["verdict"]["cleared"],
             not_cleared=str(report["verdict"].get("not_cleared", "")),
             open_points=open_points(report),
+            suspected=suspected_parts(report),
             holds_open=bool(report.get("previous", {}).get("open_faults")),
             found={
                 (r["component"], r["side"], r["deviation"]): float(r["share"])

@@ -24,16 +24,16 @@ _PLUG = "Unplug the connector and look for water, corrosion and bent pins."
 _SUPPLY = "Measure the supply at the plug with a multimeter: expected the rated voltage within 10 %."
 _CABLE = "Measure each wire's continuity: expected below 1 Ω, and no connection to ground."
 _SWAP_SENSOR = (
-    "Swap test: exchange the sensor with that of another {place}; if the fault moves with it, replace the sensor, else repair "
-    "the cable or the controller's input."
+    "Swap test: exchange the sensor itself with that of another {place}, while the cables stay; if the other {place} is then the faulty one, "
+    "replace the sensor; if this one still is, repair the cable or the controller's input."
 )
 _SWAP_PLUG = (
-    "Swap test, with the machine secured: exchange the plug with that of another valve of the type; if the fault moves to the "
-    "other {place}, repair cable or controller output, else the valve."
+    "Swap test, with the machine secured: exchange the plug alone with that of another valve of the type, while the valves stay; if the other "
+    "{place} is then the faulty one, repair cable or controller output; if this one still is, the valve."
 )
 _SWAP_MOTOR = (
-    "Swap test, with the supply off: exchange the motor's cables with those of another motor of the type; if the fault moves to "
-    "the other {place}, repair the controller, else motor, gear or brake."
+    "Swap test, with the supply off: exchange the cables alone with those of another motor of the type, while the motors stay; if the other "
+    "{place} is then the faulty one, repair the controller; if this one still is, motor, gear or brake."
 )
 
 _SENSOR: Mapping[FaultMode, str] = {

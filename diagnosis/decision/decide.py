@@ -23,6 +23,7 @@ from diagnosis.decision.sensors_alone import TITLES, sensors_alone
 from diagnosis.decision.severity import advised
 from diagnosis.decision.short import SAID_S, beside_nothing, exempt_axles
 from diagnosis.decision.to_clear import to_clear
+from diagnosis.decision.unexplained_axles import unexplained_sentences
 from diagnosis.decision.wording import actions_of, count_faults, join_words, misplaced_words, sentence_of
 from diagnosis.results.assessed import Cut, is_judged
 from diagnosis.results.assessment import STATES, Assessment
@@ -157,7 +158,8 @@ def decide(
     if found.status is Verdict.READY:
         exempt = exempt_axles(assessments, decided_s, driven, axles, limits, words, open_state=against.open_state)
         behind = behind_drives(assessments, axles, checks, model, words)
-        found = replace(found, text=" ".join((found.text, *exempt, *behind, *loads, *hidden)))
+        off = unexplained_sentences(assessments, axles, words)
+        found = replace(found, text=" ".join((found.text, *exempt, *off, *behind, *loads, *hidden)))
     else:
         caveats += hidden
     caveats = tuple(c for c in caveats if c != found.text)

@@ -13,13 +13,14 @@ from diagnosis.decision.size_notes import size_note
 from diagnosis.results.assessment import LEAST_SHARE, STATES, Assessment, Finding
 from diagnosis.results.machine_words import MachineWords
 from diagnosis.results.result import Epsilon, FaultInterval, Sat, StateSpan
-from diagnosis.results.sentence import about_of
+from diagnosis.results.sentence import About, about_of, is_about
 from diagnosis.results.vocabulary import Kind, Tier
-from replay.faults import FaultMode, Side
+from replay.faults import FaultMode, Side, State
 from replay.machine.config import Machine
 
 #: 95 % of the errors of a wheel's ε̂ by its model, on tuning seeds: what a loop makes up for hides a sensor's size more than a valve's.
 _MODEL_LOSS = {Side.SENSOR: 0.45, Side.ACTUATOR: 0.3, Side.SENSOR_OR_ACTUATOR: 0.45}
+_WORTH = 0.1  # of the probability that is left for a healthy part: worth a sentence
 #: A component and its side.
 Part = tuple[str, str]
 
@@ -34,6 +35,7 @@ def intervals_of(
         for own in assessment.findings:
             f = replace(own, epsilon=_bounded(own, kind))
             seconds = (f.stop - f.start) * step_ns * 1e-9
+            told = (*f.evidence, *_left_to_health(f), *f.course)
             severity, advice = severity_of(f, seconds, machine.limits, words, kind)
             found[component, f.side, f.start, f.stop] = FaultInterval(
                 id="",
@@ -53,13 +55,24 @@ def intervals_of(
                 advice=advice,
                 size_note=size_note(f, f.epsilon, kind),
                 check=check_of_all(kind, component, f.side, f.mode, f.hypotheses, words, machine.advice),
-                evidence=(*f.evidence, *f.course),
-                about=tuple(about_of((*f.evidence, *f.course))),
+                evidence=told,
+                about=tuple(about_of(told)),
                 tier=f.tier,
                 detected_s=None if f.detected is None else f.detected * step_ns * 1e-9,
             )
     ordered = sorted(found.values(), key=lambda x: (-x.severity.rank, x.start_s, x.component, x.side))
     return tuple(replace(f, id=f"F{i + 1}") for i, f in enumerate(ordered))
+
+
+def _left_to_health(f: Finding) -> tuple[str, ...]:
+    """Why a healthy part is left so much, although the readings are so much more probable with the fault; nothing where it is not."""
+    health = sum(h.p for h in f.hypotheses if h.mode == State.HEALTHY.value)
+    if health < _WORTH or not any(is_about(text, About.TIMES) for text in f.evidence):
+        return ()
+    return (
+        f"How many times as probable it is speaks of the readings alone; what else is said here of such findings leaves {100 * health:.1f} % "
+        "for a healthy part.",
+    )
 
 
 def _bounded(f: Finding, kind: Kind) -> Epsilon | None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -71,7 +71,7 @@ def _around(finding: Finding, a: Assessment, dt: float) -> _Around | None:
     stride = max(1, round(around / dt / SAMPLES))
     reach = SAMPLES * stride
     first, last = max(0, finding.start - reach), min(finding.start + reach, finding.stop)
-    columns = _steps(a, first, last)
+    columns = steps_between(a, _NEEDED, first, last)
     if columns is None:
         return None
     residual, threshold, expected = (c[::stride] for c in columns)
@@ -119,14 +119,14 @@ def _size(off: float) -> str:
     return f"{1e3 * abs(off):.0f} ms" if abs(off) < 1.0 else f"{abs(off):.1f} s"
 
 
-def _steps(a: Assessment, first: int, last: int) -> tuple[Array, ...] | None:
-    """Readings at steps [first, last); None where only envelopes of them are kept."""
-    if a.columns[_NEEDED[0]].size == a.states.size:
-        return tuple(np.asarray(a.columns[n][first:last], np.float64) for n in _NEEDED)
+def steps_between(a: Assessment, names: Sequence[str], first: int, last: int) -> tuple[Array, ...] | None:
+    """Some columns at steps [first, last), each of shape (last − first,); None where only envelopes of them are kept."""
+    if a.columns[names[0]].size == a.states.size:
+        return tuple(np.asarray(a.columns[n][first:last], np.float64) for n in names)
     near = a.closeups
-    if near is None or any(n not in near.columns for n in _NEEDED):
+    if near is None or any(n not in near.columns for n in names):
         return None
     at = np.searchsorted(near.step, [first, last])
     if at[1] - at[0] != last - first:
         return None
-    return tuple(np.asarray(near.columns[n][at[0] : at[1]], np.float64) for n in _NEEDED)
+    return tuple(np.asarray(near.columns[n][at[0] : at[1]], np.float64) for n in names)

@@ -10,6 +10,7 @@ from diagnosis.decision.check_advice import COMPARE, STEER, TURNED, act_of
 from diagnosis.decision.explained import Explanation, explaining
 from diagnosis.decision.open_checks import furthest_first
 from diagnosis.decision.short import Part, ToClear, short_parts, sides_of, unjudged_axles
+from diagnosis.decision.unexplained_axles import unexplained_points
 from diagnosis.decision.wording import count_words, join_words, remedy_words
 from diagnosis.results.assessed import CutKind, is_judged
 from diagnosis.results.assessment import Assessment, Lack
@@ -157,6 +158,7 @@ def to_clear(
     ranks = {check: k for k, check in enumerate(furthest_first(against.open))}
     out += [point for _, point in sorted(deviating, key=lambda d: ranks[d[0]])]
     out += short_parts(brief, assessments, decided_s, driven, limits, words, Kind.STEER, open_state=against.open_state)
+    out += unexplained_points(assessments, axles, against.unexplained, twice, words)
     out += [] if first else dark
     open_for_steering = {
         c.component for c in left if _asks_for_steering(c, seen_twice)

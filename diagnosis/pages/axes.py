@@ -51,7 +51,7 @@ class Frame:
         share = (np.asarray(y) - self.y[0]) / (self.y[1] - self.y[0])
         return self.bottom - np.clip(share, 0.0, 1.0) * (self.bottom - self.top)
 
-    def axes(self, unit: str, scale: float = 1.0) -> Markup:
+    def axes(self, unit: str, scale: float = 1.0, *, percent: bool = False) -> Markup:
         """Grid, ticks and their words; `scale` is the factor of the times shown, `unit` their unit."""
         parts = ['<path class="grid" d="']
         xs, ys = ticks(self.x[0] * scale, self.x[1] * scale, 5), ticks(*self.y, 4)
@@ -63,7 +63,10 @@ class Frame:
             words = number(v, 6) + (f" {unit}" if k == len(xs) - 1 else "")
             cut = p + _LETTER * len(words) / 2 > self.width
             parts.append(label(self.width if cut else p, self.bottom + 14, words, "fin" if cut else "mid"))
-        parts += [label(self.left - 5, p + 3.5, number(v, 6), "fin") for p, v in zip(across, ys, strict=True)]
+        parts += [
+            label(self.left - 5, p + 3.5, f"{number(100 * v, 6)} %" if percent else number(v, 6), "fin")
+            for p, v in zip(across, ys, strict=True)
+        ]
         return Markup("".join(parts))
 
     def line(self, x: float, style: str) -> Markup:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from diagnosis.comparison.coverage import SideCoverage, sides_of
 from diagnosis.decision.missing import is_commanded
 from diagnosis.pages.labels import utc
@@ -16,6 +18,7 @@ from replay.faults import Side, State
 
 _WORDS = ((0.99, "Practically certain"), (0.9, "Very likely"), (0.7, "Likely"))
 _OPEN, _TIE = 0.9, 1e-3
+_SPREAD = 0.05  # of the probabilities of spells that is worth a word
 _AT_MOST = f"{100 * MOST_CLAIMED:.0f} %, the most that any finding is given"
 _NOTHING, _MOSTLY = 0.005, 0.5  # of the driving: judged for so little that it is none, and for most of it
 _BESIDE = "what the {wheels} and the channels of one show beside each other"  # without any command
@@ -25,7 +28,7 @@ _ANSWERS = {Verdict.STOP: f"{Leave.MUST_NOT} before repair", Verdict.READY: "", 
 
 def percent(p: float) -> str:
     """Probability or share as a percentage that never claims certainty it does not have."""
-    return "over 99.9 %" if p > 0.999 else f"{100 * p:.1f} %" if p > 0.9 else f"{100 * p:.0f} %"
+    return "over 99.9 %" if p > 0.999 else f"{100 * p:.1f} %" if p >= 0.895 else f"{100 * p:.0f} %"
 
 
 def sure_of(fault: IntervalRow, report: ReportDocument) -> str:
@@ -72,6 +75,23 @@ def sure_of(fault: IntervalRow, report: ReportDocument) -> str:
     elif shares:
         judged_words = _judged_words(min(shares.values()), machine_words.moving)
     return "; ".join([", ".join(words), *([judged_words] if judged_words else [])])
+
+
+def sure_of_action(faults: Sequence[IntervalRow], report: ReportDocument) -> str:
+    """How sure the tool is of the first fault of an action, and from how little to how much of its spells where they differ.
+
+    Parameters
+    ----------
+    faults : Sequence[IntervalRow]
+        Faults of one action, the worst first; not empty.
+    report : ReportDocument
+        The document.
+    """
+    first = faults[0]
+    said, p = sure_of(first, report), sorted(f["probability"] for f in faults)
+    if p[-1] - p[0] < _SPREAD or any(f["mode"] != first["mode"] for f in faults):
+        return said
+    return f"{said}; its {len(faults)} spells: from {percent(p[0])} to {percent(p[-1])}"
 
 
 def _judged_words(share: float, moving: str) -> str:
@@ -132,7 +152,7 @@ def _why_none(report: ReportDocument) -> str:
         return ", for none was judged long enough"
     whole = next((row["reason"] for row in rows if not row["parts"]), "")
     if whole:
-        return f": {whole[:1].lower()}{whole[1:].rstrip('.')}"
+        return ", for something about the machine as a whole, or its log, is open, as said above"
     return ", for each that was judged has a fault or is named in what is open"
 
 

@@ -23,6 +23,7 @@ _HEALTHY = 120
 _LEAST_HEALTHY = 8
 _COURSE = 30
 _APART = 3.5
+_OFF = 0.5  # standard deviations
 
 
 @dataclass(frozen=True)
@@ -47,6 +48,8 @@ class Edge:
         Largest distance of a faulty sample of the window from where it should have been.
     noise : float or None
         Standard deviation on the other side of the edge; None where that holds too few samples.
+    level : float
+        How far the channel is off its independent reference on the other side of the edge, in the pair's unit; 0 without one.
     """
 
     name: str
@@ -58,6 +61,12 @@ class Edge:
     shift: tuple[float, float] | None
     most: float
     noise: float | None
+    level: float = 0.0
+
+    @property
+    def off_before(self) -> bool:
+        """Whether the channel is off its reference on the other side of the edge already, by more than half of its noise there."""
+        return abs(self.level) > _OFF * (self.noise or 0.0)
 
     @property
     def reach(self) -> float:
@@ -104,10 +113,11 @@ def edge_of(
         return None
     t = (np.arange(first, last, dtype=np.float64) - place) * step
     inside = slice(place - first, max(place, far) - first) if onset else slice(max(far - first, 0), place - first)
-    shift, most, noise = None, math.nan, None
+    shift, most, noise, level = None, math.nan, None, 0.0
     times, values = _healthy(place, fault, others, pair, columns, axis, onset)
     if values.size >= _LEAST_HEALTHY:
         course, noise = _course(times, values, t[inside], onset, pair.independent)
+        level = float(np.median(values)) if pair.independent else 0.0
         expected = course + (reference[inside] if pair.independent else 0.0)
         deviation = y[inside] - expected
         finite = np.flatnonzero(np.isfinite(deviation))
@@ -115,7 +125,7 @@ def edge_of(
             near = finite[0] if onset else finite[-1]
             shift = (float(expected[near]), float(y[inside][near]))
             most = float(np.abs(deviation[finite]).max())
-    return Edge(name, t, y, reference, at, step, shift, most, noise)
+    return Edge(name, t, y, reference, at, step, shift, most, noise, level)
 
 
 def _cut(columns: Mapping[str, NDArray[np.floating]], pair: Pair, first: int, last: int) -> tuple[Array, Array]:
@@ -192,7 +202,9 @@ def edge_words(edge: Edge, pair: Pair) -> str:
         if onset
         else "from the course after it"
     )
-    if edge.noise is not None and edge.most < _APART * edge.noise:
+    if edge.off_before:
+        text = _against_before(edge, pair, size)
+    elif edge.noise is not None and edge.most < _APART * edge.noise:
         text = f"No sample of the {time_words(edge.reach)} {window} stands out of the noise: at most {pair.text(edge.most)}{_times(edge.most, edge)} {off}"
     else:
         text = f"{which} faulty sample deviates by {pair.text(size)}{_times(size, edge)} {off}"
@@ -203,6 +215,26 @@ def edge_words(edge: Edge, pair: Pair) -> str:
     if edge.noise is not None:
         text += f"; σ {'before' if onset else 'after'} it: {number(edge.noise)}"
     return text + "."
+
+
+def _against_before(edge: Edge, pair: Pair, size: float) -> str:
+    """The same where the channel is off its reference beyond the edge already: how far off it is, and how much of that is new."""
+    onset = edge.name == "onset"
+    which, window, beside = ("First", "after", "before") if onset else ("Last", "before", "after")
+    assert edge.shift is not None
+    verb, yet = ("were", "already") if onset else ("are", "still")
+    was = f"the samples {beside} it, which {verb} {pair.text(abs(edge.level))} off the {pair.words} {yet}"
+    if edge.noise is not None and edge.most < _APART * edge.noise:
+        most = f"at most {pair.text(edge.most)}{_times(edge.most, edge)}"
+        return f"No sample of the {time_words(edge.reach)} {window} stands out of the noise against {was}: {most}"
+    total = abs(edge.shift[1] - edge.shift[0] + edge.level)
+    text = (
+        f"{which} faulty sample is {pair.text(total)} off the {pair.words}, a change of {number(size)}"
+        f"{_times(size, edge)} against {was}"
+    )
+    if edge.most > 1.5 * size:
+        text += f"; in the {time_words(edge.reach)} {window} the change is up to {number(edge.most)}{_times(edge.most, edge)}"
+    return text
 
 
 def _times(value: float, edge: Edge) -> str:

@@ -18,7 +18,7 @@ from diagnosis.report.confidence import (
     judged_means,
     may_go_out,
     percent,
-    sure_of,
+    sure_of_action,
     sure_of_verdict,
 )
 from diagnosis.report.data_tables import (
@@ -249,7 +249,7 @@ def _action(action: ActionRow, intervals: Mapping[str, IntervalRow], report: Rep
         "faults": faults,
         "state": symbol_of(first) if first else "warning",
         "severity": action["severity"],
-        "sure": sure_of(first, report) if first else "",
+        "sure": sure_of_action([intervals[f] for f in faults], report) if first else "",
         "of": f" of {first['id']}" if first and len(faults) > 1 else "",
         "when": times_words([intervals[f] for f in faults], report),
     }

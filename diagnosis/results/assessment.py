@@ -119,6 +119,8 @@ class Assessment:
         Figures that the judgement used, one sentence each.
     unexplained_s : float
         Time [s] in which something deviates that no single fault explains well enough to be stated.
+    unexplained_size : str
+        How far, against what, and when, to follow the part's name; empty where that is not known, or hardly anything.
     closeups : Closeups or None
         Every sample of `columns` around the findings, where they are envelopes.
     loss : Loss or None
@@ -138,6 +140,7 @@ class Assessment:
     tier: Tier = Tier.NONE
     notes: tuple[str, ...] = ()
     unexplained_s: float = 0.0
+    unexplained_size: str = ""
     closeups: Closeups | None = None
     loss: Loss | None = None
     powers: Powers | None = None

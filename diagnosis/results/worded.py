@@ -20,6 +20,7 @@ def worded(found: Assessment, words: MachineWords) -> Assessment:
         reasons={state: words.fill(why) for state, why in found.reasons.items()},
         notes=tuple(words.fill(note) for note in found.notes),
         hidden=words.fill(found.hidden),
+        unexplained_size=words.fill(found.unexplained_size),
         findings=tuple(_finding(f, words) for f in found.findings),
     )
 

@@ -21,7 +21,8 @@ _FEW = 5  # pairs of readings in a finding
 def without_agreed(found: Mapping[Side, SideFindings], inputs: AxleInputs) -> dict[Side, SideFindings]:
     """Findings of both sides; those of the sensor in which the second angle shows what the first one does are left out.
 
-    What the model did not explain stays unexplained of the valve, unless that is measured twice too.
+    What the model did not explain stays unexplained of the valve, unless that is measured twice too; of the sensor it is refuted where
+    both angles differ no more than usual, and stays unexplained where they do, by what may be play.
 
     Parameters
     ----------
@@ -37,15 +38,20 @@ def without_agreed(found: Mapping[Side, SideFindings], inputs: AxleInputs) -> di
     agreed = _agreed(sensor.findings, inputs)
     if not agreed:
         return out
-    out[Side.SENSOR] = sensor._replace(findings=tuple(f for f in sensor.findings if f not in agreed))
+    length = inputs.blocks.length
+    out[Side.SENSOR] = sensor._replace(
+        findings=tuple(f for f in sensor.findings if f not in agreed),
+        unexplained=(*sensor.unexplained, *(span_of(f, length) for f, same in agreed.items() if not same)),
+        refuted=(*sensor.refuted, *(span_of(f, length) for f, same in agreed.items() if same)),
+    )
     if not inputs.valve_redundant:
-        spans = [span_of(f, inputs.blocks.length) for f in agreed]
+        spans = [span_of(f, length) for f in agreed]
         out[Side.ACTUATOR] = valve._replace(unexplained=(*valve.unexplained, *spans))
     return out
 
 
-def _agreed(findings: tuple[Finding, ...], inputs: AxleInputs) -> list[Finding]:
-    """Findings in which both angles differ by no more than they do without any; noise also where only their play is between them."""
+def _agreed(findings: tuple[Finding, ...], inputs: AxleInputs) -> dict[Finding, bool]:
+    """Findings in which both angles differ by no more than they do without any (True); noise also where only their play is between them (False)."""
     y, x = inputs.values("phi"), inputs.values("phi_true")
     use = inputs.timeline.fresh[inputs.channel("phi")] & np.isfinite(y) & np.isfinite(x)
     sound = use.copy()
@@ -53,19 +59,21 @@ def _agreed(findings: tuple[Finding, ...], inputs: AxleInputs) -> list[Finding]:
         sound[f.start : f.stop] = False
     apart = y - x
     if not apart[use].any() or np.count_nonzero(sound) < max(_FEW, _LEAST_USUAL_S * use.mean() / inputs.timeline.dt):
-        return []  # a copy is no second measurement
+        return {}  # a copy is no second measurement
     usual = float(np.median(apart[sound]))
     rms = float(np.sqrt(np.median((apart[sound] - usual) ** 2))) * 1.4826
     if rms > _MOST:
-        return []
+        return {}
     most = max(_LEAST, _AGREE * rms)
     shaken = float(np.std(np.diff(apart[sound])))
 
-    def agrees(f: Finding) -> bool:
+    out = {}
+    for f in findings:
         part = (apart[f.start : f.stop] - usual)[use[f.start : f.stop]]
-        if part.size < _FEW:
-            return False
+        if part.size < _FEW or f.mode is FaultMode.NO_SIGNAL:
+            continue
         calm = f.mode is FaultMode.NOISY and float(np.std(np.diff(part))) <= _AGREE * shaken
-        return float(np.sqrt(np.mean(part**2))) <= (max(most, _PLAY) if calm else most)
-
-    return [f for f in findings if f.mode is not FaultMode.NO_SIGNAL and agrees(f)]
+        differ = float(np.sqrt(np.mean(part**2)))
+        if differ <= (max(most, _PLAY) if calm else most):
+            out[f] = differ <= most
+    return out

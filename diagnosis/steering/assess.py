@@ -36,8 +36,9 @@ from diagnosis.steering.prior import plant_before
 from diagnosis.steering.reliability import commanded, lost_by_model, paired, told_from_none, weighed
 from diagnosis.steering.rests_together import not_resting_together
 from diagnosis.steering.side_findings import SideFindings
-from diagnosis.steering.states import REASONS, states_of
+from diagnosis.steering.states import reasons_of, states_of
 from diagnosis.steering.together import less_sure_all_along, not_shaken_together, not_starved, not_together
+from diagnosis.steering.unexplained_size import size_words
 from replay.arrays.processors import each
 from replay.control.loop import Replay
 from replay.faults import Side, State
@@ -236,7 +237,7 @@ def _judged(inputs: AxleInputs, told: _Found, *, otherwise: bool) -> _Judged:
         unexplained = sum((b - a) * length for a, b in found[side].unexplained)
         sides[side] = Assessment(
             states=states_of(side, inputs, axle, path, found[side], masked, judged=judged),
-            reasons=REASONS[side],
+            reasons=reasons_of(side, axle, judged=judged),
             lacks={} if twice[side] else {State.NOT_ASSESSED: Lack.SECOND},
             findings=found[side].findings,
             columns=columns[side].columns,
@@ -244,6 +245,7 @@ def _judged(inputs: AxleInputs, told: _Found, *, otherwise: bool) -> _Judged:
             tier=Tier.MODEL,
             notes=(_note(axle), _OTHERWISE) if otherwise else (_note(axle),),
             unexplained_s=unexplained * inputs.timeline.dt,
+            unexplained_size=size_words(side, found[side], inputs, axle, path),
         )
     return _Judged(sides, path_angle(axle, path, inputs.timeline))
 

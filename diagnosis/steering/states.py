@@ -19,19 +19,37 @@ from replay.faults import Side, State
 
 _ALONE_S, _BETWEEN_S = 4.0, 10.0
 _SEEN_ALONE_S, _SEEN_BETWEEN_S = 6.0, 30.0  # where the valve's opening is measured: a fault shows at rest too
-REASONS: dict[Side, Mapping[State, str]] = {
+_REASONS: dict[Side, Mapping[State, str]] = {
     Side.SENSOR: {
         State.NOT_EXCITED: "the axle was not steered, and the sensor's rounding hides its noise",
-        State.NOT_ASSESSED: "no {valve} command to compare with, or no single fault explains the angle well enough",
         State.NO_DATA: "no samples",
     },
     Side.ACTUATOR: {
         State.NOT_EXCITED: "the axle was not steered, so there is no evidence on its {valve}",
         State.MASKED: "the steering sensor, which is needed for it, delivers nothing usable",
-        State.NOT_ASSESSED: "the steering model does not hold here, or no single fault explains the angle",
         State.NO_DATA: "no samples",
     },
 }
+_UNEXPLAINED = "something deviates there that no single fault explains well enough"
+_NO_COMMAND = "there is no {valve} command to compare with"
+_NO_MODEL = "the steering model does not hold here"
+
+
+def reasons_of(side: Side, axle: AxleFilter, *, judged: bool) -> dict[State, str]:
+    """Why a side has states that are no judgement: of what is not assessed, the reason that holds in this mission.
+
+    Parameters
+    ----------
+    side : Side
+        `SENSOR` or `ACTUATOR`.
+    axle : AxleFilter
+        Its filters.
+    judged : bool
+        Whether this side can be judged by the plant.
+    """
+    unseen = side is Side.SENSOR and bool(_unseen(axle).any())
+    why = _UNEXPLAINED if judged else _NO_MODEL
+    return {**_REASONS[side], State.NOT_ASSESSED: f"{_NO_COMMAND}, or {why}" if unseen else why}
 
 
 def vouched(healthy: NDArray[np.bool_], shown: NDArray[np.bool_], dt: float, *, seen: bool) -> NDArray[np.bool_]:
@@ -111,11 +129,19 @@ def _of_blocks(side: Side, axle: AxleFilter, path: SteeringPath, found: SideFind
         shown[:] = True
     healthy = vouched(fine, shown, blocks.dt, seen=axle.model.opening_measured)
     states = np.where(healthy, CODE[State.HEALTHY], CODE[State.NOT_EXCITED]).astype(np.int8)
+    states[~fine & shown] = CODE[
+        State.NOT_ASSESSED
+    ]  # it was steered, or trembles: what deviates there is not explained
     if not judged:
         states[:] = CODE[State.NOT_ASSESSED]
     if side is Side.SENSOR:
-        unseen = blocks.blind & (blocks.status == PAIR) & ~blocks.redundancy.known
-        states[unseen & (states == CODE[State.HEALTHY])] = CODE[State.NOT_ASSESSED]
+        states[_unseen(axle) & (states == CODE[State.HEALTHY])] = CODE[State.NOT_ASSESSED]
     for a, b in found.unexplained:
         states[a:b] = CODE[State.NOT_ASSESSED]
     return states
+
+
+def _unseen(axle: AxleFilter) -> NDArray[np.bool_]:
+    """Blocks in which nothing tells what the angle should be, shape (m,)."""
+    blocks = axle.blocks
+    return np.asarray(blocks.blind & (blocks.status == PAIR) & ~blocks.redundancy.known, dtype=np.bool_)

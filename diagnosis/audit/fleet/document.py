@@ -198,6 +198,9 @@ def _machine(m: Machine, at: Mapping[str, int]) -> MachineRow:
         "cleared": m.cleared,
         "not_cleared": m.not_cleared,
         "open_points": list(m.limits.open_points),
+        "suspicions": [
+            {"text": s.text, "mission": at[s.run.name], "again": s.again} for s in m.suspicions if s.run.name in at
+        ],
         "outdated": m.outdated,
         "unjudged": m.unjudged,
         "note": m.note,

@@ -103,6 +103,14 @@ class PartRow(TypedDict):
     modes: dict[str, int]
 
 
+class SuspicionRow(TypedDict):
+    """What an earlier mission held against a part without a fault, and nothing settled since: in words, that mission's place, and how many before it did so too."""
+
+    text: str
+    mission: int
+    again: int
+
+
 class MachineRow(Worded):
     """One machine.
 
@@ -124,6 +132,8 @@ class MachineRow(Worded):
         Why that report does not let it go out; empty where it does, or is not of faults to watch.
     open_points : list[str]
         What its newest report leaves open without naming a fault, each with its parts.
+    suspicions : list[SuspicionRow]
+        What its last ten missions but the newest one held against a part without a fault, and nothing settled since.
     outdated : bool
         Whether the last report says that a fault of an earlier mission is open which is not any more: it was repaired since.
     unjudged : int
@@ -154,6 +164,7 @@ class MachineRow(Worded):
     cleared: bool | None
     not_cleared: NotRequired[str]
     open_points: NotRequired[list[str]]
+    suspicions: NotRequired[list[SuspicionRow]]
     outdated: NotRequired[bool]
     unjudged: int
     note: str

@@ -14,6 +14,7 @@ from diagnosis.audit.fleet.machines import Machine
 from diagnosis.audit.fleet.owners import Owner, Owners
 from diagnosis.audit.fleet.read import FoundFault, Mission
 from diagnosis.audit.fleet.runs import Limits, Run, sides_of
+from diagnosis.audit.fleet.suspicions import suspicions_of
 from diagnosis.audit.store.repairs import Repair, repaired_at
 from diagnosis.results.vocabulary import Severity, Verdict
 
@@ -114,7 +115,9 @@ def _machine(key: Owner, runs: Iterable[Run], failed: Sequence[Mission], known: 
     name = key[1] or (last.result.machine_name if last else "")
     m = Machine(key[0], name, tuple(dated), tuple(undated), tuple(failed), own)
     cleared, why = _cleared(m, limits)
-    return _with_faults(m.told(cleared=cleared, not_cleared=why, unjudged=_unjudged(m, first_seen)), known)
+    open_ = suspicions_of(m.dated, limits, known.repairs)
+    told = m.told(cleared=cleared, not_cleared=why, unjudged=_unjudged(m, first_seen), suspicions=open_)
+    return _with_faults(told, known)
 
 
 def _cleared(m: Machine, limits: Callable[[str], Limits] | None) -> tuple[bool | None, str]:

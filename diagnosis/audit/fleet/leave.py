@@ -13,6 +13,7 @@ from diagnosis.audit.fleet.may_leave import is_lost, leave_of
 from diagnosis.audit.fleet.page.figures import unassessed
 from diagnosis.audit.fleet.page.rows import fault_words, not_named
 from diagnosis.audit.fleet.runs import sides_of
+from diagnosis.audit.fleet.suspicion_words import with_suspicions
 from diagnosis.audit.fleet.trend_types import TrendRow
 from diagnosis.audit.fleet.words import count, open_words
 from diagnosis.decision.severity import HALF
@@ -92,7 +93,7 @@ def lists_of(document: FleetDocument) -> tuple[Left, ...]:
         place, reason = _why(otherwise, m, standing[k], document["missions"], rising[k])
         reason += _repaired(every[k], m) if leave is Leave.MAY else ""
         reason = _with_growth(otherwise, m, _with_losses(leave, m, reason, untold), fast[k], untold)
-        reason = _with_blind(reason, m)
+        reason = with_suspicions(_with_blind(reason, m), m, document["missions"])
         if leave is not Leave.MAY and any(f["open"] and f["since"] for f in standing[k]) and _ready(m, document):
             newest = document["missions"][m["missions"][-1]]["name"]
             reason += f"; its newest report ({newest}) finds no fault, but judges its own mission alone"

@@ -38,6 +38,8 @@ class ListedMachine:
         Whether it may go out, why, and the name of the mission that says so or blocks it.
     lead, note : str
         What that mission is to the reason, and what whoever opens its report must know; mostly empty.
+    in_part : tuple[str, ...]
+        Missions with a report in which a part of a wheel was not judged long enough.
     """
 
     label: str
@@ -52,6 +54,7 @@ class ListedMachine:
     copies: tuple[tuple[str, str], ...] = ()
     lead: str = ""
     note: str = ""
+    in_part: tuple[str, ...] = ()
 
 
 def machine_words(
@@ -86,6 +89,8 @@ def machine_words(
         return f"Ready, fault {'comes and goes' if often else 'seen lately'}"
     if m["verdict"] == Verdict.READY and approaching:
         return "Ready, limit comes near"
+    if m["verdict"] == Verdict.READY and m.get("suspicions"):
+        return "Ready, but not settled what an earlier mission saw"
     return m["standing"]
 
 
@@ -119,6 +124,11 @@ def listed_machines(document: FleetDocument) -> tuple[ListedMachine, ...]:
                 tuple(copies[k]),
                 lists[k].lead,
                 lists[k].note,
+                tuple(
+                    x["name"]
+                    for x in (document["missions"][j] for j in (*m["missions"], *m["undated"]))
+                    if not x.get("judged", True)
+                ),
             )
         )
     return tuple(out)

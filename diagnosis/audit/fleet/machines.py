@@ -24,6 +24,7 @@ from diagnosis.audit.fleet.fleet_fault import FleetFault
 from diagnosis.audit.fleet.parts import PartKey, PartTable, columns_of
 from diagnosis.audit.fleet.read import Mission
 from diagnosis.audit.fleet.runs import Limits, Run, sides_of
+from diagnosis.audit.fleet.suspicions import Suspicion
 from diagnosis.results.vocabulary import Kind, Severity, Verdict
 
 _OF_RUNS = ("_columns", "_assessed", "runs", "judged_s", "_kinds")
@@ -54,6 +55,8 @@ class Machine:
         Missions that were not judged and may be later than the last judged one.
     faults : tuple[FleetFault, ...]
         Faults by part and row, those that stand and the severe ones first.
+    suspicions : tuple[Suspicion, ...]
+        What earlier missions held against parts without a fault, and nothing has settled since.
     repaired : frozenset[tuple[int, str, str, str]]
         Faults of missions before the repair of their part: result, component, side and mode.
     """
@@ -68,6 +71,7 @@ class Machine:
     not_cleared: str = ""
     unjudged: int = 0
     faults: tuple[FleetFault, ...] = ()
+    suspicions: tuple[Suspicion, ...] = ()
     repaired: frozenset[tuple[int, str, str, str]] = frozenset()
 
     @property

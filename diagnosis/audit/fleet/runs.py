@@ -21,7 +21,8 @@ class Limits:
 
     The defaults are those of the paper's machine. `found` has the share of places of the mission at which a fault of ten
     seconds would have been found, by component, side and mode; what is not there was not said. `not_cleared` is why faults to watch
-    give no leave; `open_points` what it leaves open without a fault, each with its parts; `holds_open` whether an audit has written into the
+    give no leave; `open_points` what it leaves open without a fault, each with its parts, and `suspected` those of them in which something
+    deviates, each with its components and sides; `holds_open` whether an audit has written into the
     report that a fault of an earlier mission is open.
     """
 
@@ -32,6 +33,7 @@ class Limits:
     cleared: bool | None = None
     not_cleared: str = ""
     open_points: tuple[str, ...] = ()
+    suspected: tuple[tuple[tuple[PartKey, ...], str], ...] = ()
     holds_open: bool = False
     found: Mapping[tuple[str, str, str], float] = field(default_factory=dict, hash=False)
     words: MachineWords = HYDRAULIC

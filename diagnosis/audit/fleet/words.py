@@ -68,20 +68,29 @@ def repair_command(label: str, component: str, side: str) -> str:
     return f"mfhca audit -o . --repaired {shlex.quote(part)} --on DATE"
 
 
+def share(value: float) -> str:
+    """A loss or its limit as everywhere on the page, in per cent: ``34 %``, ``0.6 %``."""
+    return (
+        f"{100 * value:.0f} %".replace("-", "−")
+        if abs(value) >= 0.095
+        else f"{round_to(100 * value)} %".replace("-", "−")
+    )
+
+
 def forecast_words(f: Forecast, limit: float, axis: Axis = "hours") -> str:
     """When a limit is reached, in one phrase. `limit` has the unit of the trend [1 for ε]."""
     unit = _UNITS[axis]
     if f.state == "not_known":
         return f"not known: {f.why}"
     if f.state == "above":
-        return f"already above the limit of {round_to(limit)}"
+        return f"already above the limit of {share(limit)}"
     if f.state == "not_within" or f.soonest is None:
-        return f"does not reach the limit of {round_to(limit)} within {round_to(f.horizon)} {unit}"
+        return f"does not reach the limit of {share(limit)} within {round_to(f.horizon)} {unit}"
     if f.latest is None:
         begin = f"in {round_to(f.soonest)} {unit} at the soonest" if f.soonest > 0 else "at any time"
         likely = f", likely in {round_to(f.likely)}" if f.likely is not None else ""
-        return f"may reach the limit of {round_to(limit)} {begin}{likely}; latest not known"
-    return f"reaches the limit of {round_to(limit)} in {round_to(f.soonest)} to {round_to(f.latest)} {unit} (90 %)"
+        return f"may reach the limit of {share(limit)} {begin}{likely}; latest not known"
+    return f"reaches the limit of {share(limit)} in {round_to(f.soonest)} to {round_to(f.latest)} {unit} (90 %)"
 
 
 def standing(m: Machine) -> str:

@@ -149,7 +149,11 @@ def test_the_verdict_is_printed(calls: dict[str, Any], capsys: pytest.CaptureFix
 def test_many_faults_are_cut_with_a_word_about_it(calls: dict[str, Any], capsys: pytest.CaptureFixture[str]) -> None:
     many = result(*["medium"] * 55)
     for k, fault in enumerate(many.report["intervals"]):
+<<<<<<< HEAD
         fault["component"] = f"wheel {k // 2}"
+=======
+        fault["component"] = f"wheel {k // 2}"  # two of a part may be two faults
+>>>>>>> w-h17
     calls["result"] = many
     run(["diagnose", "drive.mcap"])
     assert "… and 15 more in the report" in capsys.readouterr().out
@@ -161,6 +165,22 @@ def test_what_comes_again_and_again_is_one_line(calls: dict[str, Any], capsys: p
     seen = capsys.readouterr().out
     assert "stuck, 55 times" in seen
     assert "more in the report" not in seen
+
+
+def test_one_line_of_spells_says_between_which_values_they_lie(
+    calls: dict[str, Any], capsys: pytest.CaptureFixture[str]
+) -> None:
+    several = result(*["medium"] * 3)
+    for fault, p, loss in zip(several.report["intervals"], (0.6, 0.96, 0.7), (0.15, 0.1, 0.47), strict=True):
+        fault["probability"] = p
+        fault["epsilon"] = {"value": loss, "low": 0.0, "high": 0.9}
+    several.report["intervals"][2]["sat"] = None
+    calls["result"] = several
+    run(["diagnose", "drive.mcap"])
+    seen = capsys.readouterr().out
+    assert "0.600 to 0.960" in seen
+    assert "0.10 to 0.47" in seen
+    assert "differs" in seen
 
 
 def test_json_is_the_report_alone(calls: dict[str, Any], capsys: pytest.CaptureFixture[str]) -> None:

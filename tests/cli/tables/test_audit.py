@@ -61,11 +61,18 @@ def test_failures_stand_first_then_machines_then_counts_and_the_page() -> None:
         "Missions",
         "stop and repair: 1 · faults to watch: 1 · ready: 1 · not assessed or not cleared: 1 · unreadable: 1",
         "· crashed: 1",
-        "6 in all, 2 of them from an earlier run, 1 with damage or parts that cannot be judged",
-        "damaged, or in part not judged: e",
+        "6 in all, 2 of them from an earlier run, 1 with damage, or in part left out",
+        "damaged, or in part left out: e",
         "fleet page  out/fleet.html",
         "failures    out/failures.txt",
     ]
+
+
+def test_missions_of_which_drives_were_not_judged_are_named_too() -> None:
+    some = replace(M1, in_part=("e", "f", "gone"))
+    lines = printed(ending("e", "degraded", "not_assessed"), ending("f", "ok", "not_assessed"), machines=(some,))
+    assert "damaged, or in part left out: e" in lines
+    assert "not every part of a wheel judged long enough: f" in lines
 
 
 def test_of_many_failures_some_are_shown() -> None:

@@ -151,7 +151,7 @@ def test_worst_machines_come_first_then_those_whose_limit_comes_near(tmp_path: P
     assert [m["label"] for m in d["machines"]] == ["S", "N", "W", "R"]
     assert d["verdict"]["status"] == "stop"
     assert d["verdict"]["title"] == "1 of 4 machines must not go out, 2 may go out, 1 must be checked first"
-    assert any("W: the loss of the RL drive valve reaches the limit of 0.1 in" in t for t in d["verdict"]["text"])
+    assert any("W: the loss of the RL drive valve reaches the limit of 10 % in" in t for t in d["verdict"]["text"])
 
 
 def test_limits_come_from_the_machines_last_report(tmp_path: Path) -> None:

@@ -6,7 +6,16 @@ from typing import Any
 
 import pytest
 
-from diagnosis.report.confidence import going_out, headline, judged, judged_means, percent, sure_of, sure_of_verdict
+from diagnosis.report.confidence import (
+    going_out,
+    headline,
+    judged,
+    judged_means,
+    percent,
+    sure_of,
+    sure_of_action,
+    sure_of_verdict,
+)
 from diagnosis.report.tables import clearing_sentences
 from diagnosis.results.document import IntervalRow, ReportDocument
 from tests import report_samples as samples
@@ -38,7 +47,7 @@ def row(side: str, decided_s: float, component: str = "FR", tier: str = "direct"
 
 @pytest.mark.parametrize(
     ("p", "words"),
-    [(0.9999, "over 99.9 %"), (0.99, "99.0 %"), (0.95, "95.0 %"), (0.5, "50 %")],
+    [(0.9999, "over 99.9 %"), (0.99, "99.0 %"), (0.95, "95.0 %"), (0.5, "50 %"), (0.896, "89.6 %")],
 )
 def test_no_certainty_that_is_not_there(p: float, words: str) -> None:
     assert percent(p) == words
@@ -194,7 +203,7 @@ def test_parts_that_were_judged_and_those_that_were_cleared_are_counted_apart() 
         )
     about["to_clear"] = [{"reason": "Several wheels swing together.", "act": "lower the gains", "parts": []}]
     assert judged(samples.report_with(coverage=rows, intervals=[watched], verdict=about)) == (
-        "4 of 4 parts judged, none cleared: several wheels swing together"
+        "4 of 4 parts judged, none cleared, for something about the machine as a whole, or its log, is open, as said above"
     )
     brief = samples.report_with(coverage=[row("sensor", 20.0)], verdict=about)
     assert judged(brief).startswith("0 of 1 parts judged, none cleared, for none was judged long enough;")
@@ -224,3 +233,11 @@ def test_drives_without_a_command_in_the_log_answer_none() -> None:
     (one, *_) = samples.five_faults()[0]["signals"]
     told = samples.report_with(coverage=coverage, signals=[one | {"name": "cmd.v"}])
     assert "answer their commands" in sure_of_verdict(told)
+
+
+def test_spells_of_one_fault_say_how_far_their_probabilities_go() -> None:
+    report = samples.report_with(coverage=[])
+    spells = [fault(0.6), fault(0.96), fault(0.7)]
+    assert sure_of_action(spells, report).endswith("; its 3 spells: from 60 % to 96.0 %")
+    assert sure_of_action(spells[:1], report) == sure_of(spells[0], report)
+    assert "spells" not in sure_of_action([fault(0.6), fault(0.96, mode="inefficient")], report)

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import re
 from typing import Any
 
 import numpy as np
@@ -114,3 +115,23 @@ def test_a_constant_before_has_no_noise() -> None:
 
 def test_times() -> None:
     assert [time_words(s) for s in (0.005, -0.02, 1.25)] == ["5 ms", "−20 ms", "1.25 s"]
+
+
+def test_a_channel_that_is_off_before_its_onset_is_said_to_be() -> None:
+    columns = log(second=True)
+    columns["wheel.FR.v"][880:1000] -= 0.2
+    found, pair = edge("onset", columns)
+    assert found is not None
+    said = edge_words(found, pair)
+    assert re.match(
+        r"First faulty sample is 0\.(49|5)\d* m/s off the .*, a change of 0\.\d+ \(\d+ σ\) against the samples before it",
+        said,
+    )
+    assert re.search(r"which were 0\.(2|19)\d* m/s off the .* already", said)
+
+    columns["wheel.FR.v"][1000:1200] += 0.3
+    found, pair = edge("onset", columns)
+    assert found is not None
+    assert edge_words(found, pair).startswith(
+        "No sample of the 150 ms after stands out of the noise against the samples before it, which were 0."
+    )

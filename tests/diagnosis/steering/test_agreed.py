@@ -43,6 +43,8 @@ def test_what_a_second_angle_shows_too_is_no_fault_of_the_sensor(*, valve: bool)
     out = without_agreed(found, inputs(second, first, valve=valve))
     assert not out[Side.SENSOR].findings
     assert out[Side.ACTUATOR].unexplained == (() if valve else ((100, 115),))
+    assert out[Side.SENSOR].refuted == ((100, 115),)  # it reads what the second one does: healthy
+    assert out[Side.SENSOR].unexplained == ()
 
     shaken = first.copy()
     shaken[1000:1150] += rng.normal(0.0, 0.02, 150)
@@ -68,4 +70,7 @@ def test_play_between_both_angles_is_no_noise(mode: FaultMode, *, stays: bool) -
     first, second = truth + rng.normal(0.0, 1e-3, SIZE), truth + rng.normal(0.0, 1e-3, SIZE)
     first[1000:1150] -= 0.01
     found = {Side.SENSOR: noisy(mode), Side.ACTUATOR: NOTHING}
-    assert bool(without_agreed(found, inputs(second, first, valve=True))[Side.SENSOR].findings) is stays
+    out = without_agreed(found, inputs(second, first, valve=True))[Side.SENSOR]
+    assert bool(out.findings) is stays
+    assert out.refuted == ()
+    assert bool(out.unexplained) is not stays

@@ -26,9 +26,9 @@ from diagnosis.audit.fleet.page.figures import blind, hours, kpis, of_folders
 from diagnosis.audit.fleet.page.matrix import matrix
 from diagnosis.audit.fleet.page.shown import Context, ShownDocument, fault_address, shown
 from diagnosis.audit.fleet.page.svg import LEGEND, mark, sparkline, sprite
-from diagnosis.audit.fleet.page.trends import MOST, chosen, course, dead_words, interest, level_words
+from diagnosis.audit.fleet.page.trends import MOST, chosen, course, dead_words, interest, is_lost, level_words
 from diagnosis.audit.fleet.trend_types import TrendRow
-from diagnosis.audit.fleet.words import count, missions_words, open_words, repair_command
+from diagnosis.audit.fleet.words import count, missions_words, open_words, repair_command, share
 from diagnosis.pages import labels
 from diagnosis.pages.environment import DARK, SHARED, asset, environment, shared_style
 from diagnosis.pages.mode_style import mode_rules
@@ -229,7 +229,8 @@ def _machine(
     trends: Sequence[TrendRow],
     leave: Leave,
 ) -> Context:
-    leading = max((t for t in trends if t["line"] is not None), key=interest, default=None)
+    leading = max((t for t in trends if t["line"] is not None and is_lost(t)), key=interest, default=None)
+    told = any(t["line"] is not None for t in trends)
     line = leading["line"] if leading else None
     judged = len(m["missions"]) + len(m["undated"])
     near = any(t["approaching"] for t in trends)
@@ -257,7 +258,13 @@ def _machine(
         "trend_words": f"{words_of(m).part_words(leading['kind'], leading['component'], leading['side'])}: {level_words(leading)}{f', {dead}' if (dead := dead_words(leading, standing)) else ''}"
         if leading and line
         else "",
-        "no_trend": "" if leading else "fewer than five missions with an estimate" if trends else "no estimate of ε̂",
+        "no_trend": ""
+        if leading
+        else "no loss of any part over its last mission"
+        if told
+        else "fewer than five missions with an estimate"
+        if trends
+        else "no estimate of ε̂",
         "level": leading["points"][-1][2] if leading and line else -1.0,
         "driven": hours(m["driving_s"]),
         "driving_s": m["driving_s"],
@@ -283,9 +290,12 @@ def _fault(f: FleetFaultRow, document: ShownDocument, directions: Mapping[tuple[
     e, found = f["epsilon"], _each(f, document)
     notes = []
     if e and f["mode"] in SCALED and not f.get("unclear"):
-        before = [f"{each['value']:.2f}" for m in found[-_COURSE:-1] if (each := m["epsilon"]) is not None]
-        sizes = " → ".join([*before, f"{e['value']:.2f} ({e['low']:.2f} to {e['high']:.2f})"]).replace("-", "−")
-        notes.append(f"ε̂ {sizes} in the fault{', mission by mission' if before else ''}")
+        before = [
+            share(each["value"]).removesuffix(" %") for m in found[-_COURSE:-1] if (each := m["epsilon"]) is not None
+        ]
+        bounds = f"{share(e['low']).removesuffix(' %')} to {share(e['high'])}"
+        sizes = " → ".join([*before, f"{share(e['value'])} ({bounds})"])
+        notes.append(f"{sizes} lost in the fault{', mission by mission' if before else ''}")
         direction = directions.get((f["machine"], f["component"], f["side"]), "not_known")
         notes += [direction] if direction != "not_known" else []
     if found and "lasting" in found[-1]:

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from scipy.special import stdtrit
 
 from diagnosis.audit.fleet.trend_types import ChangePointRow, ForecastRow, LineRow, TrendRow
+from diagnosis.audit.fleet.words import share
 from diagnosis.pages.axes import Frame, label
-from diagnosis.pages.labels import number
 from diagnosis.pages.svg import icon
 from replay.faults import FaultMode, State
 
@@ -85,12 +85,14 @@ def trend_picture(trend: TrendRow, title: str, unit: str) -> Markup:
     values = points[:, 1]
     high = max(limit, float(values.max()), min(1.0, float(np.percentile(points[:, 3], 90))))
     low = min(0.0, float(values.min()))
+    if trend["line"] is not None and f["state"] != "not_known":  # with the line as far as it goes by now, not ahead
+        high = max(high, min(1.0, trend["line"]["level"]["high"]))
     frame = Frame(_WIDTH, _HEIGHT, (0.0, end), (low - 0.04 * (high - low), high + 0.1 * (high - low)), margin=10.0)
-    parts = [frame.axes(unit)]
+    parts = [frame.axes(unit, percent=True)]
     y = float(frame.py(limit))
     parts.append(Markup('<path class="lim" d="M{:.1f} {:.1f}H{:.1f}"/>').format(frame.left, y, frame.right))
     below = float(values[0]) > limit and y < frame.bottom - 14  # beside the line where no mission stands
-    parts.append(label(frame.left + 4, y + 12 if below else y - 4, f"limit {number(limit)}", "lbl"))
+    parts.append(label(frame.left + 4, y + 12 if below else y - 4, f"limit {share(limit)}", "lbl"))
     if now < end * 0.995:
         parts.append(frame.line(now, "now"))
     parts += [_change(frame, points, c) for c in trend["changes"]]

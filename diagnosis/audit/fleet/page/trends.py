@@ -10,13 +10,14 @@ from diagnosis.audit.fleet.page.shown import Context
 from diagnosis.audit.fleet.page.svg import physical, trend_picture
 from diagnosis.audit.fleet.runs import sides_of
 from diagnosis.audit.fleet.trend_types import TrendRow
-from diagnosis.audit.fleet.words import count, round_to
+from diagnosis.audit.fleet.words import count, round_to, share
 from diagnosis.decision.wording import join_words
 from diagnosis.results.fault_rows import state_label
 from diagnosis.results.machine_words import words_of
 from replay.faults import TOTAL
 
 MOST = 48
+_LEAST = 0.005  # of a loss over a mission
 
 
 def interest(t: TrendRow) -> tuple[bool, float, float]:
@@ -29,11 +30,21 @@ def interest(t: TrendRow) -> tuple[bool, float, float]:
 
 def level_words(t: TrendRow) -> str:
     """Loss of the last mission, as its report has it, and where the losses go."""
-    last = round(t["points"][-1][2], 2) + 0.0  # no negative zero
+    last = t["points"][-1][2]
     far = " far below its limit" if t["direction"] == "rising" and t["forecast"]["state"] == "not_within" else ""
-    return f"ε̂ {last:.2f} over its whole last mission".replace("-", "−") + (
+    return f"{share(last)} over its whole last mission" + (
         f", {t['direction']}{far}" if t["direction"] != "not_known" else ""
     )
+
+
+def _tenths(value: float) -> str:
+    """Per cent with a tenth, without a negative zero."""
+    return f"{round(100 * value, 1) + 0.0:.1f}"
+
+
+def is_lost(t: TrendRow) -> bool:
+    """Whether there is a loss to watch: one that is half a per cent, or whose limit comes near."""
+    return t["approaching"] or t["forecast"]["state"] == "above" or t["points"][-1][2] >= _LEAST
 
 
 def _between(t: TrendRow) -> float:
@@ -78,12 +89,15 @@ def course(t: TrendRow, machines: Sequence[MachineRow], unit: str, standing: Seq
     notes = []
     if line is not None and t["forecast"]["state"] != "not_known":
         between = _between(t)
-        low, high = (f"{between * v:+.3f}".replace("-", "−") for v in (line["slope"]["low"], line["slope"]["high"]))
+        low, high = (
+            f"{round(100 * between * v, 1) + 0.0:+.1f}".replace("-", "−")
+            for v in (line["slope"]["low"], line["slope"]["high"])
+        )
         least, most = physical(t)
         level = {k: min(max(line["level"][k], least), most) for k in ("value", "low", "high")}
         notes.append(
-            f"over its whole last mission, fast driving counting more, ε̂ was {t['points'][-1][2]:.3f}; the line through all missions is at {level['value']:.3f} now "
-            f"({level['low']:.3f} to {level['high']:.3f}) and changes by {low} to {high} per mission "
+            f"over its whole last mission, fast driving counting more, {_tenths(t['points'][-1][2])} % was lost; the line through all missions is "
+            f"at {_tenths(level['value'])} % now ({_tenths(level['low'])} to {_tenths(level['high'])} %) and changes by {low} to {high} points per mission "
             f"({round_to(between)} {unit} apart), 95 %".replace("-", "−")
         )
     notes += [
@@ -97,9 +111,7 @@ def course(t: TrendRow, machines: Sequence[MachineRow], unit: str, standing: Seq
     words, beyond = t["forecast"]["words"], t["points"][-1][2] >= t["limit"]
     if beyond and t["forecast"]["state"] == "not_known":
         notes.insert(0, f"how it goes on is {words}")
-        words = (
-            f"above the limit of {round_to(t['limit'])}: ε̂ {t['points'][-1][2]:.2f} over the whole of its last mission"
-        )
+        words = f"above the limit of {share(t['limit'])}: {share(t['points'][-1][2])} lost over the whole of its last mission"
     if t.get("halving") and t["forecast"]["state"] == "not_known":
         notes.insert(
             0, "if it goes on growing as in the last three, half may be lost before two more missions are over"

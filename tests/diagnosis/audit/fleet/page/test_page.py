@@ -138,11 +138,14 @@ def test_a_rise_far_below_its_limit_is_told_as_such_and_the_line_beside_the_last
         )
 
     low = page("low", [0.000, 0.001, 0.002, 0.003, 0.004, 0.006], 0.0005)
-    assert "0.01 over its whole last mission, rising far below its limit" in low
+    assert "0.6\u00a0% over its whole last mission, rising far below its limit" in low
     assert "no step, and no limit that comes near" in low
+    none = page("none", [0.002, 0.001, 0.002, 0.001, 0.002, 0.001], 0.0005)
+    assert "no loss of any part over its last mission" in none
+    assert "over its whole last mission" not in none.partition("Recurring and new faults")[0]
     high = page("high", [0.1, 0.2, 0.3, 0.35, 0.4, 0.45], 0.02)
     assert re.search(
-        r"Over its whole last mission, fast driving counting more, ε̂ was 0\.450; the line through all missions is at 0\.\d{3} now",
+        r"Over its whole last mission, fast driving counting more, 45\.0\u00a0% was lost; the line through all missions is at \d\d\.\d\u00a0% now",
         high,
     )
 
@@ -172,7 +175,7 @@ def test_a_course_names_the_losses_mission_by_mission_and_whether_the_fault_last
     missions = [Sample("a")] + [Sample(f"b{k}", day=k + 1.0, verdict="watch", faults=[f]) for k, f in enumerate(lost)]
     document = fleet_json(load_fleet(samples.write_store(tmp_path / "fleet.sqlite", missions)))
     page = build_fleet_page(document)
-    assert "ε̂ 0.50 → 0.65 (0.64 to 0.66) in the fault, mission by mission" in page
+    assert "50 → 65\u00a0% (64 to 66\u00a0%) lost in the fault, mission by mission" in page
     assert "last seen before its log ended" in page
     for fault in document["missions"][-1]["faults"]:
         fault["lasting"] = True
