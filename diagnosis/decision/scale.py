@@ -242,7 +242,8 @@ def _turning(cells: Cells, speeds: Array, by: float, agreeing: tuple[str, ...]) 
     if geometry is None or not np.isfinite(yaw).any():
         return
     v, usual = _median(speeds)
-    rest = (np.abs(v) < _STILL * usual) & np.isfinite(yaw)
+    still = np.nanmax(np.abs(np.where(np.isfinite(speeds), speeds, 0.0)), axis=1) < _STILL * usual
+    rest = still & np.isfinite(v) & np.isfinite(yaw)  # a machine that turns on the spot has no speed, and does not rest
     yaw = yaw - (float(np.median(yaw[rest])) if np.count_nonzero(rest) * cells.dt >= _STILL_S else 0.0)
     found = _by_sides(cells, geometry, speeds) or _by_angles(cells, geometry, v)
     if found is None:
