@@ -242,8 +242,6 @@ def _turning(cells: Cells, speeds: Array, by: float, agreeing: tuple[str, ...]) 
     if geometry is None or not np.isfinite(yaw).any():
         return
     v, usual = _median(speeds)
-    rest = (np.abs(v) < _STILL * usual) & np.isfinite(yaw)
-    yaw = yaw - (float(np.median(yaw[rest])) if np.count_nonzero(rest) * cells.dt >= _STILL_S else 0.0)
     found = _by_sides(cells, geometry, speeds) or _by_angles(cells, geometry, v)
     if found is None:
         return
@@ -251,6 +249,9 @@ def _turning(cells: Cells, speeds: Array, by: float, agreeing: tuple[str, ...]) 
     known = np.abs(expected[np.isfinite(expected)])
     if not known.size:
         return
+    on_the_spot = np.abs(np.nan_to_num(expected)) > _STILL * float(np.quantile(known, _USUAL))
+    rest = (np.abs(v) < _STILL * usual) & ~on_the_spot & np.isfinite(yaw)
+    yaw = yaw - (float(np.median(yaw[rest])) if np.count_nonzero(rest) * cells.dt >= _STILL_S else 0.0)
     turning = (np.abs(expected) > _MOVES * float(np.quantile(known, _USUAL))) & (expected * yaw > 0.0)
     factor = factor_of(np.abs(yaw), np.abs(expected), turning, cells.dt)
     if factor is not None:

@@ -66,7 +66,7 @@ from diagnosis.response.sides import sides_of
 from diagnosis.response.sideways import crossed, goes_sideways
 from diagnosis.response.spells import until_back, where_asked
 from diagnosis.response.states import judge
-from diagnosis.response.turning import turning_of, turns_other_way, turns_with, unasked_turn, wrong_yaw_rate
+from diagnosis.response.turning import track_of, turning_of, turns_other_way, turns_with, unasked_turn, wrong_yaw_rate
 from diagnosis.response.unlike import contradicting, unlike_in_motion
 from diagnosis.response.uphill import lower_by_a_load
 from diagnosis.response.usual_times import as_usual, shares_by_commands, shares_by_positions
@@ -301,7 +301,8 @@ def assess_response(
         parts[w] = replace(sensor, powers=powers, notes=(*sensor.notes, lateness, *signless, *remarks)), drive
     unsettled = {w: [*kept[w], *(s for s in slips[w] if not wrong_yaw_rate(s, j))] for w, j in judged.items()}
     sought = scaled_sides(judged, unsettled, turning, width * dt)
-    gyro = wrong_gyro(judged, unsettled, turning, width * dt, heading, [(x.start, x.stop) for x in sought.found])
+    aside, across = [(x.start, x.stop) for x in sought.found], None if other_way else track_of(judged, geometry)
+    gyro = wrong_gyro(judged, unsettled, turning, width * dt, heading, aside, across)
     open_to = [slice(x.start * width, x.stop * width) for x in gyro if not x.sure]
     parts = {
         w: (by_the_gyro(w, sensor, judged, sought, turning, open_to), drive) for w, (sensor, drive) in parts.items()

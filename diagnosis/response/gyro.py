@@ -13,10 +13,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from diagnosis.response.gyro_turns import against_the_wheels, usual_turns
 from diagnosis.response.heading import agree
 from diagnosis.response.machine import Judged
 from diagnosis.response.spells import Spell
-from diagnosis.response.turning import Turning, difference, fitted
+from diagnosis.response.turning import Turning, difference
 from diagnosis.results.machine_event import GYRO_CONSTANT, GYRO_REST, GYRO_SLIP
 from diagnosis.results.sizes import turn
 
@@ -69,6 +70,7 @@ def wrong_gyro(
     block_s: float,
     heading: Array | None = None,
     aside: Sequence[tuple[int, int]] = (),
+    across: float | None = None,
 ) -> tuple[Contradicted, ...]:
     """Times in which the gyro alone contradicts the wheels, and nothing else turns as it says.
 
@@ -86,6 +88,8 @@ def wrong_gyro(
         Yaw rate by the heading of odometry [rad/s]: where that has what the gyro shows, and the wheels have not, these slip.
     aside : Sequence[tuple[int, int]]
         Blocks [start, stop) that something else explains.
+    across : float or None
+        Between the sides [m], where the way in which they turn the machine is known; None else.
     """
     if turning is None or not all(j.response.answered for j in judged.values()):
         return ()
@@ -99,7 +103,7 @@ def wrong_gyro(
             sound[max(0, s.start - _AROUND) : s.stop + _AROUND] = False
     for start, stop in aside:
         sound[start:stop] = False
-    found = fitted(apart, turning.yaw, sound, _SOUND)
+    found = usual_turns(apart, turning.yaw, sound, _SOUND)
     if found is None:
         speed = np.max([np.abs(j.wheel.blocks.mean) for j in judged.values()], axis=0)[sound]
         texts = _never(apart, turning.yaw, sound, block_s) if _turns(apart[sound], speed) else ()
@@ -121,7 +125,8 @@ def wrong_gyro(
     for start, stop in _spans(off & straight, straight):
         if not any(start < last and first < stop for (first, last), what in found_in.items() if what):
             found_in[start, stop] = _constant(about, slice(start, stop), (straight, sound, stands), block_s)
-    out = []
+    against = against_the_wheels(gain, noise, apart[sound], turning, across)
+    out = [Contradicted(against, 0, apart.size, sure=True)] if against else []
     for (start, stop), what in sorted(found_in.items()):
         if heading is not None and agree(turning.yaw - offset, heading, about.made, slice(start, stop)):
             continue

@@ -81,6 +81,15 @@ def _unsteered(judged: Mapping[str, Judged], geometry: Geometry | None) -> dict[
     return _sides(fixed, geometry) if len(fixed) == _PAIR else None
 
 
+def track_of(judged: Mapping[str, Judged], geometry: Geometry | None) -> float | None:
+    """Between the middle of the right wheels and that of the left ones [m]; None where a wheel is steered, or a side has none."""
+    sides = _sides(judged, geometry)
+    if sides is None or geometry is None:
+        return None
+    right, left = (float(np.mean([geometry.wheels[w].y for w, s in sides.items() if s == one])) for one in (1.0, -1.0))
+    return left - right
+
+
 def unasked_turn(
     wheel: str, spell: Spell, judged: Mapping[str, Judged], geometry: Geometry | None, yaw: Array | None
 ) -> bool:

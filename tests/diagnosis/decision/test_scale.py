@@ -10,10 +10,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from diagnosis.decision.scale import Scale, Scaled, scale_of
+from diagnosis.decision.scale import Scale, Scaled, _turning, scale_of
 from diagnosis.decision.turn_scale import ANGLE, GYRO, Meant, meant
 from replay.faults import FaultMode, FaultSpec, Side
 from replay.machine.config import haulotte
+from replay.machine.geometry import Geometry, WheelGeometry
 from replay.simulation.options import SimulatedMission
 from tests.diagnosis.clearing.missions import LENGTH, in_cells, simulated
 
@@ -125,3 +126,18 @@ def test_the_wheels_of_the_unsteered_axle_tell_gyro_from_angle(part: str, turns:
     cells: Any = SimpleNamespace(means=lambda k: means.get(k, np.full(n, np.nan)), machine=machine, dt=0.1)
     told = meant(cells, v, expected, np.abs(expected) > 0.2, 0.6, ())
     assert told == Meant(("the commanded speed",), part, "the difference of RR and RL")
+
+
+@pytest.mark.parametrize("gain", [1.0, 0.7])
+def test_turns_on_the_spot_are_no_rests_of_the_gyro(gain: float) -> None:
+    rng, dt = np.random.default_rng(3), 0.1
+    v = np.repeat(rng.choice([0.0, 0.3, 0.5], 40), 20)
+    turn = np.where(v == 0.0, 0.6, np.repeat(rng.choice([0.0, 0.5, -0.5], 40), 20))
+    noise = rng.normal(0.0, 0.002, (2, v.size))
+    speeds = {"wheel.R.v": v + 0.17 * turn + noise[0], "wheel.L.v": v - 0.17 * turn + noise[1]}
+    columns = {**speeds, "imu.yaw_rate": gain * turn, "cmd.v": v, "cmd.omega": turn}
+    places = {w: WheelGeometry(0.0, y, 0.0, "fixed") for w, y in (("R", -0.17), ("L", 0.17))}
+    machine = SimpleNamespace(geometry=Geometry(places, 0.1), wheels=("R", "L"), axles=())
+    cells: Any = SimpleNamespace(machine=machine, means=columns.__getitem__, dt=dt, size=v.size)
+    (found,) = _turning(cells, np.column_stack(list(speeds.values())), 1.0, ())
+    assert found.factor == pytest.approx(gain, rel=0.02)

@@ -7,7 +7,7 @@ import pytest
 
 from diagnosis.response.assess import Judgement, assess_response
 from replay.machine.config import Limits
-from tests.diagnosis.response.robot import DT, TRACK, Array, followers_of, geometry, speeds
+from tests.diagnosis.response.robot import DT, TRACK, Array, followers_of, geometry, robot_of, speeds
 
 FAULTY = slice(1000, 1600)
 
@@ -71,3 +71,25 @@ def test_a_sound_gyro_is_not_told_whatever_a_wheel_does() -> None:
     assert judged(yaw_of(measured, 1)).gyro == ()
     assert judged(yaw_of(measured, 1), wheel="FL").gyro == ()
     assert judged(None).gyro == ()
+
+
+def test_a_gyro_of_the_other_sign_is_told_and_one_of_a_skid_steered_machine_is_not() -> None:
+    measured, _, _ = speeds(3)
+    found = judged(-yaw_of(measured, 1))
+    assert "turns against the" in found.gyro[0]
+    assert "−0.71 ×" in found.gyro[0]
+    assert not any(a.findings for sides in found.parts.values() for a in sides)
+    assert judged(yaw_of(measured, 1)).gyro == ()
+
+
+def test_a_gyro_that_is_frozen_in_the_longest_turn_of_a_mission_of_few_is_told() -> None:
+    rng, n = np.random.default_rng(5), 1800
+    turn = np.zeros(n)
+    for start, stop, rate in ((300, 360, -0.4), (360, 500, 0.5), (500, 560, 0.5), (900, 960, -0.8), (1300, 1440, 0.6)):
+        turn[start:stop] = rate
+    measured, asked, body = robot_of(np.full(n, 0.6), turn, 5)
+    yaw = yaw_of(measured, 1)
+    yaw[300:500] = 0.003 + rng.normal(0.0, 1e-4, 200)
+    found = assess_response(followers_of(measured, asked, body), geometry(), yaw, Limits(), DT).gyro
+    assert any("gives next to nothing" in text or "stays at" in text for text in found), found
+    assert float(found[0].split()[1]) == pytest.approx(300 * DT, abs=2.0)
