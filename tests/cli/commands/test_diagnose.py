@@ -149,11 +149,7 @@ def test_the_verdict_is_printed(calls: dict[str, Any], capsys: pytest.CaptureFix
 def test_many_faults_are_cut_with_a_word_about_it(calls: dict[str, Any], capsys: pytest.CaptureFixture[str]) -> None:
     many = result(*["medium"] * 55)
     for k, fault in enumerate(many.report["intervals"]):
-<<<<<<< HEAD
-        fault["component"] = f"wheel {k // 2}"
-=======
         fault["component"] = f"wheel {k // 2}"  # two of a part may be two faults
->>>>>>> w-h17
     calls["result"] = many
     run(["diagnose", "drive.mcap"])
     assert "… and 15 more in the report" in capsys.readouterr().out
