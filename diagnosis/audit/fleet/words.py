@@ -69,7 +69,7 @@ def repair_command(label: str, component: str, side: str) -> str:
 
 
 def share(value: float) -> str:
-    """A loss or its limit as everywhere on the page, in per cent: ``34 %``, ``0.6 %``."""
+    """A loss or its limit [1] as everywhere on the page, in per cent: ``34 %``, ``0.6 %``."""
     return (
         f"{100 * value:.0f} %".replace("-", "−")
         if abs(value) >= 0.095
