@@ -192,7 +192,8 @@ def _walk(
     )
     found = found if doubt is None else _without_valves(found, doubt)
     found = found if scale is None else _with_scale(found, scale)
-    _require_something(found.assessments, mission, machine)
+    if not found.events:  # a machine that does not follow its commands has a report, though no part is judged
+        _require_something(found.assessments, mission, machine)
     publish(Progress(Stage.DECIDING))
     judged = _without_contradicted(
         _without_backwards(

@@ -121,6 +121,22 @@ def base_by_yaw(found: Signals, base: float) -> Measured | None:
     return Measured(gain, "the yaw rate beside commanded speed and steering angle") if gain is not None else None
 
 
+def base_by_angle(found: Signals, axle: str) -> Measured | None:
+    """Distance from unsteered to steered wheels by the commanded speed, an axle's angle and the yaw rate; None where nothing measures it, or the angle is positive to the right."""
+    leaf = next((x for x in ("phi", "phi_ref") if f"steer.{axle}.{x}" in found.items), "phi")
+    signals = [found.items.get(n) for n in ("imu.yaw_rate", "cmd.v", f"steer.{axle}.{leaf}")]
+    if any(s is None for s in signals):
+        return None
+    yaw, speed, angle = (s for s in signals if s is not None)
+    at = moments([yaw, speed, angle])
+    gain = gain_of(held(yaw, at), held(speed, at) * np.tan(held(angle, at)))
+    return (
+        Measured(gain, "the yaw rate beside commanded speed and steering angle")
+        if gain is not None and gain > 0.0
+        else None
+    )
+
+
 def is_rotation(origin: SignalSource) -> bool:
     """Whether a channel has a unit of turns, rather than of the rim's speed."""
     unit = known_unit(origin.unit)

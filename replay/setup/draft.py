@@ -33,12 +33,14 @@ from replay.setup.structure import (
     Structure,
     described_structure,
     named_structure,
+    one_motor,
     preset_structure,
     steering_names,
 )
 from replay.setup.unstated_units import usual_units, valve_currents
 from replay.setup.unsure_signals import unsure_signals
 from replay.setup.unused_steering import ask_about_steering
+from replay.setup.vesc import ask_about_motor
 from replay.signals.file_names import named_channels
 from replay.signals.like_wheels import like_wheels
 from replay.signals.mapping import by_number, map_signals
@@ -109,6 +111,7 @@ def draft_machine(logs: Sequence[RawLog], preset: Preset | None = None) -> Draft
         return _haulotte_draft(draft, logs)
     empty = unfilled(channels)
     given = given_signals(structure, {n: c for n, c in channels.items() if n not in empty}, logs)
+    ask_about_motor(structure, given, draft)
     ask_about_odometry(structure, channels, draft)
     ask_about_steering(structure, steering_names(channels), draft)
     for array in dict.fromkeys(empty.values()):
@@ -207,7 +210,8 @@ def _structure(
     joints = [m[1] for c in channels.values() if (m := re.search(r"\[([^\[\]]+)\]$", c.field)) and c.topic]
     described = None if description is None else described_structure(description, joints)
     if preset is not None:
-        fixed = preset_structure(preset)
+        motor = one_motor(channels) if preset is Preset.ACKERMANN and named_structure(channels) is None else None
+        fixed = motor or preset_structure(preset)
         return described if described is not None and described.wheels == fixed.wheels else fixed
     if described is not None:
         return described

@@ -15,6 +15,7 @@ from replay.setup.draft_notes import Draft
 from replay.setup.odometry_frame import along_the_ground
 from replay.setup.one_clock import Lag
 from replay.setup.structure import ONE, Structure
+from replay.setup.vesc import motor_signals
 from replay.signals.candidate import message_field, source_of
 
 _DATED = 10**18  # ns; stamps before are of a clock without a date
@@ -65,6 +66,7 @@ def given_signals(
                 given.setdefault(f"wheel.{wheel}.{leaf}", replace(where, unit="rad", derivative=True))
             elif c.field == f"position[{joint.steering}]" and joint.steering:
                 given.setdefault(f"steer.{own_axle(wheel)}.phi", replace(where, unit="rad"))
+    given |= motor_signals(structure, channels)
     whole = odometry(channels)
     if structure.wheels == ONE and "odometry" in structure.how and whole is not None:
         given["wheel.D.v"] = source_of(whole, "m/s")

@@ -13,11 +13,11 @@ from replay.machine.config import Limits, Machine, haulotte
 from replay.machine.geometry import Geometry, WheelGeometry
 from replay.machine.quantities import UNITS
 from replay.machine.units import known_unit
-from replay.setup.by_the_body import Measured, base_by_yaw, is_rotation, track_by_yaw
+from replay.setup.by_the_body import Measured, base_by_angle, base_by_yaw, is_rotation, track_by_yaw
 from replay.setup.by_the_steering import Lengths, lengths_by_yaw
 from replay.setup.draft_notes import Draft
 from replay.setup.motion import WheelMotion
-from replay.setup.structure import ONE, Structure
+from replay.setup.structure import MOTOR, ONE, Structure
 from replay.setup.unit_of_speeds import DIFFERS, WHEEL_SIZES, agreed, by_their_mean, turns_commanded, unit_of_speeds
 from replay.signals.mapping import map_signals
 from replay.signals.name_words import english, tokens
@@ -137,13 +137,18 @@ def wheel_places(
     places = structure.places
     if places is None:
         return None if structure.wheels == ONE else _sides(draft, structure.wheels, motions)
-    if structure.wheels == ONE:
-        (place,) = places.values()
+    if structure.wheels in (ONE, MOTOR):
+        ((name, place),) = places.items()
+        turned = None if measured is None or structure.wheels == ONE else base_by_angle(measured[0], place.axle)
+        if turned is not None and _TRACKS[0] <= turned.length <= _BASES:
+            length = float(_round(turned.length))
+            draft.ask("geometry", f"are front and rear wheels {length:g} m apart? By {turned.by}. Measure it.")
+            return {name: replace(place, x=math.copysign(length, place.x))}
         where = f"{'before' if place.x > 0 else 'behind'} the unsteered wheels"
         draft.ask(
             "geometry",
             f"how far {where} is the {place.axle} axle, which is steered? Nothing tells it; {abs(place.x):g} m stand in, as x of "
-            f"{ONE[0]}, which stands at that axle.",
+            f"{name}, which stands at that axle.",
         )
         return places
     steered = Lengths(None, None) if measured is None else lengths_by_yaw(measured[0], places, *measured[1:])

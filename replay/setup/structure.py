@@ -19,7 +19,7 @@ from replay.signals.unsure_names import unsure
 
 FOUR, SIX = ("FR", "FL", "RR", "RL"), ("FR", "FL", "MR", "ML", "RR", "RL")
 GERMAN, FRENCH = ("VR", "VL", "HR", "HL"), ("AVD", "AVG", "ARD", "ARG")
-TWO, ONE = ("R", "L"), ("D",)
+TWO, ONE, MOTOR = ("R", "L"), ("D",), ("M",)
 _LANGUAGES = (
     (GERMAN, {"vl", "vr", "hl", "hr", "vorne", "vorn", "hinten", "vorder", "hinter", "va", "ha"}),
     (FRENCH, {"avg", "avd", "arg", "ard", "avant", "arriere", "gauche", "droite"}),
@@ -168,6 +168,26 @@ def _at_the_steering(channels: Mapping[str, Channel]) -> Mapping[str, WheelGeome
         return None
     axle = "rear" if ends == {"rear"} else "front"
     return {ONE[0]: WheelGeometry(-_BASE if axle == "rear" else _BASE, 0.0, 0.0, axle)}
+
+
+def motor_state(channels: Mapping[str, Channel]) -> Channel | None:
+    """Speed of the only motor that a controller of the kind VESC tells (electrical rotations a minute); None without one, or of several."""
+    found = [
+        c
+        for c in channels.values()
+        if c.type_name.rpartition("/")[2].startswith("VescState")
+        and c.field.rpartition(".")[2] == "speed"
+        and len(c.values) > 1
+    ]
+    return found[0] if len(found) == 1 else None
+
+
+def one_motor(channels: Mapping[str, Channel]) -> Structure | None:
+    """A car with one motor of which a VESC tells the speed, at the steered axle, which needs a wheel; None of another machine."""
+    places = _at_the_steering(channels)
+    if motor_state(channels) is None or places is None:
+        return None
+    return Structure(MOTOR, {MOTOR[0]: places[ONE[0]]}, how="the only motor in the log")
 
 
 def _unsure_structure(channels: Mapping[str, Channel]) -> Structure | None:
