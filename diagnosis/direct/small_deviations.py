@@ -100,8 +100,13 @@ def _off(finding: Finding, one: IdentifiedPair) -> tuple[float | None, float]:
 
 
 def _small(finding: Finding, one: IdentifiedPair, usual: float, meanwhile: float) -> bool:
-    """Whether a position is off by little beside what is usual, or meanwhile of others [unit], and by a small share of its command."""
+    """Whether a position is off by little beside what is usual, or meanwhile of others [unit], and by a small share of its command.
+
+    Off by a constant, it is no share: what others are off by at the same time is the measure.
+    """
     off, asked = _off(finding, one)
     by_habit = min(_BEYOND * usual, _SHARE * asked, _SMALL * one.pair.span)
     as_others = min(_BEYOND_OTHERS * meanwhile, _SHARE_OTHERS * asked, _SMALL_OTHERS * one.pair.span)
+    if finding.mode is FaultMode.OUTSIDE_TABLE:
+        as_others = min(_BEYOND_OTHERS * meanwhile, _SMALL * one.pair.span)
     return off is not None and off < max(by_habit, as_others)

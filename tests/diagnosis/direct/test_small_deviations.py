@@ -84,3 +84,8 @@ def test_what_is_hardly_off_its_command_is_healthy(gain: float, state: State) ->
     after = told((gain, 1.0, 0.93, 0.96))
     assert after.findings == ()
     assert (after.states[slice(*SPAN)] == CODE[state]).all()
+
+
+@pytest.mark.parametrize(("gains", "stays"), [((0.9, 0.93, 0.92, 0.93), False), ((0.9, 1.0, 0.99, 1.0), True)])
+def test_a_constant_beside_others_that_are_off_as_well_is_left_open(gains: tuple[float, ...], stays: bool) -> None:
+    assert bool(told(gains, FaultMode.OUTSIDE_TABLE).findings) is stays
