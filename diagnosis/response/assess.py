@@ -17,7 +17,6 @@ from diagnosis.response.channel import holds_of, samples_of
 from diagnosis.response.common_cause import (
     consequence,
     less_sure,
-    spans_of,
     standing,
     stands_with_all,
     unwinds,
@@ -64,7 +63,7 @@ from diagnosis.response.runs_on import running_on
 from diagnosis.response.share_findings import told_share
 from diagnosis.response.sides import sides_of
 from diagnosis.response.sideways import crossed, goes_sideways
-from diagnosis.response.spells import until_back, where_asked
+from diagnosis.response.spells import spans_of, until_back, where_asked
 from diagnosis.response.states import judge
 from diagnosis.response.turning import track_of, turning_of, turns_other_way, turns_with, unasked_turn, wrong_yaw_rate
 from diagnosis.response.unlike import contradicting, unlike_in_motion

@@ -61,12 +61,6 @@ def standing(data: Mapping[str, FollowerData], driving_speed: float, dt: float) 
     return out
 
 
-def spans_of(there: Flags) -> list[tuple[int, int]]:
-    """Steps [start, stop) of each stretch in which something holds. `there` of shape (n,)."""
-    edge = np.flatnonzero(np.diff(np.r_[False, there, False].astype(np.int8)))
-    return list(zip(edge[::2].tolist(), edge[1::2].tolist(), strict=True))
-
-
 def consequence(spell: Spell, wheel: str, judged: Mapping[str, Judged]) -> bool:
     """Whether a deviation from command or peers may be what another wheel's evident fault does to the machine.
 

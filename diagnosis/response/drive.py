@@ -20,6 +20,7 @@ from diagnosis.response.inputs import cells
 from diagnosis.response.jumps import falls_dead
 from diagnosis.response.machine import Judged, unlike_others
 from diagnosis.response.models import Beside, Blocks
+from diagnosis.response.spells import spans_of
 from diagnosis.results.assessment import Finding
 from diagnosis.results.result import Epsilon, Hypothesis
 from diagnosis.results.vocabulary import Tier
@@ -159,7 +160,7 @@ def unanswered(
     reach = round(_NEAR_S / block_s)
     least = _MUCH_S[one.alone]
     found = []
-    for start, stop in _spans(there, round(_GAP_S / block_s)):
+    for start, stop in spans_of(there, round(_GAP_S / block_s)):
         astray = np.count_nonzero(all_off[max(0, start - reach) : stop + reach])
         if astray * block_s >= _ASTRAY_S and astray > _ASTRAY_SHARE * (stop - start):
             continue
@@ -182,11 +183,11 @@ def _habit(astray: Flags, off: Array, others: Sequence[Blocks], top: float) -> f
 
     `astray`, `off` of shape (b,): where the wheel in question is off its command, and how far [m/s]; `top` in m/s.
     """
-    own = [(a, b, float(np.sum(off[a:b]))) for a, b in _spans(astray, _GAP_BLOCKS)]
+    own = [(a, b, float(np.sum(off[a:b]))) for a, b in spans_of(astray, _GAP_BLOCKS)]
     least = 0.0
     for blocks in others:
         away = np.nan_to_num(_off(blocks))
-        spans = _spans(away > np.maximum(_FAR * blocks.noise, _OFF_OF_TOP * top), _GAP_BLOCKS)
+        spans = spans_of(away > np.maximum(_FAR * blocks.noise, _OFF_OF_TOP * top), _GAP_BLOCKS)
         missed = [(a, b, float(np.sum(away[a:b]))) for a, b in spans]
         alone = [m for a, b, m in missed if not any(c < b and a < d and much > m for c, d, much in own)]
         least = max([least, *sorted(alone)[-_TWICE:][:1]]) if len(alone) >= _TWICE else least
@@ -242,17 +243,6 @@ _AT_ONCE = (
     "It fell to 0 from one reading to the next, as a dead sensor's does and that of a drive without power does not, yet the body moves as if the "
     "reading were right: which of both fails is open."
 )
-
-
-def _spans(there: Flags, gap: int) -> list[tuple[int, int]]:
-    edge = np.flatnonzero(np.diff(np.r_[False, there, False].astype(np.int8)))
-    out: list[tuple[int, int]] = []
-    for a, b in zip(edge[::2].tolist(), edge[1::2].tolist(), strict=True):
-        if out and a - out[-1][1] <= gap:
-            out[-1] = out[-1][0], b
-        else:
-            out.append((a, b))
-    return out
 
 
 def _finding(

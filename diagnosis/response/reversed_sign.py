@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.response.machine import Judged
+from diagnosis.response.spells import spans_of
 from diagnosis.response.wheel import sensor_finding
 from diagnosis.results.assessment import CODE, Assessment, Finding
 from diagnosis.results.result import Epsilon
@@ -85,12 +86,11 @@ def _spans(one: Judged, block_s: float) -> list[tuple[int, int]]:
     other = moves & (np.abs(b.mean + asked) < near) & (np.abs(b.mean - asked) > np.abs(asked))
     if not other.any() or np.count_nonzero(other) > _MOST * np.count_nonzero(moves):
         return []
-    edge = np.flatnonzero(np.diff(np.r_[False, other, False].astype(np.int8)))
-    spans: list[tuple[int, int]] = []
-    for start, stop in zip(edge[::2].tolist(), edge[1::2].tolist(), strict=True):
-        joined = bool(spans) and start - spans[-1][1] <= _GAP_BLOCKS
-        spans[-1:] = [(spans[-1][0], stop)] if joined else [*spans[-1:], (start, stop)]
-    return [(a, c) for a, c in spans if (c - a) * block_s >= _LEAST_S and np.mean(other[a:c][moves[a:c]]) >= _MOSTLY]
+    return [
+        (a, c)
+        for a, c in spans_of(other, _GAP_BLOCKS)
+        if (c - a) * block_s >= _LEAST_S and np.mean(other[a:c][moves[a:c]]) >= _MOSTLY
+    ]
 
 
 def _finding(one: Judged, start: int, stop: int) -> Finding:

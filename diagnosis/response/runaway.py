@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.response.machine import Judged
+from diagnosis.response.spells import spans_of
 from diagnosis.results.assessment import Finding
 from diagnosis.results.result import Epsilon, Hypothesis
 from diagnosis.results.sentence import About, Sentence
@@ -66,13 +67,8 @@ def _spans(one: Judged, effort: Array, block_s: float) -> list[tuple[int, int]]:
     top = float(np.nanquantile(np.abs(b.mean), 0.99))
     off = b.mean - np.clip(b.mean, b.low, b.high)
     away = known & (np.abs(off) > np.maximum(_FAR * b.noise, _OFF * top)) & (way * effort * off > 0.0)
-    edge = np.flatnonzero(np.diff(np.r_[False, away, False].astype(np.int8)))
-    spans: list[tuple[int, int]] = []
-    for start, stop in zip(edge[::2].tolist(), edge[1::2].tolist(), strict=True):
-        near = bool(spans) and start - spans[-1][1] <= _GAP_BLOCKS
-        spans[-1:] = [(spans[-1][0], stop)] if near else [*spans[-1:], (start, stop)]
     out = []
-    for start, stop in spans:
+    for start, stop in spans_of(away, _GAP_BLOCKS):
         rest = known.copy()
         rest[start:stop] = False
         if (stop - start) * block_s < _LEAST_S or np.count_nonzero(rest) < _LEAST_BLOCKS:

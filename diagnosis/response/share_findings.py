@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.response.machine import Judged
+from diagnosis.response.spells import spans_of
 from diagnosis.response.wheel import sensor_finding
 from diagnosis.results.assessment import CODE, Assessment, Finding
 from diagnosis.results.result import Epsilon
@@ -39,8 +40,7 @@ def told_share(sides: tuple[Assessment, Assessment], one: Judged) -> tuple[Asses
     if share is None or rolled is None:
         return sides
     found = []
-    edge = np.flatnonzero(np.diff(np.r_[False, share != 1.0, False].astype(np.int8)))
-    for a, b in zip(edge[::2].tolist(), edge[1::2].tolist(), strict=True):
+    for a, b in spans_of(share != 1.0):
         told = np.zeros(share.size, np.bool_)
         for f in sensor.findings:
             told[f.start : f.stop] = True

@@ -34,6 +34,18 @@ class Spell(NamedTuple):
     turns: bool | None = None
 
 
+def spans_of(there: Flags, gap: int = 0) -> list[tuple[int, int]]:
+    """Steps [start, stop) of each stretch in which something holds, with interruptions of `gap` steps at most bridged; `there` of shape (n,)."""
+    edge = np.flatnonzero(np.diff(np.r_[False, there, False].astype(np.int8)))
+    out: list[tuple[int, int]] = []
+    for start, stop in zip(edge[::2].tolist(), edge[1::2].tolist(), strict=True):
+        if out and start - out[-1][1] <= gap:
+            out[-1] = out[-1][0], stop
+        else:
+            out.append((start, stop))
+    return out
+
+
 def spells_of(posterior: Array, block_s: float) -> list[Spell]:
     """Spells of faults along the most probable states; short interruptions of one mode are bridged.
 

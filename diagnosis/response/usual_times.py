@@ -120,5 +120,5 @@ def _shares(y: Array, x: Array) -> Array | None:
     odd = np.convolve(np.where(near, 1.0, -1.0), np.ones(_SMOOTH_BLOCKS), mode="same") > 0.0
     if np.count_nonzero(np.diff(odd.astype(np.int8))) > _FEW or np.mean(odd) < _LEAST_PART or odd.all():
         return None
-    nearest = np.abs(np.arange(y.size)[:, np.newaxis] - places).argmin(axis=1)
-    return np.where(odd[nearest], other, 1.0)
+    between = 0.5 * (places[1:] + places[:-1])  # from there on the later one is nearer
+    return np.where(odd[np.searchsorted(between, np.arange(y.size))], other, 1.0)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from diagnosis.response.assess import assess_response
 from diagnosis.response.inputs import FollowerData
-from diagnosis.response.usual_times import as_usual, shares_by_positions
+from diagnosis.response.usual_times import _shares, as_usual, shares_by_positions
 from replay.faults import FaultMode, Side
 from replay.machine.config import Limits
 from tests.diagnosis.response.robot import DT, followers_of, geometry, speeds
@@ -76,3 +76,11 @@ def test_readings_are_brought_back() -> None:
     mean = np.array([1.0, 0.8, np.nan])
     assert as_usual(mean, None, 2) is mean
     np.testing.assert_allclose(as_usual(mean, np.array([1.0, 1.0, 0.8, 0.8, 0.8]), 2), [1.0, 1.0, np.nan])
+
+
+def test_a_mission_of_a_day_takes_no_more_than_its_blocks() -> None:
+    speed = np.ones(350_000)
+    reading = np.where(np.arange(speed.size) < 200_000, 1.0, 0.7) * speed
+    share = _shares(reading, speed)
+    assert share is not None
+    assert np.count_nonzero(share == 1.0) == pytest.approx(200_000, abs=20)
