@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import logging
+import weakref
 from collections.abc import Callable, Iterator
-from concurrent.futures import BrokenExecutor, Executor, ThreadPoolExecutor
+from concurrent.futures import BrokenExecutor, Executor, Future, ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
 from importlib import import_module
@@ -93,7 +94,7 @@ def dask(address: str, wait_s: float = 20.0) -> Iterator[Engine]:
         raise ConfigError(f"--dask {address}: the scheduler does not answer ({error}); see `dask scheduler`") from error
     try:
         client.run_on_scheduler(_one_task_per_worker)
-        executor = client.get_executor(pure=False, retries=0)
+        executor = _Workers(client)
 
         def capacity() -> int:
             try:
@@ -107,9 +108,40 @@ def dask(address: str, wait_s: float = 20.0) -> Iterator[Engine]:
                 ) from error
             return max(sum(threads.values()), 1)
 
-        yield Engine("dask", executor, capacity, lambda: executor.shutdown(wait=False), shared=True)
+        yield Engine("dask", executor, capacity, executor.shutdown, shared=True)
     finally:
         client.close(timeout=10)
+
+
+class _Workers(Executor):
+    """Workers of a cluster, where every task ends in a result or an error, whatever becomes of its worker.
+
+    Dask's own executor leaves a task without an end for ever where its result is lost after it was told as finished.
+    """
+
+    def __init__(self, client: Any) -> None:
+        self._client = client
+        self._tasks: weakref.WeakSet[Any] = weakref.WeakSet()
+
+    def submit(self, call: Callable[..., Any], /, *args: Any, **named: Any) -> Future[Any]:
+        task = self._client.submit(call, *args, **named, pure=False, retries=0)
+        self._tasks.add(task)
+        told: Future[Any] = Future()
+        self._client.loop.add_callback(self._tell, task, told)
+        return told
+
+    @staticmethod
+    async def _tell(task: Any, told: Future[Any]) -> None:
+        try:
+            result = await task
+        except BaseException as error:
+            told.set_exception(error)
+        else:
+            told.set_result(result)
+
+    def shutdown(self, wait: bool = False, *, cancel_futures: bool = True) -> None:
+        """Cancel what has not ended."""
+        self._client.cancel(list(self._tasks))
 
 
 def _one_task_per_worker(dask_scheduler: Any) -> None:

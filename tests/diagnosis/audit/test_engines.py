@@ -101,6 +101,32 @@ def test_workers_that_are_killed_cost_no_mission(cluster: Any, tmp_path: Path) -
 
 
 @pytest.mark.filterwarnings("ignore")
+def test_a_result_that_is_lost_after_its_task_was_done_is_a_lost_worker(
+    cluster: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Whoever holds the result is killed before it was fetched, and so is who computes it again."""
+    distributed = pytest.importorskip("distributed")
+
+    async def gather(*_: object, **__: object) -> None:
+        raise distributed.KilledWorker("audit_one", None, 0)
+
+    with engines.dask(cluster.scheduler_address) as engine:
+        monkeypatch.setattr(distributed.Client, "_gather", gather)
+        error = engine.executor.submit(abs, -1).exception(timeout=20)
+    assert error is not None
+    assert engines.is_lost(error)
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_a_cluster_that_is_stopped_ends_what_runs(cluster: Any) -> None:
+    with engines.dask(cluster.scheduler_address) as engine:
+        waiting = [engine.executor.submit(time.sleep, 5.0) for _ in range(9)]
+        engine.stop()
+        errors = [one.exception(timeout=20) for one in waiting]
+    assert all(error is not None and engines.is_lost(error) for error in errors)
+
+
+@pytest.mark.filterwarnings("ignore")
 def test_a_scheduler_that_is_not_there_is_one_sentence() -> None:
     pytest.importorskip("distributed")
     with (
