@@ -27,7 +27,7 @@ KEPT = Path(__file__).with_suffix(".json")
 _HEAD = """# All benchmarks, short
 
 Written by `python tests/benchmarks/all_figures.py`: each script with few missions, repeats or seconds, so that a change shows. The
-figures to go by are in [How good it is](how-good.md), with the commands that make them in full.
+figures to go by are in [How good it is](how-good.md), with the commands that make them in full. A dash: this form was not run.
 
 A **unit** is the CPU time of a Python loop of ten million additions, taken before and after each script on the same machine, so that
 machines can be compared; the time of all its processes is counted. Wall times in the output were taken on a machine that did other
@@ -127,17 +127,18 @@ def _used() -> float:
 
 
 def page(kept: dict[str, dict[str, Any]]) -> str:
-    """The page of what is known; scripts that were not run yet are named at the end."""
+    """The page of what is known; scripts that were not run have a dash."""
     known = [(f, kept[f.script]) for f in FIGURES if f.script in kept]
     rows = ["| figures of | command | units | one unit | on |", "|---|---|---|---|---|"]
-    rows += [
-        f"| [{f.subject}](#{_anchor(f)}) | `{one['command']}` | {one['units']:.0f} | {one['unit_s']:.3f} s | {one['date']} |"
-        for f, one in known
-    ]
+    for f in FIGURES:
+        one = kept.get(f.script)
+        rows.append(
+            f"| [{f.subject}](#{_anchor(f)}) | `{one['command']}` | {one['units']:.0f} | {one['unit_s']:.3f} s | {one['date']} |"
+            if one
+            else f"| {f.subject} | `{f.command}` | – | – | – |"
+        )
     parts = [f"## {_anchor(f)}\n\n```text\n" + "\n".join(one["lines"]) + "\n```\n" for f, one in known]
-    missing = [f"`{f.command}`" for f in FIGURES if f.script not in kept]
-    rest = f"\nNot run yet: {', '.join(missing)}.\n" if missing else ""
-    return _HEAD + "\n".join(rows) + "\n" + rest + "\n" + "\n".join(parts)
+    return _HEAD + "\n".join(rows) + "\n\n" + "\n".join(parts)
 
 
 def _anchor(figure: Figure) -> str:
