@@ -19,6 +19,7 @@ from diagnosis.clearing.still import (
     rate_of,
     still_frame,
 )
+from diagnosis.clearing.turned_as_read import turned_as_read
 from diagnosis.results.clearing import Check, Checked
 from diagnosis.results.vocabulary import Kind
 from replay.faults import Side
@@ -54,11 +55,16 @@ def axle_checks(cells: Cells, clear_at: float) -> Iterator[Checked]:
     place = np.minimum(np.arange(cells.frame.starts.size), len(rates.off) - 1)
     limit = answered(cells)
     joint = len(cells.machine.axles) > 1 and one_joint(cells, 0, 1)
-    both = [bool(np.isfinite(second[:, j]).any() and np.isfinite(opening[:, j]).any()) for j in range(angle.shape[1])]
+    turned = turned_as_read(cells)
+    seconds = [bool(np.isfinite(second[:, j]).any()) for j in range(angle.shape[1])]
+    opened = [bool(np.isfinite(opening[:, j]).any()) for j in range(angle.shape[1])]
+    both = [a and b for a, b in zip(seconds, opened, strict=True)]
+    # a gyro that shows one share of an angle all the time is its second measurement for what changes
+    steady = [b and (a or c) for a, b, c in zip(seconds, opened, turned, strict=True)]
     changes = [
         _ONE_AXLE * share
         if joint
-        else alone(rates.changes, j, share, (_CHANGED_TWICE if both[j] else _CHANGED) * share, _ALONE, others=1)
+        else alone(rates.changes, j, share, (_CHANGED_TWICE if steady[j] else _CHANGED) * share, _ALONE, others=1)
         for j in range(len(rates.changes))
     ]
     told = any((x or 0.0) > most for x, most in zip(rates.changes, changes, strict=True))  # which of them changes
@@ -77,10 +83,13 @@ def axle_checks(cells: Cells, clear_at: float) -> Iterator[Checked]:
         if np.isfinite(command[:, j]).any():
             yield _still(cells, j, limit)
             twice = both[j]
-            off = _alone(rates.off, j) if twice else np.abs(rates.off[:, j])
-            deviates = worst(cells, (*about, either, Check.RATE), off[place], brief_limit(rates, j, share, twice=twice))
+            off = _alone(rates.off, j) if steady[j] else np.abs(rates.off[:, j])
+            most = brief_limit(rates, j, share, twice=steady[j])
+            deviates = worst(cells, (*about, either, Check.RATE), off[place], most)
             changed = lasts(cells, (*about, either, Check.RATE), rates.changes[j], changes[j])
-            between = (1.0 if twice else _CHANGED if len(cells.machine.axles) > 1 and not joint else _ONE_AXLE) * share
+            between = (
+                1.0 if steady[j] else _CHANGED if len(cells.machine.axles) > 1 and not joint else _ONE_AXLE
+            ) * share
             parted = lasts(cells, (*about, either, Check.RATE), None if told else rates.parted[j], between)
             yield max([deviates, *(c for c in (changed, parted) if c.worst is not None)], key=times)
             if len(cells.machine.axles) > 1 and not joint:

@@ -134,6 +134,20 @@ def turn_by_angles(cells: Cells) -> tuple[Array, Array] | None:
     return np.where(use, path.yaw, np.nan), expected
 
 
+def turn_of_ends(cells: Cells) -> tuple[Array, dict[str, Array]] | None:
+    """Turn by the gyro beyond that by all angles, as a difference of the ends' tangents, and each axle's own part of it; all of shape (cells,).
+
+    NaN where the machine is too slow. None without a gyro, or where an axle's angle is missing.
+    """
+    off = _off_angles(cells)
+    if off is None or off.by_wheels:
+        return None
+    names = [[name for name in end if name != _FIXED] for end in turning_ends(cells.machine).values()]
+    angles = dict(zip(cells.machine.axles, cells.axles("phi").T, strict=True))
+    signed = zip((1.0, -1.0), names, strict=True)
+    return off.angle, {name: sign * np.tan(angles[name]) for sign, end in signed for name in end}
+
+
 class _Path(NamedTuple):
     """How the machine turns and where its angles point, each of shape (cells,), and its length between the ends [m].
 

@@ -1,0 +1,44 @@
+"""Whether the machine turns, by its gyro, all the time by one share of what each steering angle reads: its sensor then has not come to read another share."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from diagnosis.clearing.cells import Array, Cells, Frame
+from diagnosis.clearing.responses import growth, largest_change
+from diagnosis.clearing.yaw import turn_of_ends
+
+_WINDOW_S, _LEAST_S = 8.0, 1.5  # of a window, and steered in it
+_LEAST_WINDOWS = 16
+_STEERED = 0.05  # tangent of an angle
+#: Of an angle: a change between parts of the mission, and the range of all windows. Tyres that give way had up to 0.13 and 0.21 on six healthy
+#: machines (tuning), sensors that come to read 0.6 or 1.4 from 0.17 and 0.27 on.
+_CHANGED, _RANGE = 0.12, 0.25
+
+
+def turned_as_read(cells: Cells) -> list[bool]:
+    """Of every axle, whether the turn beyond that by all angles is one share of its angle from the start to the end.
+
+    False without a gyro, of what is no end of the machine, and where too few windows tell.
+    """
+    ends = turn_of_ends(cells)
+    if ends is None:
+        return [False] * len(cells.machine.axles)
+    beyond, angles = ends
+    frame = Frame(cells.size, max(1, round(_WINDOW_S / cells.dt)), cells.frame.hop)
+    return [name in angles and _steady(frame, cells.dt, beyond, angles[name]) for name in cells.machine.axles]
+
+
+def _steady(frame: Frame, dt: float, beyond: Array, tangent: Array) -> bool:
+    """Whether a turn is one share of a tangent in all windows; both of shape (cells,)."""
+    use: NDArray[np.bool_] = np.isfinite(beyond) & (np.abs(np.nan_to_num(tangent)) > _STEERED)
+    turned = frame.sums(np.where(use, beyond * np.sign(tangent), 0.0))
+    steered = frame.sums(np.where(use, np.abs(tangent), 0.0))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        share = np.where(frame.sums(use.astype(np.float64)) * dt >= _LEAST_S, turned / steered, np.nan)
+    known = share[np.isfinite(share)]
+    if known.size < _LEAST_WINDOWS:
+        return False
+    every = [np.ones(share.size, np.bool_)]
+    return bool(max(largest_change(share, every), growth(share, every)) <= _CHANGED and np.ptp(known) <= _RANGE)

@@ -1,0 +1,56 @@
+"""A gyro that shows one share of an angle from the start to the end is its second measurement for what changes."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from diagnosis.clearing.turned_as_read import turned_as_read
+from replay.machine.config import haulotte
+from replay.simulation.options import SimulatedMission
+from tests.diagnosis.clearing.missions import in_cells, simulated
+
+_DRIVEN = simulated(seed=8)
+
+
+def _with_a_gyro(mission: SimulatedMission) -> SimulatedMission:
+    """The mission with a yaw rate as rigid wheels have it at these angles."""
+    columns, geometry = mission.columns, haulotte().geometry
+    assert geometry is not None
+    wheels = geometry.wheels.values()
+    speed = np.mean([columns[f"wheel.{w}.v"] for w in haulotte().wheels], axis=0)
+    front, rear = (np.tan(columns[f"steer.{axle}.phi"]) for axle in ("front", "rear"))
+    length = max(w.x for w in wheels) - min(w.x for w in wheels)
+    return replace(mission, columns={**columns, "imu.yaw_rate": speed * (front - rear) / length})
+
+
+MISSION = _with_a_gyro(_DRIVEN)
+
+
+def with_angle(axle: str, share: NDArray[np.float64]) -> list[bool]:
+    """Whether the machine turns as each axle reads, where one of them reads such a share of its angle."""
+    name = f"steer.{axle}.phi"
+    columns = {**MISSION.columns, name: MISSION.columns[name] * share}
+    return turned_as_read(in_cells(replace(MISSION, columns=columns), base=False))
+
+
+def test_healthy_angles_turn_the_machine_by_one_share() -> None:
+    assert turned_as_read(in_cells(MISSION, base=False)) == [True, True]
+
+
+def test_without_a_gyro_nothing_is_known() -> None:
+    assert turned_as_read(in_cells(_DRIVEN, base=True)) == [False, False]
+
+
+@pytest.mark.parametrize("axle", ["front", "rear"])
+@pytest.mark.parametrize("end", [0.6, 1.5])
+def test_an_angle_that_comes_to_read_another_share_does_not(axle: str, end: float) -> None:
+    ramp = np.linspace(1.0, end, MISSION.stamps.size)
+    assert not all(with_angle(axle, ramp))
+
+
+def test_a_share_that_stays_is_none_that_changes() -> None:
+    assert with_angle("front", np.full(MISSION.stamps.size, 0.9)) == [True, True]
