@@ -55,7 +55,7 @@ def axle_checks(cells: Cells, clear_at: float) -> Iterator[Checked]:
     place = np.minimum(np.arange(cells.frame.starts.size), len(rates.off) - 1)
     limit = answered(cells)
     joint = len(cells.machine.axles) > 1 and one_joint(cells, 0, 1)
-    turned = turned_as_read(cells)
+    turned = turned_as_read(cells, np.isfinite(rates.off))
     seconds = [bool(np.isfinite(second[:, j]).any()) for j in range(angle.shape[1])]
     opened = [bool(np.isfinite(opening[:, j]).any()) for j in range(angle.shape[1])]
     both = [a and b for a, b in zip(seconds, opened, strict=True)]

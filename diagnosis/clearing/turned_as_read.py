@@ -11,34 +11,40 @@ from diagnosis.clearing.yaw import turn_of_ends
 
 _WINDOW_S, _LEAST_S = 8.0, 1.5  # of a window, and steered in it
 _LEAST_WINDOWS = 16
+_SPAN = 0.75  # of the time from the first window in which it is steered to the last
 _STEERED = 0.05  # tangent of an angle
 #: Of an angle: a change between parts of the mission, and the range of all windows. Tyres that give way had up to 0.13 and 0.21 on six healthy
 #: machines (tuning), sensors that come to read 0.6 or 1.4 from 0.17 and 0.27 on.
 _CHANGED, _RANGE = 0.12, 0.25
 
 
-def turned_as_read(cells: Cells) -> list[bool]:
+def turned_as_read(cells: Cells, steered: NDArray[np.bool_]) -> list[bool]:
     """Of every axle, whether the turn beyond that by all angles is one share of its angle from the start to the end.
 
-    False without a gyro, of what is no end of the machine, and where too few windows tell.
+    False without a gyro, of what is no end of the machine, and where windows that tell are few or lie in one part of those in which it is
+    `steered`, of shape (windows, axles).
     """
     ends = turn_of_ends(cells)
     if ends is None:
         return [False] * len(cells.machine.axles)
     beyond, angles = ends
     frame = Frame(cells.size, max(1, round(_WINDOW_S / cells.dt)), cells.frame.hop)
-    return [name in angles and _steady(frame, cells.dt, beyond, angles[name]) for name in cells.machine.axles]
+    return [
+        name in angles and _steady(frame, cells.dt, beyond, angles[name], steered[:, j])
+        for j, name in enumerate(cells.machine.axles)
+    ]
 
 
-def _steady(frame: Frame, dt: float, beyond: Array, tangent: Array) -> bool:
-    """Whether a turn is one share of a tangent in all windows; both of shape (cells,)."""
+def _steady(frame: Frame, dt: float, beyond: Array, tangent: Array, steered: NDArray[np.bool_]) -> bool:
+    """Whether a turn is one share of a tangent in all windows, `steered` of shape (windows,); both of shape (cells,)."""
     use: NDArray[np.bool_] = np.isfinite(beyond) & (np.abs(np.nan_to_num(tangent)) > _STEERED)
     turned = frame.sums(np.where(use, beyond * np.sign(tangent), 0.0))
-    steered = frame.sums(np.where(use, np.abs(tangent), 0.0))
+    read = frame.sums(np.where(use, np.abs(tangent), 0.0))
     with np.errstate(divide="ignore", invalid="ignore"):
-        share = np.where(frame.sums(use.astype(np.float64)) * dt >= _LEAST_S, turned / steered, np.nan)
-    known = share[np.isfinite(share)]
-    if known.size < _LEAST_WINDOWS:
+        share = np.where(frame.sums(use.astype(np.float64)) * dt >= _LEAST_S, turned / read, np.nan)
+    at, needed = np.flatnonzero(np.isfinite(share)), np.flatnonzero(steered)
+    if at.size < _LEAST_WINDOWS or needed.size == 0 or at[-1] - at[0] < _SPAN * (needed[-1] - needed[0]):
         return False
+    known = share[at]
     every = [np.ones(share.size, np.bool_)]
     return bool(max(largest_change(share, every), growth(share, every)) <= _CHANGED and np.ptp(known) <= _RANGE)

@@ -30,19 +30,26 @@ def _with_a_gyro(mission: SimulatedMission) -> SimulatedMission:
 MISSION = _with_a_gyro(_DRIVEN)
 
 
+def turned(mission: SimulatedMission, *, base: bool = False, steered: tuple[int, int] = (0, 10**6)) -> list[bool]:
+    """Whether the machine turns as its axles read, which are steered in such windows."""
+    cells = in_cells(mission, base=base)
+    windows = np.arange(cells.frame.starts.size)
+    return turned_as_read(cells, np.column_stack([(windows >= steered[0]) & (windows < steered[1])] * 2))
+
+
 def with_angle(axle: str, share: NDArray[np.float64]) -> list[bool]:
     """Whether the machine turns as each axle reads, where one of them reads such a share of its angle."""
     name = f"steer.{axle}.phi"
     columns = {**MISSION.columns, name: MISSION.columns[name] * share}
-    return turned_as_read(in_cells(replace(MISSION, columns=columns), base=False))
+    return turned(replace(MISSION, columns=columns))
 
 
 def test_healthy_angles_turn_the_machine_by_one_share() -> None:
-    assert turned_as_read(in_cells(MISSION, base=False)) == [True, True]
+    assert turned(MISSION) == [True, True]
 
 
 def test_without_a_gyro_nothing_is_known() -> None:
-    assert turned_as_read(in_cells(_DRIVEN, base=True)) == [False, False]
+    assert turned(_DRIVEN, base=True) == [False, False]
 
 
 @pytest.mark.parametrize("axle", ["front", "rear"])
@@ -54,3 +61,8 @@ def test_an_angle_that_comes_to_read_another_share_does_not(axle: str, end: floa
 
 def test_a_share_that_stays_is_none_that_changes() -> None:
     assert with_angle("front", np.full(MISSION.stamps.size, 0.9)) == [True, True]
+
+
+def test_turns_in_one_part_of_the_mission_tell_nothing_of_the_rest() -> None:
+    gone = np.where(np.linspace(0.0, 1.0, MISSION.stamps.size) < 0.5, MISSION.columns["imu.yaw_rate"], np.nan)
+    assert turned(replace(MISSION, columns={**MISSION.columns, "imu.yaw_rate": gone})) == [False, False]

@@ -19,11 +19,11 @@ from tests.diagnosis.clearing.missions import LENGTH, signals_of, simulated
 WHEELS = ("FR", "FL")
 
 
-def failing(share: float) -> set[Check]:
-    """Checks that do not pass of a machine whose front right speeds, by both sensors, are a share for the second half."""
+def failing(share: float, stop: float = LENGTH) -> set[Check]:
+    """Checks that do not pass of a machine whose front right speeds, by both sensors, are a share from the middle until `stop` [s]."""
     one = simulated(seed=5)
     t = (one.stamps - one.stamps[0]) * 1e-9
-    behind = np.where(t > LENGTH / 2, share, 1.0)
+    behind = np.where((t > LENGTH / 2) & (t < stop), share, 1.0)
     columns = {n: x * behind if n in ("wheel.FR.v", "wheel.FR.v_true") else x for n, x in one.columns.items()}
     columns = {n: x for n, x in columns.items() if not n.startswith(("wheel.RR", "wheel.RL", "steer."))}
     machine = replace(haulotte(), wheels=WHEELS, geometry=None)
@@ -35,3 +35,7 @@ def failing(share: float) -> set[Check]:
 @pytest.mark.parametrize(("share", "found"), [(1.0, False), (0.5, True)])
 def test_what_lies_behind_one_of_two_drives_shows_beside_the_other(share: float, *, found: bool) -> None:
     assert bool(failing(share) & {Check.RESPONSE, Check.LASTING_RESPONSE, Check.CHANGE}) is found
+
+
+def test_ten_seconds_of_it_show_in_windows() -> None:
+    assert Check.RESPONSE in failing(0.65, LENGTH / 2 + 10.0)
