@@ -25,7 +25,7 @@ _LAGS_S, _SETTLED = (
     4.0,
 )  # time constants; times the longest, of what came before
 _USUAL = 0.9  # of the samples
-_SOME = 2_000  # samples of which a likely delay is found
+_SOME, _ALL = 500, slice(None)  # samples of which a likely delay is found
 _ROUNDED = 1e-9  # of a sum: far more than rounding leaves of it
 _OWN = 1.5  # times the noise: a healthy channel's own deviation
 _LATER, _STARTS = 0.5, 11  # of a piece, within which a gain may begin to fade, and moments that are tried
@@ -170,12 +170,12 @@ class _Late(NamedTuple):
     ----------
     seconds : Sequence[float]
         By how much, one after the other [s].
-    reference : Callable[[int, slice], Array]
-        What it is by one of them, at some of the steps.
+    reference : Callable[[int | slice, slice], Array]
+        What it is by one of them, or by all, at some of the steps.
     """
 
     seconds: Sequence[float]
-    reference: Callable[[int, slice], Array]
+    reference: Callable[[int | slice, slice], Array]
 
 
 def _least(late: _Late, y: Array, measured: Measured) -> tuple[float, Array]:
@@ -184,13 +184,10 @@ def _least(late: _Late, y: Array, measured: Measured) -> tuple[float, Array]:
     What leaves least of some of the samples is looked at first: its bound rules most others out.
     """
 
-    def behind(k: int, part: slice = slice(None)) -> Array:
-        return np.asarray(y[part] - late.reference(k, part))
+    def behind(k: int) -> Array:
+        return y - late.reference(k, _ALL)
 
-    some = slice(None, None, max(1, y.size // _SOME))
-    likely = _ranked(
-        behind(int(np.argmin([_smaller(_ranked(behind(k, some)), measured) for k in range(len(late.seconds))])))
-    )
+    likely = _ranked(behind(_likely(late, y)))
     bound, edge = _smaller(likely, measured), float(likely[_most(y.size)])
     least, best, rest = np.inf, 0.0, y
     for k, seconds in enumerate(late.seconds):
@@ -203,12 +200,21 @@ def _least(late: _Late, y: Array, measured: Measured) -> tuple[float, Array]:
     return best, rest
 
 
+def _likely(late: _Late, y: Array) -> int:
+    """Place of what leaves least of every so many samples of y, shape (k,)."""
+    some = slice(None, None, max(1, y.size // _SOME))
+    squared = (y[some] - late.reference(_ALL, some)) ** 2
+    most = _most(squared.shape[1])
+    return int(np.argmin(np.partition(squared, most, axis=1)[:, :most].sum(axis=1)))
+
+
 def _delayed(at: NDArray[np.intp], x: Array, measured: Measured) -> _Late:
     """The reference at some steps, x there, by how much it is delayed."""
     seconds = np.linspace(0.0, _LATEST_S, _DELAYS)[1:].tolist()
+    steps = np.array([round(s / measured.dt) for s in seconds])
 
-    def reference(k: int, part: slice) -> Array:
-        before = measured.x[np.maximum(at[part] - round(seconds[k] / measured.dt), 0)]
+    def reference(k: int | slice, part: slice) -> Array:
+        before = measured.x[np.maximum(at[part] - steps[k, ..., np.newaxis], 0)]
         return np.where(np.isfinite(before), before, x[part])
 
     return _Late(seconds, reference)
@@ -218,7 +224,11 @@ def _lagged(at: NDArray[np.intp], x: Array, measured: Measured) -> _Late:
     """The same behind a lag of first order, by its time constant."""
     first = max(0, int(at[0]) - round(_SETTLED * _LAGS_S[-1] / measured.dt))
     behind = low_passed_at(measured.x[first : at[-1] + 1], _LAGS_S, measured.dt, at - first)
-    return _Late(_LAGS_S, lambda k, part: np.where(np.isfinite(behind[k][part]), behind[k][part], x[part]))
+
+    def reference(k: int | slice, part: slice) -> Array:
+        return np.where(np.isfinite(behind[k, ..., part]), behind[k, ..., part], x[part])
+
+    return _Late(_LAGS_S, reference)
 
 
 def _later(off: Array, x: Array, when: Array) -> tuple[int, Array, float]:
