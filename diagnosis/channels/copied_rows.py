@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from replay.arrays.numeric import without_nan
 from replay.signals.signal import quantity_kind
 from replay.signals.timeline import Timeline
 
@@ -76,7 +77,7 @@ def copied_rows(timeline: Timeline, names: Sequence[str]) -> list[Span]:
     top = {n: float(np.nanmax(np.abs(timeline.signals[n]))) for n in moving}
     standing = np.zeros(start.size)
     for n in moving:
-        size = np.abs(np.nan_to_num(timeline.signals[n][start]))
+        size = np.abs(without_nan(timeline.signals[n][start]))
         standing += (size > _ZERO * top[n]) & (size < _EXTREME * top[n])
     use = standing >= _CHANNELS
     order = np.flatnonzero(use)[np.argsort((start - stop)[use], kind="stable")]

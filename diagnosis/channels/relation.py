@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from diagnosis.channels.noise import shifted
 from diagnosis.channels.scale import scale_of
 from replay.arrays.compiling import njit
-from replay.arrays.numeric import bridged
+from replay.arrays.numeric import bridged, without_nan
 
 Array = NDArray[np.float64]
 
@@ -212,7 +212,7 @@ def _places(y: Array, x: Array, use: NDArray[np.bool_], dt: float, margin: int) 
     if count < 1:
         return _Places(x, np.zeros(0, np.intp), y)
     first = warm + length * np.arange(count)
-    filled = np.nan_to_num(x)
+    filled = without_nan(x)
     moved = np.abs(np.diff(filled))[warm : warm + count * length - 1]
     moved = np.r_[moved, 0.0].reshape(count, length).sum(axis=1)
     kept = first[moved >= np.quantile(moved, _STILL)]

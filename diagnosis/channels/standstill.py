@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.evidence import MissionView
+from replay.arrays.numeric import without_nan
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -101,7 +102,7 @@ def stood_still(
     `speeds`, `commands`, `readings` of shape (n,) each [m/s]; `driving_speed` in m/s, `dt` in s.
     """
     still = np.logical_and.reduce([np.abs(np.nan_to_num(y, nan=np.inf)) <= STILL * driving_speed for y in speeds])
-    asked = [np.abs(np.nan_to_num(c)) > _ASKED * driving_speed for c in commands]
+    asked = [np.abs(without_nan(c)) > _ASKED * driving_speed for c in commands]
     edge = np.flatnonzero(np.diff(np.r_[False, still, False].astype(np.int8)))
     out: list[Span] = []
     for start, stop in zip(edge[::2].tolist(), edge[1::2].tolist(), strict=True):

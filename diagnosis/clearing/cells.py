@@ -108,6 +108,10 @@ class Cells:
         kept: _T = self._kept[what]
         return kept
 
+    def once_beside(self, what: str, found: Callable[[], _T]) -> _T:
+        """The same of what depends on what is stated: computed once for all that state the same faults."""
+        return self.once(f"{what} beside {self.stated}, {self.carried}, {self.may_carry}", found)
+
     def means(self, name: str) -> Array:
         """Mean of a signal in each cell; NaN where it has no value. Shape (cells,)."""
 

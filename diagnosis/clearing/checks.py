@@ -56,13 +56,16 @@ def cells_of(
 
 def checks_of(cells: Cells, words: MachineWords) -> tuple[Checked, ...]:
     """Whatever the log allows to ask of each part, whichever evidence judged it: more evidence never hides a fault."""
+    return tuple(replace(c, words=words) for c in cells.once_beside("checks", lambda: _checks(cells)))
+
+
+def _checks(cells: Cells) -> tuple[Checked, ...]:
     clear_at = cells.machine.limits.clear_at
     with warnings.catch_warnings():  # windows without any value
         warnings.simplefilter("ignore", RuntimeWarning)
-        found = (
+        return (
             *wheel_checks(cells, clear_at),
             *axle_checks(cells, clear_at),
             *yaw_checks(cells),
             *jump_checks(cells, clear_at),
         )
-    return tuple(replace(c, words=words) for c in found)

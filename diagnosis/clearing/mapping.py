@@ -83,6 +83,10 @@ def mapping_hints(cells: Cells) -> tuple[Hint, ...]:
 
     A fault that lasts from start to end can look alike: its sentence asks for the machine file to be looked at first.
     """
+    return cells.once_beside("mapping hints", lambda: _all_hints(cells))
+
+
+def _all_hints(cells: Cells) -> tuple[Hint, ...]:
     machine, wanted = cells.machine, cells.reference
     with warnings.catch_warnings():  # means without any value
         warnings.simplefilter("ignore", RuntimeWarning)

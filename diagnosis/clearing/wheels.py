@@ -204,6 +204,10 @@ def most_carried(clear_at: float) -> float:
 
 def _echoes(cells: Cells, wheel: str) -> bool:
     """Whether a wheel's reading repeats its command."""
+    return cells.once(f"echo of {wheel}", lambda: _echo(cells, wheel))
+
+
+def _echo(cells: Cells, wheel: str) -> bool:
     timeline, name, at = cells.timeline, f"wheel.{wheel}.v", cells.machine.wheels.index(wheel)
     asked = cells.replay.v_ref[:, at]
     y = timeline.signals[name]

@@ -15,6 +15,7 @@ from diagnosis.channels.noise import shifted
 from diagnosis.direct.identification import IdentifiedPair
 from diagnosis.direct.low_speed import evened_off, in_lasting, left_open
 from diagnosis.results.assessment import Assessment, Finding
+from replay.arrays.numeric import without_nan
 from replay.arrays.sliding import largest_within
 
 Array = NDArray[np.float64]
@@ -43,12 +44,12 @@ def without_shared_moments(
     if len(found) < _SENSORS or not any(a.findings for a in assessments.values()):
         return dict(assessments)
     off = {w: evened_off(one) for w, one in found.items()}
-    top = max(float(np.quantile(np.abs(np.nan_to_num(one.samples.x)), _TOP)) for one in found.values())
+    top = max(float(np.quantile(np.abs(without_nan(one.samples.x)), _TOP)) for one in found.values())
     steady = {w: _steady(one, top) for w, one in found.items()}
     own, lasting = {}, {}
     for w, one in found.items():
         findings = assessments[w].findings if w in assessments else ()
-        fast = np.abs(np.nan_to_num(one.samples.x)) > _SLOW * top
+        fast = np.abs(without_nan(one.samples.x)) > _SLOW * top
         alone = [f for f in findings if _by_itself(f, off[w], steady[w], fast)]
         own[w] = in_lasting(alone, off[w].size, one.pair.dt)
         lasting[w] = in_lasting(findings, off[w].size, one.pair.dt) & ~own[w]
@@ -86,9 +87,9 @@ def _beside(finding: Finding, off: Mapping[str, Array], lasting: Mapping[str, ND
 
 def _steady(one: IdentifiedPair, top: float) -> NDArray[np.bool_]:
     """Samples of a speed that is neither low nor changes."""
-    x = np.nan_to_num(one.samples.x)
+    x = without_nan(one.samples.x)
     reach = max(1, round(_STEADY_S / one.pair.dt))
-    change = np.abs(np.nan_to_num(shifted(x, reach) - shifted(x, -reach)))
+    change = np.abs(without_nan(shifted(x, reach) - shifted(x, -reach)))
     return np.asarray((change < _STEADY * top) & (np.abs(x) > _SLOW * top))
 
 

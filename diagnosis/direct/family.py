@@ -176,7 +176,7 @@ class _WheelPairs:
             return np.asarray((np.abs(without_nan(command)) < limit) & (np.abs(without_nan(speed)) < limit))
 
         true = self.mission.values(self.name("v_true"))
-        even = self.mission.timeline.store.keep(mean_within(np.nan_to_num(true), width))
+        even = self.mission.timeline.store.keep(mean_within(without_nan(true), width))
         return self.mission.timeline.map(low, self.mission.command(self.wheel), even)
 
     @cached_property

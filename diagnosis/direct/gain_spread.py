@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from diagnosis.channels.sample_status import PAIR
 from diagnosis.estimation.samples import Samples
+from replay.arrays.numeric import without_nan
 
 Array = NDArray[np.float64]
 
@@ -83,5 +84,5 @@ def gain_windows(samples: Samples, dt: float) -> GainWindows:
     width = max(2, round(_GAIN_S / dt))
     size = samples.y.size // width * width
     use = (samples.status[:size] == PAIR) & ~samples.quiet[:size]
-    x, y = (np.where(use, np.nan_to_num(z[:size]), 0.0).reshape(-1, width) for z in (samples.x, samples.y))
+    x, y = (np.where(use, without_nan(z[:size]), 0.0).reshape(-1, width) for z in (samples.x, samples.y))
     return GainWindows(np.einsum("ij,ij->i", x, x), np.einsum("ij,ij->i", x, y), width)

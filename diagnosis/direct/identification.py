@@ -26,6 +26,7 @@ from diagnosis.direct.inputs import Pair
 from diagnosis.direct.uncertainty import HealthyNoise, uncertainty_of
 from diagnosis.estimation.fault_models import ModeModel
 from diagnosis.estimation.samples import Samples
+from replay.arrays.numeric import without_nan
 from replay.arrays.sliding import largest_within
 from replay.faults import Side
 from replay.machine.config import Limits
@@ -162,7 +163,7 @@ class IdentifiedPair:
     @cached_property
     def way(self) -> Array:
         """Sum of the sizes of the reference up to each sample [unit], shape (n + 1,)."""
-        return self.pair.store.keep(np.r_[0.0, np.cumsum(np.abs(np.nan_to_num(self.samples.x)))])
+        return self.pair.store.keep(np.r_[0.0, np.cumsum(np.abs(without_nan(self.samples.x)))])
 
     @cached_property
     def texture(self) -> Texture:
@@ -199,10 +200,10 @@ def identify(
     dt, sensor = pair.dt, pair.side is Side.SENSOR
     habit = pair.habit
     held = held_reference(pair.x, habit, dt) if habit.stepwise else Held(pair.x, np.zeros(pair.x.size))
-    hold = habit.hold(np.nan_to_num(held.mean))
+    hold = habit.hold(without_nan(held.mean))
     relation = _relation(pair, held.mean, hold, sensor) if given is None else given
     x = pair.store.keep(relation.expected(held.mean, dt))
-    spread = np.nan_to_num(shifted(held.spread, relation.delay))
+    spread = without_nan(shifted(held.spread, relation.delay))
     status = sample_status(pair.y, x, pair.fresh, pair.alive, dt)
     if habit.stepwise:
         status = news_alone(status, pair.y, hold, dt)
@@ -251,10 +252,10 @@ def _relation(pair: Pair, x: Array, hold: Array, sensor: bool) -> Relation:
 
 def _unsettled(x: Array, noise: Array) -> NDArray[np.bool_]:
     """Within three samples of a jump of the reference that noise does not explain, shape (n,)."""
-    return largest_within(np.abs(white_part(np.nan_to_num(x))), _SETTLED, _SETTLED) > _JUMP * noise
+    return largest_within(np.abs(white_part(without_nan(x))), _SETTLED, _SETTLED) > _JUMP * noise
 
 
 def _neighbours(x: Array) -> Array:
     """Mean of the samples around each one, itself and the next ones left out, shape (n, 1): x but for its quick part."""
-    known = np.nan_to_num(x)
+    known = without_nan(x)
     return ((moving_sum(known, _AROUND) - moving_sum(known, 3)) / (_AROUND - 3))[:, np.newaxis]

@@ -17,6 +17,7 @@ from diagnosis.channels.noise import moving_sum
 from diagnosis.channels.sample_status import PAIR
 from diagnosis.direct.identification import IdentifiedPair
 from diagnosis.results.assessment import CODE, Assessment, Finding
+from replay.arrays.numeric import without_nan
 from replay.faults import State
 
 Array = NDArray[np.float64]
@@ -44,7 +45,7 @@ def without_low_speed_habit(
     """
     if len(found) < _SENSORS or not any(a.findings for a in assessments.values()):
         return dict(assessments)
-    speeds = {w: np.abs(np.nan_to_num(one.samples.x)) for w, one in found.items()}
+    speeds = {w: np.abs(without_nan(one.samples.x)) for w, one in found.items()}
     low = _LOW * max(float(np.quantile(x, _TOP)) for x in speeds.values())
     off = {w: evened_off(one) for w, one in found.items()}
     sound = {w: ~in_lasting(assessments[w].findings, off[w].size, found[w].pair.dt) for w in found}

@@ -20,6 +20,7 @@ from diagnosis.direct.identification import IdentifiedPair
 from diagnosis.direct.low_speed import left_open
 from diagnosis.estimation.lag import low_passed
 from diagnosis.results.assessment import Assessment, Finding
+from replay.arrays.numeric import without_nan
 
 Array = NDArray[np.float64]
 
@@ -112,7 +113,7 @@ class _Cells:
 def _cells(one: IdentifiedPair, opening: Array, others: Sequence[Array]) -> _Cells:
     pair = one.pair
     width = max(1, round(_CELL_S / pair.dt))
-    known = np.nan_to_num(opening)
+    known = without_nan(opening)
     drives = [low_passed(known, lag, pair.dt) for lag in _LAGS_S]
     columns = [_means(x, width) for x in (*drives, *others)]
     if others:

@@ -15,6 +15,7 @@ from diagnosis.channels.sample_status import PAIR
 from diagnosis.direct.identification import IdentifiedPair
 from diagnosis.direct.low_speed import left_open
 from diagnosis.results.assessment import Assessment, Finding
+from replay.arrays.numeric import without_nan
 from replay.faults import FaultMode, State
 
 _SMALL = 0.1  # of the span, root mean square: a larger deviation is none of a healthy valve, whatever is usual
@@ -75,7 +76,7 @@ def _usual(one: IdentifiedPair) -> float:
     width = max(1, round(_WINDOW_S / dt))
     size = one.samples.y.size // width * width
     use = (one.samples.status[:size] == PAIR) & ~one.samples.quiet[:size]
-    off = np.where(use, np.nan_to_num(one.samples.y[:size] - one.samples.x[:size]), 0.0).reshape(-1, width)
+    off = np.where(use, without_nan(one.samples.y[:size] - one.samples.x[:size]), 0.0).reshape(-1, width)
     count = np.count_nonzero(use.reshape(-1, width), axis=1)
     known_s = count * one.model.dt  # a position may be slower than the timeline
     size_of = np.sqrt((off**2).sum(axis=1) / np.maximum(count, 1))[known_s > _KNOWN * _WINDOW_S]

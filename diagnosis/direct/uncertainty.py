@@ -18,6 +18,7 @@ from diagnosis.channels.sample_status import PAIR
 from diagnosis.direct.inputs import Pair
 from diagnosis.estimation.fault_models import MISMATCH_S, ModeModel
 from diagnosis.results.fault_rows import codes_of
+from replay.arrays.numeric import without_nan
 from replay.faults import Side
 
 Array = NDArray[np.float64]
@@ -126,7 +127,7 @@ def uncertainty_of(
     lsb = pair.known_noise.lsb if pair.known_noise.lsb is not None else usual_rounding(news)
     residual = np.where(paired, pair.y - x, np.nan)
     period = pair.dt * max(1.0, usual_distance(paired) if news.size > 1 else 1.0)
-    size = np.abs(np.nan_to_num(x))
+    size = np.abs(without_nan(x))
     counted = habit.rounding(size) ** 2 * _COUNTED
     if usual is None:
         growth = _growth(residual[paired], size[paired], counted[paired], period)
@@ -237,7 +238,7 @@ def _constant(pair: Pair, relative: Array, counted: Array, noise: float, constan
 
 def _moved(x: Array, dt: float) -> Array:
     """Change of x within 5 ms to either side, half of it [unit], shape (n,)."""
-    reach, filled = max(1, round(_MOTION_S / dt)), np.nan_to_num(x)
+    reach, filled = max(1, round(_MOTION_S / dt)), without_nan(x)
     moved = np.zeros(x.size)
     moved[reach:-reach] = 0.5 * np.abs(filled[2 * reach :] - filled[: -2 * reach])
     return moved

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +25,7 @@ _LAGS_S, _SETTLED = (
     4.0,
 )  # time constants; times the longest, of what came before
 _USUAL = 0.9  # of the samples
+_SOME, _ALL = 500, slice(None)  # samples of which a likely delay is found
 _ROUNDED = 1e-9  # of a sum: far more than rounding leaves of it
 _OWN = 1.5  # times the noise: a healthy channel's own deviation
 _LATER, _STARTS = 0.5, 11  # of a piece, within which a gain may begin to fade, and moments that are tried
@@ -161,34 +163,72 @@ def _late(words: str, seconds: float) -> Cause:
     return Cause(FaultMode.OUTSIDE_TABLE, words, changes=True, late=True, seconds=seconds)
 
 
-def _least(trials: Iterable[tuple[float, Array]], y: Array, measured: Measured) -> tuple[float, Array]:
-    """Time [s] and rest [unit], shape (k,), of what leaves least of y among references that come late."""
-    least, best, rest, edge = np.inf, 0.0, y, np.inf
-    for seconds, x in trials:
-        behind = y - x
-        if _surely_more(behind, least, edge, measured):
+class _Late(NamedTuple):
+    """A reference that comes late.
+
+    Attributes
+    ----------
+    seconds : Sequence[float]
+        By how much, one after the other [s].
+    reference : Callable[[int | slice, slice], Array]
+        What it is by one of them, or by all, at some of the steps.
+    """
+
+    seconds: Sequence[float]
+    reference: Callable[[int | slice, slice], Array]
+
+
+def _least(late: _Late, y: Array, measured: Measured) -> tuple[float, Array]:
+    """Time [s] and rest [unit], shape (k,), of what leaves least of y among references that come late.
+
+    What leaves least of some of the samples is looked at first: its bound rules most others out.
+    """
+
+    def behind(k: int) -> Array:
+        return y - late.reference(k, _ALL)
+
+    likely = _ranked(behind(_likely(late, y)))
+    bound, edge = _smaller(likely, measured), float(likely[_most(y.size)])
+    least, best, rest = np.inf, 0.0, y
+    for k, seconds in enumerate(late.seconds):
+        off = behind(k)
+        if _surely_more(off, bound, edge, measured):
             continue
-        squared = _ranked(behind)
-        share = _smaller(squared, measured)
-        if share < least or (share == least and every_power(behind, measured) < every_power(rest, measured)):
-            least, best, rest = share, seconds, behind
-            edge = float(squared[_most(squared.size)])
+        share = power(off, measured)
+        if share < least or (share == least and every_power(off, measured) < every_power(rest, measured)):
+            least, best, rest = share, seconds, off
     return best, rest
 
 
-def _delayed(at: NDArray[np.intp], x: Array, measured: Measured) -> Iterator[tuple[float, Array]]:
-    """The reference at some steps, x there, by how much it is delayed [s]."""
-    for seconds in np.linspace(0.0, _LATEST_S, _DELAYS)[1:].tolist():
-        before = measured.x[np.maximum(at - round(seconds / measured.dt), 0)]
-        yield seconds, np.where(np.isfinite(before), before, x)
+def _likely(late: _Late, y: Array) -> int:
+    """Place of what leaves least of every so many samples of y, shape (k,)."""
+    some = slice(None, None, max(1, y.size // _SOME))
+    squared = (y[some] - late.reference(_ALL, some)) ** 2
+    most = _most(squared.shape[1])
+    return int(np.argmin(np.partition(squared, most, axis=1)[:, :most].sum(axis=1)))
 
 
-def _lagged(at: NDArray[np.intp], x: Array, measured: Measured) -> Iterator[tuple[float, Array]]:
-    """The same behind a lag of first order, by its time constant [s]."""
+def _delayed(at: NDArray[np.intp], x: Array, measured: Measured) -> _Late:
+    """The reference at some steps, x there, by how much it is delayed."""
+    seconds = np.linspace(0.0, _LATEST_S, _DELAYS)[1:].tolist()
+    steps = np.array([round(s / measured.dt) for s in seconds])
+
+    def reference(k: int | slice, part: slice) -> Array:
+        before = measured.x[np.maximum(at[part] - steps[k, ..., np.newaxis], 0)]
+        return np.where(np.isfinite(before), before, x[part])
+
+    return _Late(seconds, reference)
+
+
+def _lagged(at: NDArray[np.intp], x: Array, measured: Measured) -> _Late:
+    """The same behind a lag of first order, by its time constant."""
     first = max(0, int(at[0]) - round(_SETTLED * _LAGS_S[-1] / measured.dt))
-    reference = measured.x[first : at[-1] + 1]
-    for seconds, behind in zip(_LAGS_S, low_passed_at(reference, _LAGS_S, measured.dt, at - first), strict=True):
-        yield seconds, np.where(np.isfinite(behind), behind, x)
+    behind = low_passed_at(measured.x[first : at[-1] + 1], _LAGS_S, measured.dt, at - first)
+
+    def reference(k: int | slice, part: slice) -> Array:
+        return np.where(np.isfinite(behind[k, ..., part]), behind[k, ..., part], x[part])
+
+    return _Late(_LAGS_S, reference)
 
 
 def _later(off: Array, x: Array, when: Array) -> tuple[int, Array, float]:
@@ -257,7 +297,7 @@ def _surely_more(off: Array, least: float, edge: float, measured: Measured) -> b
     The m smallest of k squares sum up to no less than all of them, each cut at an edge, less k − m times that edge [unit²].
     """
     most = _most(off.size)
-    if not np.isfinite(edge) or not most:
+    if not most:
         return False
     bound = float(np.minimum(off**2, edge).sum()) - (off.size - most) * edge
     return bound > (least + (_OWN * measured.noise) ** 2) * most + _ROUNDED * edge * off.size

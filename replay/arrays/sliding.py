@@ -91,17 +91,18 @@ def windowed(
     return _joined(found, x.size)
 
 
-def mean_within(x: Array, width: int) -> Array:
-    """Mean of `width` samples around each one, 0 beyond the ends, shape (n,): `scipy.ndimage.uniform_filter1d` to the last digit.
+def mean_within(x: Array, width: int, beyond: Beyond = "constant") -> Array:
+    """Mean of `width` samples around each one, shape (n,): `scipy.ndimage.uniform_filter1d` to the last digit.
 
-    `x` of shape (n,), n > 0, finite; of an even width one more sample lies before than after.
+    `x` of shape (n,), n > 0, finite, goes on beyond its ends as `np.pad` has it, with 0 unless told otherwise; of an even width one
+    more sample lies before than after.
     """
     before = width // 2
 
     def means() -> Iterator[Array]:
         last = np.zeros(0, x.dtype)
         for start, stop in _parts(x.size, width):
-            line = _beyond(x, max(start - 1, 0) - before, stop + width - before - 1)
+            line = _beyond(x, max(start - 1, 0) - before, stop + width - before - 1, beyond)
             first = last if start else np.add.accumulate(line[:width])[-1:]
             sums = np.add.accumulate(np.concatenate([first, line[width:] - line[:-width]]))
             last = sums[-1:]

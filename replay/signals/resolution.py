@@ -10,6 +10,10 @@ from replay.arrays.blocks import blocks
 Array = NDArray[np.float64]
 
 _WINDOW_S = 0.25
+_SOME, _WIDER = (
+    4_000,
+    2.0,
+)  # values that tell where a low quantile lies, and times its share, up to which values are ranked
 
 
 def rounding_step(values: Array) -> float:
@@ -46,16 +50,21 @@ def rounding_step(values: Array) -> float:
 
 
 def _low_quantile(values: Array, share: float) -> float:
-    """`np.quantile` of many finite values, without its search for the largest one."""
+    """`np.quantile` of many finite values, without its search for the largest one; some of them tell below what the few lie that are ranked."""
     place = share * (values.size - 1)
     k = int(place)
-    ranked = np.partition(values, k)
-    a, t = float(ranked[k]), place - k
-    b = float(ranked[k + 1 :].min())
+    some = values[:: max(1, values.size // _SOME)]
+    near = min(int(_WIDER * share * some.size) + 1, some.size - 1)
+    few = values[values <= np.partition(some, near)[near]]
+    ranked = np.partition(few if few.size > k + 1 else values, (k, k + 1))
+    a, b, t = float(ranked[k]), float(ranked[k + 1]), place - k
     return a + (b - a) * t if t < 0.5 else b - (b - a) * (1.0 - t)
 
 
 def _first_known(values: Array, count: int) -> Array:
+    """The first `count` values that are known, or all."""
+    if np.isfinite(values[:count]).all():
+        return values[:count]
     found: list[Array] = []
     for part in blocks(values.size):
         near = values[part]

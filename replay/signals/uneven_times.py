@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from replay.arrays.sliding import median_within
+from replay.arrays.sliding import mean_within, median_within
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -72,6 +72,8 @@ def evened(stamps: NDArray[np.int64], values: Array) -> Evened:
 
 def _by_uneven_times(stamps: NDArray[np.int64], values: Array) -> bool:
     """Whether steps go on evenly where readings do not."""
+    if _even(np.diff(stamps)):
+        return False
     interval, usual = _intervals(stamps)
     reading = np.abs(values[1:])
     step = reading * interval
@@ -89,14 +91,17 @@ def _by_uneven_times(stamps: NDArray[np.int64], values: Array) -> bool:
     return _roughness(step, triple) < _EVENER * _roughness(reading, triple)
 
 
+def _even(interval: NDArray[np.int64]) -> bool:
+    """Whether no interval, shape (n,), differs from any mean of others by as much as uneven times do."""
+    return float(interval.max()) < (1.0 + _UNEVEN) * float(interval.min())
+
+
 def _intervals(stamps: NDArray[np.int64]) -> tuple[Array, Array]:
     """Time before each sample but the first, and the usual one around it [s]; shape (n - 1,) each."""
-    from scipy.ndimage import uniform_filter1d
-
     interval = np.diff(stamps) * 1e-9
     middle = _middle(interval)
     known = np.where(interval > _PAUSE * middle, middle, interval)
-    return interval, np.asarray(uniform_filter1d(known, _AROUND, mode="nearest"), dtype=np.float64)
+    return interval, mean_within(known, _AROUND, "edge")
 
 
 def _middle(x: Array) -> Array:

@@ -49,6 +49,7 @@ def test_medians(size: int, reach: int) -> None:
 def test_means(size: int, width: int) -> None:
     x = np.random.default_rng(size + width).normal(size=size) ** 2
     assert_array_equal(mean_within(x, width), uniform_filter1d(x, width, mode="constant"))
+    assert_array_equal(mean_within(x, width, "edge"), uniform_filter1d(x, width, mode="nearest"))
 
 
 @pytest.mark.parametrize("size", [16384, 32767, 32768, 50_001])
