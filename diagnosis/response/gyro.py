@@ -19,6 +19,7 @@ from diagnosis.response.machine import Judged
 from diagnosis.response.spells import Spell
 from diagnosis.response.turning import Turning, difference
 from diagnosis.results.machine_event import GYRO_CONSTANT, GYRO_REST, GYRO_SLIP
+from diagnosis.results.said import Said, Stated
 from diagnosis.results.sizes import turn
 
 Array = NDArray[np.float64]
@@ -46,9 +47,9 @@ _NEVER, _TURNED_S = 0.2, 20.0  # of the wheels' yaw rate, over a mission that tu
 
 
 class Contradicted(NamedTuple):
-    """Blocks [start, stop) in which the gyro alone contradicts the wheels, a sentence, and whether nothing but the gyro does that."""
+    """Blocks [start, stop) in which the gyro alone contradicts the wheels, what is said of it, and whether nothing but the gyro does that."""
 
-    text: str
+    said: Said
     start: int
     stop: int
     sure: bool
@@ -107,7 +108,7 @@ def wrong_gyro(
     if found is None:
         speed = np.max([np.abs(j.wheel.blocks.mean) for j in judged.values()], axis=0)[sound]
         texts = _never(apart, turning.yaw, sound, block_s) if _turns(apart[sound], speed) else ()
-        return tuple(Contradicted(text, 0, apart.size, sure=True) for text in texts)
+        return tuple(Contradicted(Said(text), 0, apart.size, sure=True) for text in texts)
     gain, offset, noise = found
     usual = float(np.quantile(np.abs(gain * apart[sound]), 0.9))
     about = _Spread(gain * apart, turning.yaw - offset, usual, noise)
@@ -126,16 +127,17 @@ def wrong_gyro(
         if not any(start < last and first < stop for (first, last), what in found_in.items() if what):
             found_in[start, stop] = _constant(about, slice(start, stop), (straight, sound, stands), block_s)
     against = against_the_wheels(gain, noise, apart[sound], turning, across)
-    out = [Contradicted(against, 0, apart.size, sure=True)] if against else []
+    out = [Contradicted(Said(against), 0, apart.size, sure=True)] if against else []
     for (start, stop), what in sorted(found_in.items()):
         if heading is not None and agree(turning.yaw - offset, heading, about.made, slice(start, stop)):
             continue
         if what:
             constant = what.endswith(GYRO_CONSTANT)
             rests = bool(np.count_nonzero((stands & off)[start:stop]) * block_s >= _RESTS_S)
-            text = f"From {start * block_s:.1f} to {stop * block_s:.1f} s the gyro (imu.yaw_rate) {what}, by what the rest of the mission shows of the two"
+            when = Stated.of(start * block_s, stop * block_s)
+            text = f"From {when.start} to {when.stop} s the gyro (imu.yaw_rate) {what}, by what the rest of the mission shows of the two"
             text += _OR_SIDE if constant and not rests else f"{GYRO_REST}." if constant else "."
-            out.append(Contradicted(text, start, stop, sure=rests or not constant))
+            out.append(Contradicted(Said(text, (when.span,)), start, stop, sure=rests or not constant))
     return tuple(out)
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.response.models import FROZEN, NOISY, SCALES, SILENT
+from replay.arrays.runs import runs_of
 from replay.faults import FaultMode
 
 Array = NDArray[np.float64]
@@ -36,9 +37,8 @@ class Spell(NamedTuple):
 
 def spans_of(there: Flags, gap: int = 0) -> list[tuple[int, int]]:
     """Steps [start, stop) of each stretch in which something holds, with interruptions of `gap` steps at most bridged; `there` of shape (n,)."""
-    edge = np.flatnonzero(np.diff(np.r_[False, there, False].astype(np.int8)))
     out: list[tuple[int, int]] = []
-    for start, stop in zip(edge[::2].tolist(), edge[1::2].tolist(), strict=True):
+    for start, stop in runs_of(there):
         if out and start - out[-1][1] <= gap:
             out[-1] = out[-1][0], stop
         else:
