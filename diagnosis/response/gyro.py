@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from diagnosis.response.gyro_turns import against_the_wheels, usual_turns
 from diagnosis.response.heading import agree
 from diagnosis.response.machine import Judged
-from diagnosis.response.spells import Spell
+from diagnosis.response.spells import Spell, deviations_of
 from diagnosis.response.turning import Turning, difference
 from diagnosis.results.machine_event import GYRO_CONSTANT, GYRO_REST, GYRO_SLIP
 from diagnosis.results.said import Said, Stated
@@ -119,11 +119,11 @@ def wrong_gyro(
     stands = sound & (np.max([np.abs(j.wheel.blocks.mean) for j in judged.values()], axis=0) <= _STANDS * fastest)
     straight = sound & (np.abs(about.made) < _TURNS * usual)  # there a constant is no share of the turn
     found_in: dict[tuple[int, int], str] = {}
-    for start, stop in _spans(off, shows):
+    for start, stop in deviations_of(off, shows, _GAP):
         long = (stop - start) * block_s >= _LEAST_S
         if long and np.mean(off[start:stop][shows[start:stop]]) >= _MOST_OF:
             found_in[start, stop] = _kind(about, slice(start, stop), sound[start:stop], block_s)
-    for start, stop in _spans(off & straight, straight):
+    for start, stop in deviations_of(off & straight, straight, _GAP):
         if not any(start < last and first < stop for (first, last), what in found_in.items() if what):
             found_in[start, stop] = _constant(about, slice(start, stop), (straight, sound, stands), block_s)
     against = against_the_wheels(gain, noise, apart[sound], turning, across)
@@ -175,17 +175,6 @@ def _only(where: Flags, part: slice) -> Flags:
     """Blocks of a part alone, shape (b,)."""
     out = np.zeros_like(where)
     out[part] = where[part]
-    return out
-
-
-def _spans(off: Flags, shows: Flags) -> list[tuple[int, int]]:
-    """Blocks [start, stop) of deviations, interrupted by few blocks that would show one and do not."""
-    out: list[tuple[int, int]] = []
-    for k in np.flatnonzero(off).tolist():
-        if out and np.count_nonzero(shows[out[-1][1] : k]) <= _GAP:
-            out[-1] = out[-1][0], k + 1
-        else:
-            out.append((k, k + 1))
     return out
 
 

@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from diagnosis.response.spells import deviations_of
 from diagnosis.results.said import Said, Stated
 from diagnosis.results.sizes import turn
 from replay.signals.timeline import Timeline
@@ -76,7 +77,7 @@ def contradictions(gyro: Array, odometry: Array, asked: Array | None, block_s: f
     far &= off > _TURNS * usual
     shows = far | (np.abs(made) > _TURNS * usual)
     out: list[Contradiction] = []
-    for start, stop in _spans(far, shows):
+    for start, stop in deviations_of(far, shows, _GAP):
         part = slice(start, stop)
         if (stop - start) * block_s >= _LEAST_S and np.mean(far[part][shows[part]]) >= _MOST_OF:
             which = _which(made, measured, asked, part, block_s)
@@ -118,17 +119,6 @@ def _related(x: Array, y: Array) -> tuple[Array, Array, float, float] | None:
     if misfit > _ALIKE * usual:
         return None
     return gain * x, y - offset, 1.5 * misfit, abs(gain) * usual
-
-
-def _spans(off: Flags, shows: Flags) -> list[tuple[int, int]]:
-    """Blocks [start, stop) of deviations, interrupted by few blocks that would show one and do not."""
-    out: list[tuple[int, int]] = []
-    for k in np.flatnonzero(off).tolist():
-        if out and np.count_nonzero(shows[out[-1][1] : k]) <= _GAP:
-            out[-1] = out[-1][0], k + 1
-        else:
-            out.append((k, k + 1))
-    return out
 
 
 def _which(made: Array, measured: Array, asked: Array | None, part: slice, block_s: float) -> str:

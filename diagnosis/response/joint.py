@@ -111,7 +111,7 @@ def cut(spells: Sequence[Spell], joint: Joint | None, blocks: Blocks) -> list[Sp
         if s.mode is FaultMode.NO_SIGNAL:
             out.append(s._replace(own=_goes_on(s, joint)))
             continue
-        spans = _parted(blocks, joint) if s.mode.scaled or s.mode is FaultMode.OUTSIDE_TABLE else []
+        spans = _parted(blocks, joint) if s.unspecific else []
         inside = [(max(a, s.start), min(b, s.stop)) for a, b in spans if a < s.stop and b > s.start]
         at = s.start
         for a, b in inside:

@@ -184,7 +184,7 @@ def smallest_delay(one: Judged, block_s: float) -> tuple[Power, str]:
 
 def late_neighbour(spell: Spell, wheel: str, late: Mapping[str, Sequence[Finding]], width: int) -> bool:
     """Whether what looks like a scale lies, for the most part, where another wheel's speed comes late: beside that one it differs, too."""
-    if spell.own or not (spell.mode.scaled or spell.mode is FaultMode.OUTSIDE_TABLE):
+    if spell.own or not spell.unspecific:
         return False
     start, stop = spell.start * width, spell.stop * width
     return any(
