@@ -28,7 +28,7 @@ from diagnosis.results.assessment import CODE
 from diagnosis.results.clearing import Checked, clearing_rows
 from diagnosis.results.detectability import Detectability, detectability_table
 from diagnosis.results.document import SCHEMA, CoverageRow, MachineRow, ReportDocument
-from diagnosis.results.event_times import event_rows
+from diagnosis.results.event_rows import event_rows
 from diagnosis.results.loss import loss_rows
 from diagnosis.results.machine_event import GYRO_OTHERWISE, MachineEvent
 from diagnosis.results.result import FaultInterval, to_json

@@ -14,6 +14,7 @@ from diagnosis.api.series import Curve, Series, Span
 from diagnosis.report.plot_data import worst
 from diagnosis.report.rows import Row
 from diagnosis.results.document import IntervalRow
+from replay.arrays.runs import runs_of
 from replay.faults import State
 
 if TYPE_CHECKING:
@@ -134,9 +135,8 @@ def _outline(low: Curve, high: Curve) -> tuple[NDArray[np.float64], NDArray[np.f
     """Closed outlines between two curves, one for each stretch without a gap, divided by NaN."""
     below = low.y if len(low.t) == len(high.t) else np.interp(high.t, low.t, low.y)
     known = np.isfinite(below) & np.isfinite(high.y)
-    edges = np.flatnonzero(np.diff(known, prepend=False, append=False))
     x, y = [np.empty(0)], [np.empty(0)]
-    for a, b in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
+    for a, b in runs_of(known):
         x += [high.t[a:b], high.t[a:b][::-1], np.array([np.nan])]
         y += [high.y[a:b], below[a:b][::-1], np.array([np.nan])]
     return np.concatenate(x), np.concatenate(y)

@@ -12,6 +12,7 @@ from diagnosis.channels.liveness import alive, alive_sources
 from diagnosis.results.assessment import CODE, Assessment, Finding
 from diagnosis.results.result import Epsilon, Hypothesis
 from diagnosis.results.vocabulary import Tier
+from replay.arrays.runs import runs_of
 from replay.faults import FaultMode, Side, State
 from replay.signals.timeline import Timeline
 
@@ -90,8 +91,7 @@ def _long_gaps(known: Flags, dt: float) -> list[Span]:
         return []
     missing = ~known
     missing[: int(np.argmax(known))] = False  # what has not begun yet may be late
-    edges = np.flatnonzero(np.diff(np.r_[False, missing, False].astype(np.int8)))
-    return [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True) if (b - a) * dt >= _LEAST_S]
+    return [(a, b) for a, b in runs_of(missing) if (b - a) * dt >= _LEAST_S]
 
 
 def with_silence(assessment: Assessment, spans: Sequence[Span], name: str, dt: float) -> Assessment:

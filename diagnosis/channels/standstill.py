@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from diagnosis.evidence import MissionView
 from replay.arrays.numeric import without_nan
+from replay.arrays.runs import runs_of
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -103,9 +104,8 @@ def stood_still(
     """
     still = np.logical_and.reduce([np.abs(np.nan_to_num(y, nan=np.inf)) <= STILL * driving_speed for y in speeds])
     asked = [np.abs(without_nan(c)) > _ASKED * driving_speed for c in commands]
-    edge = np.flatnonzero(np.diff(np.r_[False, still, False].astype(np.int8)))
     out: list[Span] = []
-    for start, stop in zip(edge[::2].tolist(), edge[1::2].tolist(), strict=True):
+    for start, stop in runs_of(still):
         wanted = [a[start:stop] for a in asked]
         first = np.flatnonzero(np.logical_or.reduce(wanted))
         if first.size and first.size * dt >= _LEAST_S and all(w.any() for w in wanted):

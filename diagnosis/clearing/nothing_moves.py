@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 from diagnosis.clearing.cells import Array, Cells
 from diagnosis.clearing.measure import lowest_passed
 from diagnosis.results.machine_event import MachineEvent, not_following
+from diagnosis.results.said import Said, Stated
+from replay.arrays.runs import runs_of
 
 Flags = NDArray[np.bool_]
 
@@ -124,18 +126,16 @@ def _needs(opening: Array) -> float:
 
 def _lasting(flags: Flags, least: int) -> Flags:
     """Those that stand in stretches of at least so many cells."""
-    edges = np.flatnonzero(np.diff(np.r_[False, flags, False].astype(np.int8)))
     out = np.zeros(flags.size, np.bool_)
-    for a, b in zip(edges[::2], edges[1::2], strict=True):
+    for a, b in runs_of(flags):
         out[a:b] = b - a >= least
     return out
 
 
 def _mostly(flags: Flags, other: Flags, most: float) -> Flags:
     """Stretches for more than a share of which something else holds as well."""
-    edges = np.flatnonzero(np.diff(np.r_[False, flags, False].astype(np.int8)))
     out = np.zeros(flags.size, np.bool_)
-    for a, b in zip(edges[::2], edges[1::2], strict=True):
+    for a, b in runs_of(flags):
         out[a:b] = np.mean(other[a:b]) > most
     return out
 
@@ -154,11 +154,11 @@ def supply_gone(cells: Cells) -> MachineEvent | None:
     still = nothing_moves(cells)
     if not still.any():
         return None
-    edges = np.flatnonzero(np.diff(np.r_[False, still, False].astype(np.int8))) * cells.dt
-    spells = [f"{a:.1f}–{b:.1f} s" for a, b in zip(edges[::2], edges[1::2], strict=True)]
+    spans = tuple((a * cells.dt, b * cells.dt) for a, b in runs_of(still))
+    spells = [str(Stated.of(*span)) for span in spans]
     when = ", ".join(spells[:3]) + (f" and {len(spells) - 3} more times" if len(spells) > 3 else "")
-    found = not_following(
+    text = (
         f"No {{wheel}} moved at {when} although most {{valve}}s were commanded to open, or every steered axle to turn: what supplies them all "
         "had stopped, as an engine that stalls does; no part is blamed for that time."
     )
-    return found.at([*zip(edges[::2], edges[1::2], strict=True)])
+    return Said(text, spans).event(not_following)

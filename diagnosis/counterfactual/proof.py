@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from diagnosis.counterfactual.abduct import Abducted
 from diagnosis.counterfactual.document import ProofRow, SpanRow
+from replay.arrays.runs import runs_of
 from replay.control.loop import Replay
 from replay.control.lyapunov import ProofConstants, ProofTerms, proof_terms
 from replay.machine.config import Machine
@@ -62,7 +63,6 @@ def _most(x: Array) -> float | None:
 
 def _spans(flag: Flags, dt: float) -> list[SpanRow]:
     """Stretches of at least a tenth of a second, the longest where there are very many."""
-    edges = np.flatnonzero(np.diff(np.concatenate(([False], flag, [False])).astype(np.int8)))
-    spans = [(float(a) * dt, float(b) * dt) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+    spans = [(a * dt, b * dt) for a, b in runs_of(flag)]
     long = sorted((s for s in spans if s[1] - s[0] >= _LEAST_S), key=lambda s: s[0] - s[1])[:_MOST_SPANS]
     return [{"start_s": a, "stop_s": b} for a, b in sorted(long)]

@@ -26,6 +26,8 @@ from diagnosis.results.machine_event import (
     not_at_rest,
     other_response,
 )
+from diagnosis.results.said import Said, Stated
+from replay.arrays.runs import runs_of
 
 Flags = NDArray[np.bool_]
 
@@ -129,45 +131,50 @@ def _beside_commands(cells: Cells) -> Iterator[MachineEvent]:
         use = (asked > _MOVES * usual) & (np.abs(asked - before) < _SETTLED * usual)
     use &= ~_stated(cells)  # a wheel that has failed is dragged along by the others, or drags them
     course, counts = _course(cells, v, asked, use), _counts(cells)
-    text = course.changes("what they are told", _NEARLY * counts, _MANY)
-    if not text and course.mostly(counts, counts):
-        text = f"{course.usual:.2f} times what they are told throughout"
-    text = text or _falls_behind(course, counts)
-    if text:
-        yield less_than_told(f"All {{wheels}} together make {text}")
+    found = course.changes("what they are told", _NEARLY * counts, _MANY)
+    if found is None and course.mostly(counts, counts):
+        found = Said(f"{course.usual:.2f} times what they are told throughout")
+    found = found or _falls_behind(course, counts)
+    if found is not None:
+        yield found._replace(text=f"All {{wheels}} together make {found.text}").event(less_than_told)
 
 
 def _beside_openings(cells: Cells) -> Iterator[MachineEvent]:
     """All wheels make another speed of the same openings from some moment on, or for a while."""
     found, spell, least = common_change(cells, _GEAR), common_spell(cells), _NEARLY * _counts(cells)
     if found is not None and abs(found[0]) >= _counts(cells):
-        yield other_response(
-            f"From about {found[1]:.0f} s on all {{wheels}} together make {np.exp(found[0]):.2f} times the speed of the same {{valve}} openings that they "
+        since = Stated.of(found[1], digits=0)
+        text = (
+            f"From about {since.start} s on all {{wheels}} together make {np.exp(found[0]):.2f} times the speed of the same {{valve}} openings that they "
             "made before, where they are driven alike"
         )
+        yield Said(text, (since.span,)).event(other_response)
     elif spell is not None and least <= abs(spell[0]) <= _GEAR:
-        yield other_response(
-            f"At about {spell[1]:.0f}–{spell[2]:.0f} s all {{wheels}} together make {np.exp(spell[0]):.2f} times the speed of the same {{valve}} openings "
+        when = Stated.of(*spell[1:], digits=0)
+        text = (
+            f"At about {when} all {{wheels}} together make {np.exp(spell[0]):.2f} times the speed of the same {{valve}} openings "
             "that they make else at such speeds"
         )
+        yield Said(text, (when.span,)).event(other_response)
 
 
-def _falls_behind(course: Course, counts: float) -> str:
-    """How much of their commands all wheels make for a while or again and again, and when; empty where that is what they usually make."""
+def _falls_behind(course: Course, counts: float) -> Said | None:
+    """How much of their commands all wheels make for a while or again and again, and when; None where that is what they usually make."""
     if not np.isfinite(course.usual):
-        return ""
+        return None
     at = np.flatnonzero(np.isfinite(course.share))
     behind = course.log[at] - np.log(max(course.usual, FLOOR)) <= -_NEARLY * counts
     spell = course.longest(behind, _BEHIND_S)
     hop = course.cells.frame.hop * course.cells.dt
     if spell is not None:
         first, last = int(at[spell[0]]), int(at[spell[1] - 1]) + 1
-        inside, (start, stop) = float(np.median(course.share[at[slice(*spell)]])), course.span(first, last)
-        return f"{inside:.2f} times what they are told at {start:.0f}–{stop:.0f} s, and {course.usual:.2f} times else"
+        inside, when = float(np.median(course.share[at[slice(*spell)]])), Stated.of(*course.span(first, last), digits=0)
+        return Said(f"{inside:.2f} times what they are told at {when}, and {course.usual:.2f} times else", (when.span,))
     if np.count_nonzero(behind) * hop < _AGAIN_S:
-        return ""
+        return None
     inside = float(np.median(course.share[at[behind]]))
-    return f"{inside:.2f} times what they are told again and again, for {np.count_nonzero(behind) * hop:.0f} s in all, and {course.usual:.2f} times else"
+    text = f"{inside:.2f} times what they are told again and again, for {np.count_nonzero(behind) * hop:.0f} s in all, and {course.usual:.2f} times else"
+    return Said(text, tuple(course.span(int(at[a]), int(at[b - 1]) + 1) for a, b in runs_of(behind)))
 
 
 def _beyond_the_top(cells: Cells) -> Iterator[MachineEvent]:
@@ -195,14 +202,15 @@ def _at_rest(cells: Cells) -> Iterator[MachineEvent]:
         moves = np.isfinite(v) & (np.where(np.isfinite(speeds), np.abs(speeds), np.inf).min(axis=1) > _CREEPS * top)
     before = round(_SETTLES_S / cells.dt)
     settled = np.lib.stride_tricks.sliding_window_view(np.pad(stands, (before, 0)), before + 1).all(axis=1)
-    edges = np.flatnonzero(np.diff(np.r_[False, settled & moves, False].astype(np.int8)))
-    spells = [(a, b) for a, b in zip(edges[::2], edges[1::2], strict=True) if (b - a) * cells.dt >= _CREEPS_S]
+    spells = [(a, b) for a, b in runs_of(settled & moves) if (b - a) * cells.dt >= _CREEPS_S]
     if spells:
         a, b = max(spells, key=lambda s: s[1] - s[0])
-        yield not_at_rest(
-            f"All {{wheels}} read about {float(np.nanmedian(v[a:b])):.2g} {{speed_unit}} at {a * cells.dt:.1f}–{b * cells.dt:.1f} s, while they are told to "
+        when = Stated.of(a * cells.dt, b * cells.dt)
+        text = (
+            f"All {{wheels}} read about {float(np.nanmedian(v[a:b])):.2g} {{speed_unit}} at {when}, while they are told to "
             "stand and no {valve} is open"
         )
+        yield Said(text, (when.span,)).event(not_at_rest)
 
 
 def _beside_body(cells: Cells) -> Iterator[MachineEvent]:
@@ -213,34 +221,42 @@ def _beside_body(cells: Cells) -> Iterator[MachineEvent]:
         use = (v > _MOVES * usual) & (near >= np.isfinite(speeds).sum(axis=1) / 2)
     counts = _counts(cells)
     for body in bodies(cells):
-        if held := _held(cells, body.speed, speeds, usual):
-            yield body_otherwise(f"By {body.name} the machine goes {held}")
-            return
-        course = _course(cells, np.abs(body.speed), v, use)
-        text = course.changes("as fast as by its {wheels}", counts, _MANY)
-        spell = course.longest(np.abs(np.nan_to_num(course.log - np.log(max(course.usual, FLOOR)))) >= counts, _SPELL_S)
-        if not text and spell is not None:
-            inside, (start, stop) = float(np.nanmedian(course.share[slice(*spell)])), course.span(*spell)
-            text = f"{inside:.2f} times as fast as by its {{wheels}} at {start:.0f}–{stop:.0f} s, and {course.usual:.2f} times else"
-        if text:
-            yield body_otherwise(f"By {body.name} the machine goes {text}")
+        found = _held(cells, body.speed, speeds, usual) or _contradicts(
+            _course(cells, np.abs(body.speed), v, use), counts
+        )
+        if found is not None:
+            yield found._replace(text=f"By {body.name} the machine goes {found.text}").event(body_otherwise)
             return
 
 
-def _held(cells: Cells, speed: Array, wheels: Array, usual: float) -> str:
-    """That a body's speed (cells,) stays at one value, and for how long, while all wheels (cells, wheels) speed up or slow down by much; else empty."""
+def _contradicts(course: Course, counts: float) -> Said | None:
+    """How fast the machine goes by a sensor of the body, and when, where that is another share of its wheels' speed by `counts` [ln]; else None."""
+    found = course.changes("as fast as by its {wheels}", counts, _MANY)
+    if found is not None:
+        return found
+    spell = course.longest(np.abs(np.nan_to_num(course.log - np.log(max(course.usual, FLOOR)))) >= counts, _SPELL_S)
+    if spell is None:
+        return None
+    inside, when = float(np.nanmedian(course.share[slice(*spell)])), Stated.of(*course.span(*spell), digits=0)
+    return Said(
+        f"{inside:.2f} times as fast as by its {{wheels}} at {when}, and {course.usual:.2f} times else", (when.span,)
+    )
+
+
+def _held(cells: Cells, speed: Array, wheels: Array, usual: float) -> Said | None:
+    """That a body's speed (cells,) stays at one value, and for how long, while all wheels (cells, wheels) speed up or slow down by much; else None."""
     with np.errstate(invalid="ignore"):
         same = np.abs(np.diff(speed)) <= _SAME * usual
-    edges = np.flatnonzero(np.diff(np.r_[False, same, False].astype(np.int8)))
-    for a, b in zip(edges[::2], edges[1::2], strict=True):
+    for a, b in runs_of(same):
         part = np.abs(wheels[a : b + 1])
         known = np.isfinite(part).any(axis=0)
         if (b - a) * cells.dt < _SPELL_S or np.count_nonzero(known) <= wheels.shape[1] / 2:
             continue
         if float(np.min(np.nanmax(part[:, known], axis=0) - np.nanmin(part[:, known], axis=0))) > _VARIES * usual:
-            at = f"{a * cells.dt:.0f}–{(b + 1) * cells.dt:.0f} s"
-            return f"at {abs(float(speed[a])):.2f} m/s at {at} to the last digit, while all its {{wheels}} speed up and slow down"
-    return ""
+            when = Stated.of(a * cells.dt, (b + 1) * cells.dt, digits=0)
+            text = f"at {abs(float(speed[a])):.2f} m/s at {when} to the last digit, while all its {{wheels}} speed up and slow down"
+            return Said(text, (when.span,))
+    return None
 
 
 def _beside_gyro(cells: Cells) -> Iterator[MachineEvent]:
@@ -254,26 +270,26 @@ def _beside_gyro(cells: Cells) -> Iterator[MachineEvent]:
     power = frame.sums(x * x)
     turns = power >= (_TURNS * _usual(np.abs(x))) ** 2 * min(frame.length, frame.cells)
     course = Course(np.where(turns, frame.sums(x * y) / np.where(turns, power, 1.0), np.nan), cells)
-    text = _turns_otherwise(course, _counts(cells))
-    if text:
-        yield gyro_otherwise(f"By the gyro (imu.yaw_rate) the machine {text}")
+    found = _turns_otherwise(course, _counts(cells))
+    if found is not None:
+        yield found._replace(text=f"By the gyro (imu.yaw_rate) the machine {found.text}").event(gyro_otherwise)
 
 
-def _turns_otherwise(course: Course, counts: float) -> str:
-    """How the machine turns by the gyro, and when, where that is another share by `counts` [ln]; empty where it is not."""
+def _turns_otherwise(course: Course, counts: float) -> Said | None:
+    """How the machine turns by the gyro, and when, where that is another share by `counts` [ln]; None where it is not."""
     what, share, usual = "as fast as steering angles and {wheel} speeds make it", course.share, course.usual
     if course.mostly(_FEW_CHANGE * counts, counts):
-        return f"{_turning(usual)} {what} throughout"
+        return Said(f"{_turning(usual)} {what} throughout")
     deaf, wild = (
         course.longest(flags, _DEAF_S)
         for flags in (np.nan_to_num(share, nan=1.0) < _DEAF, np.nan_to_num(share) > _WILD)
     )
     spell = deaf or wild
     if spell is not None:
-        start, stop = course.span(*spell)
-        return f"{_turning(float(np.median(share[slice(*spell)])))} {what} at {start:.0f}–{stop:.0f} s"
+        when = Stated.of(*course.span(*spell), digits=0)
+        return Said(f"{_turning(float(np.median(share[slice(*spell)])))} {what} at {when}", (when.span,))
     found = course.changes(what, counts, _MANY) or course.changes(what, _FEW_CHANGE * counts, FEW)
-    return found and f"turns {found}"
+    return None if found is None else found._replace(text=f"turns {found.text}")
 
 
 def _turning(share: float) -> str:

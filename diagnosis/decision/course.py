@@ -8,6 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.clearing.cells import Array, Cells
+from diagnosis.results.said import Said, Stated
+from replay.arrays.runs import runs_of
 
 Flags = NDArray[np.bool_]
 
@@ -50,14 +52,14 @@ class Course(NamedTuple):
         low, median, high = np.log(np.maximum(np.quantile(known, (*_NEARLY_ALL, 0.5)), FLOOR))[[0, 2, 1]]
         return bool(abs(median) >= middle and (high <= -counts or low >= counts))
 
-    def changes(self, what: str, counts: float, least: int) -> str:
+    def changes(self, what: str, counts: float, least: int) -> Said | None:
         """From when on its median is another one by `counts` [ln], as "0.98 times `what` up to 40 s, and 0.6 times from 43 s on".
 
-        Empty where it is not, or where fewer than `least` windows are known before and after.
+        None where it is not, or where fewer than `least` windows are known before and after.
         """
         at = np.flatnonzero(np.isfinite(self.share))
         if at.size < 2 * least:
-            return ""
+            return None
         x, n = self.log[at], at.size
 
         def left(k: int) -> float:
@@ -69,11 +71,15 @@ class Course(NamedTuple):
         k = min(range(max(least, k - step + 1), min(n - least, k + step - 1) + 1), key=left)
         one, other = float(np.median(x[:k])), float(np.median(x[k:]))
         if abs(one - other) < counts:
-            return ""
+            return None
         last, first = self.span(int(at[k - 1]), int(at[k - 1]) + 1)[1], self.span(int(at[k]), n)[0]
         middle = (last + first) / 2
         last, first = min(last, middle), max(first, middle)
-        return f"{np.exp(one):.2f} times {what} up to {last:.0f} s, and {np.exp(other):.2f} times from {first:.0f} s on"
+        since = Stated.of(first, digits=0)
+        text = (
+            f"{np.exp(one):.2f} times {what} up to {last:.0f} s, and {np.exp(other):.2f} times from {since.start} s on"
+        )
+        return Said(text, (since.span,))
 
     def span(self, first: int, last: int) -> tuple[float, float]:
         """Time of windows [first, last) [s]."""
@@ -82,7 +88,5 @@ class Course(NamedTuple):
 
     def longest(self, flags: Flags, least_s: float) -> tuple[int, int] | None:
         """First window of the longest run of `flags`, shape (windows,), and the one behind it; None where none is as long as `least_s` [s]."""
-        edges = np.flatnonzero(np.diff(np.r_[False, flags, False].astype(np.int8)))
-        runs = zip(edges[::2], edges[1::2], strict=True)
-        first, last = max(runs, key=lambda r: r[1] - r[0], default=(0, 0))
-        return (int(first), int(last)) if (last - first) * self.cells.frame.hop * self.cells.dt >= least_s else None
+        first, last = max(runs_of(flags), key=lambda r: r[1] - r[0], default=(0, 0))
+        return (first, last) if (last - first) * self.cells.frame.hop * self.cells.dt >= least_s else None

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from diagnosis.decision.second_onsets import steps_between
 from diagnosis.results.assessment import Assessment, Finding
 from diagnosis.results.vocabulary import Tier
+from replay.arrays.runs import runs_of
 
 Part = tuple[str, str]
 
@@ -69,8 +70,7 @@ def _begins(f: Finding, a: Assessment, before: int, dt: float) -> int:
 
 def _stretch(at: NDArray[np.intp], beyond: NDArray[np.bool_], onset: int, dt: float) -> int:
     """Where the stretch begins that lasts at an onset; readings at steps `at`, of which `beyond` pass the threshold."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], beyond.astype(np.int8), [0]])))
-    runs = [(int(at[i]), int(at[j - 1])) for i, j in zip(edges[::2], edges[1::2], strict=True) if j - i >= _ON_END]
+    runs = [(int(at[i]), int(at[j - 1])) for i, j in runs_of(beyond) if j - i >= _ON_END]
     start, begin = onset, None
     for a, b in reversed(runs):
         if begin is None:

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from diagnosis.results.sizes import turn
 from replay.arrays.blocks import release
+from replay.arrays.runs import runs_of
 from replay.machine.config import Machine
 from replay.signals.timeline import Timeline
 
@@ -35,9 +36,9 @@ def offset_at_rest(timeline: Timeline, machine: Machine) -> str:
     asked = [n for n in ("cmd.v", "cmd.omega", *(f"wheel.{w}.v_ref" for w in machine.wheels)) if n in timeline.signals]
     moves, rate = _cells(timeline, (*speeds, *asked), _STANDS * machine.max_speed)
     rests = []
-    edges = np.flatnonzero(np.diff(np.r_[True, moves, True].astype(np.int8)))
-    for start, stop in zip(edges[::2] + _AROUND, edges[1::2] - _AROUND, strict=False):
-        part = rate[start:stop][np.isfinite(rate[start:stop])]
+    for start, stop in runs_of(~moves):
+        part = rate[start + _AROUND : stop - _AROUND]
+        part = part[np.isfinite(part)]
         if part.size * _CELL_S >= _REST_S and np.std(part) < _SWAYS:
             error = float(np.std(part)) / np.sqrt(part.size)
             rests.append((float(np.mean(part)), error))

@@ -18,6 +18,7 @@ from diagnosis.channels.sample_status import PAIR
 from diagnosis.direct.identification import IdentifiedPair
 from diagnosis.results.assessment import CODE, Assessment, Finding
 from replay.arrays.numeric import without_nan
+from replay.arrays.runs import runs_of
 from replay.faults import State
 
 Array = NDArray[np.float64]
@@ -83,8 +84,7 @@ def _passages(off: Array, speed: Array, sound: NDArray[np.bool_], low: float) ->
 
     Of sound ones alone.
     """
-    edge = np.flatnonzero(np.diff(np.r_[False, speed < low, False].astype(np.int8)))
-    spans = [(a, b) for a, b in zip(edge[::2], edge[1::2], strict=True) if a > 0 or b < speed.size]
+    spans = [(a, b) for a, b in runs_of(speed < low) if a > 0 or b < speed.size]
     near = [(a, b) for a, b in spans if speed[a:b].min() < _SLOWEST * low and sound[a:b].all()]
     moves = speed > _SLOWEST * low
     return np.array(

@@ -21,6 +21,7 @@ from diagnosis.direct.low_speed import left_open
 from diagnosis.estimation.lag import low_passed
 from diagnosis.results.assessment import Assessment, Finding
 from replay.arrays.numeric import without_nan
+from replay.arrays.runs import runs_of
 
 Array = NDArray[np.float64]
 
@@ -145,12 +146,7 @@ def _usual(findings: Sequence[Finding], cells: _Cells, dt: float) -> list[_Left]
     taken = np.zeros(cells.sensor.size, np.bool_)
     for f in findings:
         taken[f.start // cells.width : -(-f.stop // cells.width)] = True
-    edges = np.flatnonzero(np.diff(np.r_[True, taken, True].astype(np.int8)))
-    windows = (
-        w
-        for a, b in zip(edges[::2], edges[1::2], strict=True)
-        for w in _windows(int(a) * cells.width, int(b) * cells.width, cells.width, dt)
-    )
+    windows = (w for a, b in runs_of(~taken) for w in _windows(a * cells.width, b * cells.width, cells.width, dt))
     return [left for w in windows if (left := _left(w, cells)) is not None]
 
 

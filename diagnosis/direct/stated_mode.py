@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from diagnosis.direct.identification import IdentifiedPair
 from diagnosis.direct.isolation import ZERO, Isolated, RunSamples
 from diagnosis.results.fault_rows import ROWS
+from replay.arrays.runs import runs_of
 from replay.faults import FaultMode, Side
 from replay.machine.config import Limits
 
@@ -115,5 +116,4 @@ def _left_behind(seen: RunSamples, found: IdentifiedPair) -> bool:
 
 def _longest(there: Flags) -> int:
     """Length of the longest stretch."""
-    edge = np.flatnonzero(np.diff(np.r_[False, there, False].astype(np.int8)))
-    return int(np.max(edge[1::2] - edge[::2], initial=0))
+    return max((b - a for a, b in runs_of(there)), default=0)

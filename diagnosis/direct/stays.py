@@ -15,6 +15,7 @@ from diagnosis.channels.sample_status import PAIR
 from diagnosis.direct.identification import IdentifiedPair
 from diagnosis.direct.low_speed import left_open
 from diagnosis.results.assessment import Assessment, Finding
+from replay.arrays.runs import runs_of
 from replay.arrays.sliding import largest_within, smallest_within
 from replay.faults import FaultMode
 
@@ -72,8 +73,7 @@ def _stays(one: IdentifiedPair) -> Sequence[tuple[int, int, float]]:
     width, span = max(2, round(_STAYS_S / one.pair.dt)), one.pair.span
     still = max(_STILL * span, _NOISES * one.model.noise)
     flags = (status == PAIR) & (_range(y, width) <= still) & (_range(x, width) >= max(_MOVES * span, still))
-    edges = np.flatnonzero(np.diff(np.r_[False, flags, False].astype(np.int8)))
-    stretches = [(int(a) - width // 2, int(b) + width // 2) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+    stretches = [(a - width // 2, b + width // 2) for a, b in runs_of(flags)]
     return [
         (max(0, a), b, _size(one, max(0, a), min(b, y.size)))
         for a, b in stretches

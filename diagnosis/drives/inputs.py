@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.channels.liveness import alive, alive_sources
+from replay.arrays.runs import runs_of
 from replay.machine.config import Machine, Noise
 from replay.machine.drive_model import DriveModel
 from replay.signals.timeline import Timeline
@@ -125,5 +126,4 @@ def drive_data(
 
 def stretches(valid: NDArray[np.bool_], least: int) -> list[slice]:
     """Stretches of valid samples that are at least `least` long. `valid` of shape (n,)."""
-    edge = np.flatnonzero(np.diff(np.r_[False, valid, False].astype(np.int8)))
-    return [slice(int(a), int(b)) for a, b in zip(edge[::2], edge[1::2], strict=True) if b - a >= least]
+    return [slice(a, b) for a, b in runs_of(valid) if b - a >= least]

@@ -17,6 +17,7 @@ from diagnosis.results.assessment import Finding
 from diagnosis.results.result import Epsilon, Hypothesis, Sat
 from diagnosis.results.sentence import About, Sentence
 from diagnosis.results.vocabulary import Tier
+from replay.arrays.runs import runs_of
 from replay.faults import FaultMode, Side, State
 from replay.machine.config import Limits
 
@@ -146,10 +147,9 @@ def load_findings(data: DriveData, load: LoadTrack, between: float, limits: Limi
 def load_stretches(load: LoadTrack, between: float, limits: Limits, dt: float) -> list[LoadStretch]:
     """Stretches of extra load that are findings; parameters are those of `load_findings`, `dt` the distance of samples [s]."""
     sure = np.nan_to_num(load.probability) >= limits.min_probability
-    edge = np.flatnonzero(np.diff(np.r_[False, sure, False].astype(np.int8)))
     out = []
-    for a, b in zip(edge[::2], edge[1::2], strict=True):
-        stretch = LoadStretch.of(load, int(a), int(b), dt)
+    for a, b in runs_of(sure):
+        stretch = LoadStretch.of(load, a, b, dt)
         if (
             stretch.epsilon.value >= limits.min_epsilon
             and stretch.seconds >= _LEAST_S

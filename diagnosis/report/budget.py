@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from diagnosis.report.encode import Channel, Plan, plan_of, reduced, resolution_of, whole, with_pieces
 from diagnosis.results.result import Closeups
 from replay.arrays.processors import each
+from replay.arrays.runs import runs_of
 
 Values = NDArray[np.floating]
 Spans = list[tuple[int, int]]
@@ -86,9 +87,7 @@ class Encodable:
         rows = self.columns[column]
         at = np.minimum((start + np.arange(len(values))) // self.per * 2, len(rows) - 1)
         known = np.isfinite(values) | ~np.isfinite(rows[at])
-        edges = np.flatnonzero(np.diff(np.r_[False, known, False]))
-        parts = zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True)
-        return [(start + a, values[a:b]) for a, b in parts]
+        return [(start + a, values[a:b]) for a, b in runs_of(known)]
 
 
 def spans_of(faults: Iterable[tuple[float, float]], pad_s: float, whole_s: float, step_s: float, samples: int) -> Spans:

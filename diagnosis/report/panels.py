@@ -14,6 +14,7 @@ from diagnosis.report.edges import Edge, time_words
 from diagnosis.report.rows import Columns, Row
 from diagnosis.report.thumbnail import extremes
 from diagnosis.results.document import IntervalRow
+from replay.arrays.runs import runs_of
 
 Array = NDArray[np.float64]
 
@@ -169,9 +170,8 @@ def _curve(t: Array, low: Array, high: Array, frame: Frame, style: str) -> Marku
 
 def _band(t: Array, half: Array, frame: Frame) -> Markup:
     """Area within the threshold, in one piece for each stretch of time that has one."""
-    edges = np.flatnonzero(np.diff(np.r_[False, np.isfinite(half), False].astype(np.int8)))
     out = []
-    for a, b in zip(edges[::2], edges[1::2], strict=True):
+    for a, b in runs_of(np.isfinite(half)):
         x, top, low = (v.tolist() for v in (frame.px(t[a:b]), frame.py(half[a:b]), frame.py(-half[a:b])))
         upper = "L".join(f"{p:.1f} {q:.1f}" for p, q in zip(x, top, strict=True))
         lower = "L".join(f"{p:.1f} {q:.1f}" for p, q in zip(x[::-1], low[::-1], strict=True))

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +16,7 @@ from diagnosis.response.encoder_scale_words import by_the_gyro, told
 from diagnosis.response.gyro import wrong_gyro
 from diagnosis.response.inputs import FollowerData
 from diagnosis.response.joint_gain import told_gain
-from diagnosis.response.machine import paused, pauses, standstills, unexplained
+from diagnosis.response.machine import paused, standstills, unexplained
 from diagnosis.response.reversed_sign import reversed_spans, told_reversed
 from diagnosis.response.scene import Drives, Given, drives_of, scene_of
 from diagnosis.response.share_findings import told_share
@@ -24,6 +24,7 @@ from diagnosis.response.turning import track_of, wrong_yaw_rate
 from diagnosis.response.weighed import settled, weighed
 from diagnosis.response.witness import witnessed
 from diagnosis.results.assessment import Assessment
+from diagnosis.results.said import Said
 from replay.machine.config import Limits
 from replay.machine.geometry import Geometry
 
@@ -32,19 +33,18 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Judgement:
-    """Both sides of each wheel that could be judged, and what happened to the machine as a whole, to its gyro, to all speeds and to those of one side, a sentence each.
+    """Both sides of each wheel that could be judged, and what happened to the machine as a whole, to its gyro, to all speeds and to those of one side.
 
-    `when` has the times of what happened to the machine, by its sentence [s]; `apart` says which wheels read another share of the motion than the others, or nothing, all through; `unrelated` says that speeds and commands are of sizes that nothing relates.
+    `apart` says which wheels read another share of the motion than the others, or nothing, all through; `unrelated` says that speeds and commands are of sizes that nothing relates.
     """
 
     parts: Mapping[str, tuple[Assessment, Assessment]]
-    events: tuple[str, ...]
-    gyro: tuple[str, ...] = ()
-    unshown: tuple[str, ...] = ()
+    events: tuple[Said, ...]
+    gyro: tuple[Said, ...] = ()
+    unshown: tuple[Said, ...] = ()
     unrelated: tuple[str, ...] = ()
-    scaled: tuple[str, ...] = ()
+    scaled: tuple[Said, ...] = ()
     apart: tuple[str, ...] = ()
-    when: Mapping[str, Sequence[tuple[float, float]]] = field(default_factory=dict)
 
 
 def assess_response(
@@ -98,7 +98,7 @@ def assess_response(
     }
     ignored = () if any(j.response.answered for j in judged.values()) else _unexplained(drives, given)
     ignored, said = witnessed(ignored, drives.witness, drives.seen, drives.all, speeds, (width, limits, dt))
-    stood, when = _stood(drives, parts, dt)
+    stood = _stood(drives, parts, dt)
     other_sign = reversed_spans(judged, block_s)
     for w, both in parts.items():
         both = told_reversed(told_share(both, judged[w]), judged[w], other_sign.get(w, []))
@@ -106,33 +106,28 @@ def assess_response(
     return Judgement(
         parts,
         events=(*stood, *(sides.astray if sides.lasts else ())),
-        gyro=tuple(x.text for x in gyro),
+        gyro=tuple(x.said for x in gyro),
         unshown=said,
         unrelated=ignored,
         scaled=told(sought, apart.turning, block_s),
         apart=sides.apart,
-        when=when | dict.fromkeys(sides.astray, sides.elsewhere),
     )
 
 
 def _none_answers(drives: Drives, given: Given) -> Judgement:
     """What can be said where no drive answers enough to be judged."""
-    stood, when = _stood(drives, {}, given.dt)
+    stood = _stood(drives, {}, given.dt)
     ignored = () if stood or drives.seen else _unexplained(drives, given)
     steps = given.width, given.limits, given.dt
     ignored, said = witnessed(ignored, drives.witness, drives.seen, drives.all, given.speeds, steps)
-    return Judgement({}, stood, unshown=said, unrelated=() if stood else ignored, when=when)
+    return Judgement({}, stood, unshown=said, unrelated=() if stood else ignored)
 
 
 def _unexplained(drives: Drives, given: Given) -> tuple[str, ...]:
     return unexplained(drives.all, given.limits, given.dt)
 
 
-def _stood(
-    drives: Drives, parts: Mapping[str, tuple[Assessment, Assessment]], dt: float
-) -> tuple[tuple[str, ...], dict[str, Sequence[tuple[float, float]]]]:
-    """A sentence where the machine stood though it was told to move, or its only drive paused, and when [s]."""
+def _stood(drives: Drives, parts: Mapping[str, tuple[Assessment, Assessment]], dt: float) -> tuple[Said, ...]:
+    """What is said where the machine stood though it was told to move, or its only drive paused."""
     of_one = [f for side in parts.values() for f in side[0].findings] if len(drives.data) == 1 else []
-    stood = standstills(drives.idle, dt) or paused(of_one, dt)
-    rests = drives.idle or [(f.start, f.stop) for f in pauses(of_one)]
-    return stood, {text: [(a * dt, b * dt) for a, b in rests] for text in stood}
+    return standstills(drives.idle, dt) or paused(of_one, dt)

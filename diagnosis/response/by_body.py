@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from diagnosis.response.body import BodySpeed, View, view_of
 from diagnosis.response.inputs import FollowerData, cells
 from diagnosis.response.models import BLOCK_S
+from diagnosis.response.spells import deviations_of
 from diagnosis.response.wheel import SENSOR_SHARE, sensor_finding
 from diagnosis.results.assessment import Finding
 from diagnosis.results.result import Epsilon
@@ -63,20 +64,9 @@ def beside_the_body(data: FollowerData, speeds: Sequence[BodySpeed], dt: float) 
     noise = float(np.median(off[moves])) * np.sqrt(view.reach) + change
     found = (
         _finding(data, view, y, span, dt)
-        for span in _spans(moves & (off > np.maximum(_OFF * noise, _SHARE * np.abs(x))), moves)
+        for span in deviations_of(moves & (off > np.maximum(_OFF * noise, _SHARE * np.abs(x))), moves, _GAP_BLOCKS)
     )
     return tuple(f for f in found if f is not None)
-
-
-def _spans(off: Flags, moves: Flags) -> list[tuple[int, int]]:
-    """Blocks [start, stop) of deviations, interrupted by few in which the body moves and nothing deviates."""
-    out: list[tuple[int, int]] = []
-    for k in np.flatnonzero(off).tolist():
-        if out and np.count_nonzero(moves[out[-1][1] : k]) <= _GAP_BLOCKS:
-            out[-1] = out[-1][0], k + 1
-        else:
-            out.append((k, k + 1))
-    return out
 
 
 def _finding(data: FollowerData, view: View, y: Array, span: tuple[int, int], dt: float) -> Finding | None:

@@ -11,6 +11,7 @@ from diagnosis.response.channel import Samples
 from diagnosis.response.wheel import SENSOR_SHARE, Wheel, sensor_finding
 from diagnosis.results.assessment import Finding
 from diagnosis.results.result import Epsilon
+from replay.arrays.runs import runs_of
 from replay.faults import FaultMode
 
 Array = NDArray[np.float64]
@@ -157,8 +158,7 @@ def broken_off(
     """
     step, value = wheel.samples.step, np.nan_to_num(wheel.samples.value)
     size = np.abs(np.nan_to_num(wheel.samples.change))
-    edge = np.flatnonzero(np.diff(np.r_[False, value == 0.0, False].astype(np.int8)))
-    spans = [(a, b) for a, b in zip(edge[::2].tolist(), edge[1::2].tolist(), strict=True) if a > 0]
+    spans = [(a, b) for a, b in runs_of(value == 0.0) if a > 0]
     goes_on = others if asked is None else (asked,)
     if asked is not None:
         spans = [

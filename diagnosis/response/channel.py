@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from replay.arrays.runs import runs_of
 from replay.arrays.sliding import median_within
 
 Array = NDArray[np.float64]
@@ -110,8 +111,7 @@ def without_holds(y: Array, samples: Samples, dt: float) -> Array:
     """
     out = y.copy()
     held = samples.same & (samples.value != 0.0)
-    edge = np.flatnonzero(np.diff(np.r_[False, held, False].astype(np.int8)))
-    for a, b in zip(edge[::2].tolist(), edge[1::2].tolist(), strict=True):
+    for a, b in runs_of(held):
         first, last = int(samples.step[a]), int(samples.step[b - 1])
         if (last - first) * dt > _LONG_HOLD_S:
             out[first : last + 1] = np.nan

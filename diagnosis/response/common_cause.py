@@ -95,7 +95,7 @@ def unwinds(spell: Spell, wheel: str, judged: Mapping[str, Judged], block_s: flo
     block_s : float
         Length of a block [s].
     """
-    if spell.own or not (spell.mode.scaled or spell.mode is FaultMode.OUTSIDE_TABLE):
+    if spell.own or not spell.unspecific:
         return False
     one, last = judged[wheel], spell.stop * block_s
     return any(

@@ -12,7 +12,6 @@ from diagnosis.response.disputed import disputed
 from diagnosis.response.machine import Judged
 from diagnosis.response.rivals import jumped
 from diagnosis.response.spells import Spell
-from replay.faults import FaultMode
 
 Array = NDArray[np.float64]
 
@@ -37,7 +36,7 @@ def in_company(spell: Spell, wheel: str, judged: Mapping[str, Judged]) -> bool:
         All wheels.
     """
     one = judged[wheel]
-    if one.speed is None or spell.own or not (spell.mode.scaled or spell.mode is FaultMode.OUTSIDE_TABLE):
+    if one.speed is None or spell.own or not spell.unspecific:
         return False
     beside = one.wheel.compared.split(" and ")
     others = [j for w, j in judged.items() if w != wheel and j.data.name in beside]

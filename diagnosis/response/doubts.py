@@ -22,6 +22,7 @@ from diagnosis.response.sides import sides_of
 from diagnosis.response.unlike import contradicting, unlike_in_motion
 from diagnosis.response.weighed import Spells, Weighed
 from diagnosis.results.assessment import Assessment, Reason
+from diagnosis.results.said import Said
 
 Flags = NDArray[np.bool_]
 Parts = dict[str, tuple[Assessment, Assessment]]
@@ -47,20 +48,17 @@ class Sides(NamedTuple):
     ----------
     parts : Parts
         Sensor and drive of each wheel.
-    astray : tuple[str, ...]
-        A sentence where the machine goes elsewhere than it is told to.
+    astray : tuple[Said, ...]
+        What is said where the machine goes elsewhere than it is told to.
     lasts : bool
         Whether that is worth a verdict.
-    elsewhere : Sequence[tuple[float, float]]
-        Its times [s].
     apart : tuple[str, ...]
         Wheels that read another share of the motion than the others, or nothing, all through.
     """
 
     parts: Parts
-    astray: tuple[str, ...]
+    astray: tuple[Said, ...]
     lasts: bool
-    elsewhere: Sequence[tuple[float, float]]
     apart: tuple[str, ...]
 
 
@@ -81,7 +79,7 @@ def sides_of_all(
         parts[w] = doubted(sensor, late + [slice(x.start * width, x.stop * width) for x in nobodys[w]]), drive
     if len(drives.data) == 1:
         parts = {w: (either(a, judged[w], given.moves), b) for w, (a, b) in parts.items()}
-    astray, lasts, elsewhere = otherwise(judged, given.block_s, drives.witness.there)
+    astray, lasts = otherwise(judged, given.block_s, drives.witness.there)
     apart = unlike_in_motion(judged, scene.mates, sideways=scene.sideways)
     none_read = motionless(judged, given.limits.driving_speed, given.block_s)
     doubts = {w: Reason(j.odd) for w, j in judged.items() if j.odd and not any(side.findings for side in parts[w])}
@@ -94,9 +92,9 @@ def sides_of_all(
     parts |= {w: not_moving(*parts[w], why) for w, why in none_read.items()}
     disputed = disputed_steps(judged, given.block_s)
     parts |= {w: (unproved(parts[w][0], one, DISPUTED), parts[w][1]) for w, one in disputed.items()}
-    remarks = (*astray, *scene.notes, *((_TURNED,) if any(weighed.turned.values()) else ()))
+    remarks = (*(x.text for x in astray), *scene.notes, *((_TURNED,) if any(weighed.turned.values()) else ()))
     parts = _with_powers(parts, remarks, weighed.asked, scene, given)
-    return Sides(parts, astray, lasts, elsewhere, contradicting(apart, none_read))
+    return Sides(parts, astray, lasts, contradicting(apart, none_read))
 
 
 def _with_powers(parts: Parts, remarks: Sequence[str], asked: Mapping[str, Flags], scene: Scene, given: Given) -> Parts:

@@ -18,6 +18,7 @@ from diagnosis.results.assessment import Finding
 from diagnosis.results.result import Epsilon, Hypothesis
 from diagnosis.results.sentence import About, Sentence
 from diagnosis.results.vocabulary import Tier
+from replay.arrays.runs import runs_of
 from replay.faults import FaultMode, Side, State
 
 Array = NDArray[np.float64]
@@ -194,9 +195,8 @@ def _runs(
     """
     places = np.flatnonzero(known)
     flags, near = nothing[places], little[places]
-    edge = np.flatnonzero(np.diff(np.r_[False, flags, False].astype(np.int8)))
     out: list[list[int]] = []
-    for a, b in zip(edge[::2].tolist(), edge[1::2].tolist(), strict=True):
+    for a, b in runs_of(flags):
         if out and a - out[-1][1] <= _BRIEF_BLOCKS and near[out[-1][1] : a].all():
             out[-1][1] = b
         else:

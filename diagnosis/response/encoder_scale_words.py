@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
@@ -12,6 +13,7 @@ from diagnosis.response.encoder_scale import LENGTH_S, Scaled, Sought
 from diagnosis.response.machine import Judged
 from diagnosis.response.turning import Turning
 from diagnosis.results.assessment import Assessment
+from diagnosis.results.said import Said, Stated
 
 _END_S = 1.0
 _UNTOLD = (
@@ -21,11 +23,11 @@ _UNTOLD = (
 OTHERWISE = "it keeps to its command, but the gyro shows that one side of the machine goes otherwise than it reads"
 
 
-def told(sought: Sought, turning: Turning | None, block_s: float) -> tuple[str, ...]:
-    """A sentence for each time in which one side goes otherwise than it reads; `block_s` is the length of a block [s]."""
+def told(sought: Sought, turning: Turning | None, block_s: float) -> tuple[Said, ...]:
+    """What is said of each time in which one side goes otherwise than it reads; `block_s` is the length of a block [s]."""
     if turning is None:
         return ()
-    return tuple(sentence_of(x, turning.sides, turning.yaw.size, block_s) for x in sought.found)
+    return tuple(_said(x, turning.sides, turning.yaw.size, block_s) for x in sought.found)
 
 
 def by_the_gyro(
@@ -74,7 +76,7 @@ def by_the_gyro(
     return unproved(sensor, where, OTHERWISE)
 
 
-def sentence_of(one: Scaled, sides: Mapping[str, float], size: int, block_s: float) -> str:
+def _said(one: Scaled, sides: Mapping[str, float], size: int, block_s: float) -> Said:
     """What is said of a time in which one side goes otherwise than it reads.
 
     Parameters
@@ -89,14 +91,17 @@ def sentence_of(one: Scaled, sides: Mapping[str, float], size: int, block_s: flo
         Length of a block [s].
     """
     this, other = (_named([w for w, side in sides.items() if side == s]) for s in (one.side, -one.side))
-    start = "From the start" if one.start * block_s < _END_S else f"From {one.start * block_s:.1f} s"
-    stop = "the end of the log" if (size - one.stop) * block_s < _END_S else f"{one.stop * block_s:.1f} s"
+    at_start, at_end = one.start * block_s < _END_S, (size - one.stop) * block_s < _END_S
+    when = Stated.of(0.0 if at_start else one.start * block_s, math.inf if at_end else one.stop * block_s)
+    start = "From the start" if at_start else f"From {when.start} s"
+    stop = "the end of the log" if at_end else f"{when.stop} s"
     likely = f"{this} went {one.factor:.2f} × as fast as read"
     which = f"{likely} ({other} is less likely)" if one.told else f"{likely}, or {other} {one.rival:.2f} ×"
-    return (
+    text = (
         f"{start} to {stop} the gyro shows that the machine turned as if {which}, while the {{wheels}} kept to their commands: an encoder that is "
         "scaled inside the speed loop that it closes, another tyre, or one that slips; no factor or constant of the gyro itself does that."
     )
+    return Said(text, () if at_start and at_end else (when.span,))
 
 
 def _named(wheels: Sequence[str]) -> str:

@@ -67,13 +67,13 @@ class ResponseEvidence:
                 if spans and side == SENSOR and _is_odometry(machine, wheel):
                     parts[wheel, side] = doubted(part, spans, _TURNS_OTHERWISE)
         events = (
-            *(not_following(text).at(judged.when.get(text, ())) for text in judged.events),
+            *(x.event(not_following) for x in judged.events),
             *map(not_related, judged.unrelated),
-            *map(not_shown, judged.unshown),
-            *map(one_side_otherwise, judged.scaled),
-            *map(gyro_or_slip, judged.gyro),
+            *(x.event(not_shown) for x in judged.unshown),
+            *(x.event(one_side_otherwise) for x in judged.scaled),
+            *(x.event(gyro_or_slip) for x in judged.gyro),
             *wheels_apart(judged.apart),
-            *(turns_otherwise(t.text) for t in turns),
+            *(t.said.event(turns_otherwise) for t in turns),
         )
         return Contribution(parts, events=events)
 

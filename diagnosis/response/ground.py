@@ -17,7 +17,6 @@ from diagnosis.response.inputs import cells
 from diagnosis.response.machine import Judged
 from diagnosis.response.models import Blocks
 from diagnosis.response.spells import Spell
-from replay.faults import FaultMode
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -128,13 +127,7 @@ def by_slip(spell: Spell, wheel: str, judged: Mapping[str, Judged], yaw: Array |
         Measured yaw rate [rad/s].
     """
     one = judged[wheel]
-    if (
-        yaw is None
-        or one.across is None
-        or one.speed is None
-        or spell.own
-        or not (spell.mode.scaled or spell.mode is FaultMode.OUTSIDE_TABLE)
-    ):
+    if yaw is None or one.across is None or one.speed is None or spell.own or not spell.unspecific:
         return False
     apart = one.wheel.blocks.mean - one.across
     outside = np.ones(apart.size, np.bool_)
@@ -202,11 +195,7 @@ def by_drag(spell: Spell, wheel: str, judged: Mapping[str, Judged]) -> bool:
     """
     one = judged[wheel]
     bare = one.speed is None and one.response.answered and not spell.own
-    return (
-        bare
-        and (spell.mode.scaled or spell.mode is FaultMode.OUTSIDE_TABLE)
-        and dragged(slice(spell.start, spell.stop), wheel, judged)
-    )
+    return bare and spell.unspecific and dragged(slice(spell.start, spell.stop), wheel, judged)
 
 
 def dragged(part: slice, wheel: str, judged: Mapping[str, Judged], least: float = _MOSTLY) -> bool:

@@ -16,9 +16,10 @@ from numpy.typing import NDArray
 from diagnosis.response.gyro_turns import against_the_wheels, usual_turns
 from diagnosis.response.heading import agree
 from diagnosis.response.machine import Judged
-from diagnosis.response.spells import Spell
+from diagnosis.response.spells import Spell, deviations_of
 from diagnosis.response.turning import Turning, difference
 from diagnosis.results.machine_event import GYRO_CONSTANT, GYRO_REST, GYRO_SLIP
+from diagnosis.results.said import Said, Stated
 from diagnosis.results.sizes import turn
 
 Array = NDArray[np.float64]
@@ -46,9 +47,9 @@ _NEVER, _TURNED_S = 0.2, 20.0  # of the wheels' yaw rate, over a mission that tu
 
 
 class Contradicted(NamedTuple):
-    """Blocks [start, stop) in which the gyro alone contradicts the wheels, a sentence, and whether nothing but the gyro does that."""
+    """Blocks [start, stop) in which the gyro alone contradicts the wheels, what is said of it, and whether nothing but the gyro does that."""
 
-    text: str
+    said: Said
     start: int
     stop: int
     sure: bool
@@ -107,7 +108,7 @@ def wrong_gyro(
     if found is None:
         speed = np.max([np.abs(j.wheel.blocks.mean) for j in judged.values()], axis=0)[sound]
         texts = _never(apart, turning.yaw, sound, block_s) if _turns(apart[sound], speed) else ()
-        return tuple(Contradicted(text, 0, apart.size, sure=True) for text in texts)
+        return tuple(Contradicted(Said(text), 0, apart.size, sure=True) for text in texts)
     gain, offset, noise = found
     usual = float(np.quantile(np.abs(gain * apart[sound]), 0.9))
     about = _Spread(gain * apart, turning.yaw - offset, usual, noise)
@@ -118,24 +119,25 @@ def wrong_gyro(
     stands = sound & (np.max([np.abs(j.wheel.blocks.mean) for j in judged.values()], axis=0) <= _STANDS * fastest)
     straight = sound & (np.abs(about.made) < _TURNS * usual)  # there a constant is no share of the turn
     found_in: dict[tuple[int, int], str] = {}
-    for start, stop in _spans(off, shows):
+    for start, stop in deviations_of(off, shows, _GAP):
         long = (stop - start) * block_s >= _LEAST_S
         if long and np.mean(off[start:stop][shows[start:stop]]) >= _MOST_OF:
             found_in[start, stop] = _kind(about, slice(start, stop), sound[start:stop], block_s)
-    for start, stop in _spans(off & straight, straight):
+    for start, stop in deviations_of(off & straight, straight, _GAP):
         if not any(start < last and first < stop for (first, last), what in found_in.items() if what):
             found_in[start, stop] = _constant(about, slice(start, stop), (straight, sound, stands), block_s)
     against = against_the_wheels(gain, noise, apart[sound], turning, across)
-    out = [Contradicted(against, 0, apart.size, sure=True)] if against else []
+    out = [Contradicted(Said(against), 0, apart.size, sure=True)] if against else []
     for (start, stop), what in sorted(found_in.items()):
         if heading is not None and agree(turning.yaw - offset, heading, about.made, slice(start, stop)):
             continue
         if what:
             constant = what.endswith(GYRO_CONSTANT)
             rests = bool(np.count_nonzero((stands & off)[start:stop]) * block_s >= _RESTS_S)
-            text = f"From {start * block_s:.1f} to {stop * block_s:.1f} s the gyro (imu.yaw_rate) {what}, by what the rest of the mission shows of the two"
+            when = Stated.of(start * block_s, stop * block_s)
+            text = f"From {when.start} to {when.stop} s the gyro (imu.yaw_rate) {what}, by what the rest of the mission shows of the two"
             text += _OR_SIDE if constant and not rests else f"{GYRO_REST}." if constant else "."
-            out.append(Contradicted(text, start, stop, sure=rests or not constant))
+            out.append(Contradicted(Said(text, (when.span,)), start, stop, sure=rests or not constant))
     return tuple(out)
 
 
@@ -173,17 +175,6 @@ def _only(where: Flags, part: slice) -> Flags:
     """Blocks of a part alone, shape (b,)."""
     out = np.zeros_like(where)
     out[part] = where[part]
-    return out
-
-
-def _spans(off: Flags, shows: Flags) -> list[tuple[int, int]]:
-    """Blocks [start, stop) of deviations, interrupted by few blocks that would show one and do not."""
-    out: list[tuple[int, int]] = []
-    for k in np.flatnonzero(off).tolist():
-        if out and np.count_nonzero(shows[out[-1][1] : k]) <= _GAP:
-            out[-1] = out[-1][0], k + 1
-        else:
-            out.append((k, k + 1))
     return out
 
 

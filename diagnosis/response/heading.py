@@ -12,6 +12,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from diagnosis.response.spells import deviations_of
+from diagnosis.results.said import Said, Stated
 from diagnosis.results.sizes import turn
 from replay.signals.timeline import Timeline
 
@@ -30,11 +32,11 @@ _SLOW_S = 1.0  # between readings of a heading: rarer ones tell no rate
 
 
 class Contradiction(NamedTuple):
-    """Blocks [start, stop) in which gyro and odometry contradict each other, a sentence on it, and whether odometry may be the one that is wrong."""
+    """Blocks [start, stop) in which gyro and odometry contradict each other, what is said of it, and whether odometry may be the one that is wrong."""
 
     start: int
     stop: int
-    text: str
+    said: Said
     odometry: bool = True
 
 
@@ -75,7 +77,7 @@ def contradictions(gyro: Array, odometry: Array, asked: Array | None, block_s: f
     far &= off > _TURNS * usual
     shows = far | (np.abs(made) > _TURNS * usual)
     out: list[Contradiction] = []
-    for start, stop in _spans(far, shows):
+    for start, stop in deviations_of(far, shows, _GAP):
         part = slice(start, stop)
         if (stop - start) * block_s >= _LEAST_S and np.mean(far[part][shows[part]]) >= _MOST_OF:
             which = _which(made, measured, asked, part, block_s)
@@ -119,17 +121,6 @@ def _related(x: Array, y: Array) -> tuple[Array, Array, float, float] | None:
     return gain * x, y - offset, 1.5 * misfit, abs(gain) * usual
 
 
-def _spans(off: Flags, shows: Flags) -> list[tuple[int, int]]:
-    """Blocks [start, stop) of deviations, interrupted by few blocks that would show one and do not."""
-    out: list[tuple[int, int]] = []
-    for k in np.flatnonzero(off).tolist():
-        if out and np.count_nonzero(shows[out[-1][1] : k]) <= _GAP:
-            out[-1] = out[-1][0], k + 1
-        else:
-            out.append((k, k + 1))
-    return out
-
-
 def _which(made: Array, measured: Array, asked: Array | None, part: slice, block_s: float) -> str:
     """Which of the two still does as it is told in a deviation: ``odometry``, ``gyro``, or none where that is not clear."""
     if asked is None:
@@ -163,20 +154,19 @@ def _beside_command(rate: Array, asked: Array, part: slice, block_s: float) -> f
     return found
 
 
-def _told(made: Array, measured: Array, span: tuple[int, int], which: str, block_s: float) -> str:
-    """A sentence on a contradiction."""
+def _told(made: Array, measured: Array, span: tuple[int, int], which: str, block_s: float) -> Said:
+    """What is said of a contradiction."""
     known = np.isfinite(made) & np.isfinite(measured)
     gyro, odometry = (float(np.median(np.abs(x[known]))) for x in (measured, made))
+    when = Stated.of(span[0] * block_s, span[1] * block_s)
     head = (
-        f"From {span[0] * block_s:.1f} to {span[1] * block_s:.1f} s the gyro (imu.yaw_rate) and the heading of odometry (odom.yaw) contradict each "
+        f"From {when.start} to {when.stop} s the gyro (imu.yaw_rate) and the heading of odometry (odom.yaw) contradict each "
         f"other: {turn(gyro)} and {turn(odometry)} (medians), where they otherwise agree"
     )
-    return (
-        head
-        + {
-            "gyro": ". The gyro does as the command has it turn: the heading of odometry is wrong, or an encoder that it is made of.",
-            "odometry": ". Odometry does as the command has it turn: the gyro is wrong, or the wheels slip, or an encoder is wrong over which the speed "
-            "loop closes; wheel speeds (/joint_states) would tell them apart.",
-            "": ". Which of them is wrong cannot be told: a {wheel} that slips, or an encoder, turns the heading of odometry, too.",
-        }[which]
-    )
+    tail = {
+        "gyro": ". The gyro does as the command has it turn: the heading of odometry is wrong, or an encoder that it is made of.",
+        "odometry": ". Odometry does as the command has it turn: the gyro is wrong, or the wheels slip, or an encoder is wrong over which the speed "
+        "loop closes; wheel speeds (/joint_states) would tell them apart.",
+        "": ". Which of them is wrong cannot be told: a {wheel} that slips, or an encoder, turns the heading of odometry, too.",
+    }[which]
+    return Said(head + tail, (when.span,))

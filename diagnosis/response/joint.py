@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.response.models import Beside, Blocks
-from diagnosis.response.spells import Spell
+from diagnosis.response.spells import Spell, spans_of
 from diagnosis.results.assessment import Lack, Reason
 from replay.faults import FaultMode
 
@@ -111,7 +111,7 @@ def cut(spells: Sequence[Spell], joint: Joint | None, blocks: Blocks) -> list[Sp
         if s.mode is FaultMode.NO_SIGNAL:
             out.append(s._replace(own=_goes_on(s, joint)))
             continue
-        spans = _parted(blocks, joint) if s.mode.scaled or s.mode is FaultMode.OUTSIDE_TABLE else []
+        spans = _parted(blocks, joint) if s.unspecific else []
         inside = [(max(a, s.start), min(b, s.stop)) for a, b in spans if a < s.stop and b > s.start]
         at = s.start
         for a, b in inside:
@@ -146,14 +146,7 @@ def _goes_on(spell: Spell, joint: Joint) -> bool:
 def _parted(blocks: Blocks, joint: Joint) -> list[tuple[int, int]]:
     """Blocks [start, stop) in which speed and position differ, a moment of standstill in between included."""
     off = np.nan_to_num(np.abs(blocks.mean - joint.view.speed) / joint.view.noise) * (joint.view.blame > 0.5)
-    edge = np.flatnonzero(np.diff(np.r_[False, off > _APART, False].astype(np.int8)))
-    spans: list[tuple[int, int]] = []
-    for a, b in zip(edge[::2].tolist(), edge[1::2].tolist(), strict=True):
-        if spans and a - spans[-1][1] <= _SMOOTH_BLOCKS:
-            spans[-1] = spans[-1][0], b
-        else:
-            spans.append((a, b))
-    return [(a, b) for a, b in spans if b - a >= _LEAST_APART]
+    return [(a, b) for a, b in spans_of(off > _APART, _SMOOTH_BLOCKS) if b - a >= _LEAST_APART]
 
 
 def _blame(blocks: Blocks, speed: Array, beside: Beside | None) -> Array:

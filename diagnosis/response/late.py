@@ -23,6 +23,7 @@ from diagnosis.results.assessment import Finding
 from diagnosis.results.detectability import Deviation, Power
 from diagnosis.results.result import Hypothesis
 from diagnosis.results.vocabulary import Tier
+from replay.arrays.runs import runs_of
 from replay.faults import FaultMode, Side, State
 
 Array = NDArray[np.float64]
@@ -119,9 +120,8 @@ def late_of(one: Judged, block_s: float) -> list[Finding]:
     enters, leaves = (np.full(len(score), -np.expm1(-block_s / t)) for t in (_HEALTHY_S, _LATE_S))
     p = posterior(score, enters, leaves)
     late = p[:, 1:-1].sum(axis=1)
-    edge = np.flatnonzero(np.diff(np.r_[False, late > 0.5, False].astype(np.int8)))
     out = []
-    for start, stop in zip(edge[::2].tolist(), edge[1::2].tolist(), strict=True):
+    for start, stop in runs_of(late > 0.5):
         part = slice(start, stop)
         if (stop - start) * block_s >= _LEAST_S and float(np.mean(late[part])) >= _LEAST_P:
             delay = float(np.asarray(DELAYS_S)[np.argmax(p[part, 1:-1].sum(axis=0))])
@@ -184,7 +184,7 @@ def smallest_delay(one: Judged, block_s: float) -> tuple[Power, str]:
 
 def late_neighbour(spell: Spell, wheel: str, late: Mapping[str, Sequence[Finding]], width: int) -> bool:
     """Whether what looks like a scale lies, for the most part, where another wheel's speed comes late: beside that one it differs, too."""
-    if spell.own or not (spell.mode.scaled or spell.mode is FaultMode.OUTSIDE_TABLE):
+    if spell.own or not spell.unspecific:
         return False
     start, stop = spell.start * width, spell.stop * width
     return any(

@@ -15,6 +15,8 @@ from diagnosis.response.models import Beside
 from diagnosis.response.spells import Spell
 from diagnosis.response.wheel import Wheel
 from diagnosis.results.assessment import Finding, Lack, Reason
+from diagnosis.results.said import Said, Stated
+from replay.arrays.runs import runs_of
 from replay.faults import FaultMode, Side
 from replay.machine.config import Limits
 
@@ -84,15 +86,16 @@ class Judged(NamedTuple):
     view: Beside | None = None
 
 
-def standstills(idle: Sequence[tuple[int, int]], dt: float) -> tuple[str, ...]:
-    """A sentence where all drives stood still together, in steps [start, stop), although they were commanded to move."""
+def standstills(idle: Sequence[tuple[int, int]], dt: float) -> tuple[Said, ...]:
+    """What is said where all drives stood still together, in steps [start, stop), although they were commanded to move; `dt` in s."""
     if not idle:
         return ()
     total, (start, stop) = sum(b - a for a, b in idle) * dt, max(idle, key=lambda s: s[1] - s[0])
-    return (
-        f"For {total:.1f} s all drives stood still together, one that reads wrong perhaps excepted, while they were commanded to move (longest {start * dt:.1f}–{stop * dt:.1f} s): "
-        "disabled, stopped by an emergency stop, or driven by another source of commands; no {wheel} is blamed for it.",
+    text = (
+        f"For {total:.1f} s all drives stood still together, one that reads wrong perhaps excepted, while they were commanded to move (longest {Stated.of(start * dt, stop * dt)}): "
+        "disabled, stopped by an emergency stop, or driven by another source of commands; no {wheel} is blamed for it."
     )
+    return (Said(text, tuple((a * dt, b * dt) for a, b in idle)),)
 
 
 def pauses(findings: Sequence[Finding]) -> list[Finding]:
@@ -100,17 +103,18 @@ def pauses(findings: Sequence[Finding]) -> list[Finding]:
     return [f for f in findings if f.mode is FaultMode.NO_SIGNAL and f.side is Side.SENSOR_OR_ACTUATOR]
 
 
-def paused(findings: Sequence[Finding], dt: float) -> tuple[str, ...]:
-    """A sentence where the only drive stood still for a time although it was commanded to move, by what was found of it; `dt` in s."""
+def paused(findings: Sequence[Finding], dt: float) -> tuple[Said, ...]:
+    """What is said where the only drive stood still for a time although it was commanded to move, by what was found of it; `dt` in s."""
     spans = pauses(findings)
     if not spans:
         return ()
     longest = max(spans, key=lambda f: f.stop - f.start)
-    return (
+    text = (
         f"For {sum(f.stop - f.start for f in spans) * dt:.1f} s the only drive stood still, or read 0, while it was commanded to move (longest "
-        f"{longest.start * dt:.1f}–{longest.stop * dt:.1f} s): disabled, stopped by an emergency stop, driven by another source of commands, "
-        "or faulty; with a single drive these look the same.",
+        f"{Stated.of(longest.start * dt, longest.stop * dt)}): disabled, stopped by an emergency stop, driven by another source of commands, "
+        "or faulty; with a single drive these look the same."
     )
+    return (Said(text, tuple((f.start * dt, f.stop * dt) for f in spans)),)
 
 
 def unexplained(drives: Sequence[FollowerData], limits: Limits, dt: float) -> tuple[str, ...]:
@@ -141,10 +145,8 @@ def unexplained(drives: Sequence[FollowerData], limits: Limits, dt: float) -> tu
     )
 
 
-def otherwise(
-    judged: Mapping[str, Judged], block_s: float, followed: Flags
-) -> tuple[tuple[str, ...], bool, list[tuple[float, float]]]:
-    """A sentence where all drives together did something else than their commands, whether so long that it is the machine's state, and when [s].
+def otherwise(judged: Mapping[str, Judged], block_s: float, followed: Flags) -> tuple[tuple[Said, ...], bool]:
+    """What is said where all drives together did something else than their commands, and whether so long that it is the machine's state.
 
     No wheel is blamed for it. `block_s` is the length of a block [s]; `followed`, shape (b,), are those in which a receiver shows that
     the machine went as it was told.
@@ -152,20 +154,20 @@ def otherwise(
     off = []
     for j in judged.values():
         if not j.response.answered:
-            return (), False, []
+            return (), False
         b = j.wheel.blocks
         off.append(np.abs(b.mean - np.clip(b.mean, b.low, b.high)) > _ELSEWHERE * np.nanquantile(np.abs(b.mean), 0.99))
-    edge = np.flatnonzero(np.diff(np.r_[False, np.logical_and.reduce(off) & ~followed, False].astype(np.int8)))
-    spans = [(a, b) for a, b in zip(edge[::2] * block_s, edge[1::2] * block_s, strict=True) if b - a >= _ELSEWHERE_S]
+    together = [(a * block_s, b * block_s) for a, b in runs_of(np.logical_and.reduce(off) & ~followed)]
+    spans = [(a, b) for a, b in together if b - a >= _ELSEWHERE_S]
     if len(judged) < 2 or not spans:
-        return (), False, []
+        return (), False
     longest = max(spans, key=lambda s: s[1] - s[0])
     text = (
         f"For {sum(b - a for a, b in spans):.1f} s all drives together did something else than their commands (longest "
-        f"{longest[0]:.1f}–{longest[1]:.1f} s): commands that are held or ignored, another source of commands, or a slope; no {{wheel}} is "
+        f"{Stated.of(*longest)}): commands that are held or ignored, another source of commands, or a slope; no {{wheel}} is "
         "blamed for it."
     )
-    return (text,), bool(longest[1] - longest[0] >= _STATE_S), spans
+    return (Said(text, tuple(spans)),), bool(longest[1] - longest[0] >= _STATE_S)
 
 
 def unlike(judged: Mapping[str, Judged]) -> dict[str, Reason]:

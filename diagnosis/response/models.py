@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from diagnosis.response.channel import Samples
 from diagnosis.response.identification import Response, beyond
 from replay.arrays.numeric import without_nan
+from replay.arrays.runs import runs_of
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -281,11 +282,9 @@ def held_long(blocks: Blocks, driving: Flags, block_s: float) -> float:
 def _long_holds(blocks: Blocks, driving: Flags, block_s: float) -> tuple[Flags, Flags]:
     """Blocks in which a channel should change, and those of them in which it holds one value for long; shapes (b,)."""
     use = driving & (blocks.readings > 0) & (blocks.zero < blocks.readings)
-    edge: NDArray[np.intp] = np.flatnonzero(np.diff(np.r_[False, blocks.held & use, False].astype(np.int8)))
     long = np.zeros(use.size, np.bool_)
-    starts, stops = edge[::2], edge[1::2]
-    for k in np.flatnonzero((stops - starts) * block_s > blocks.long_s):
-        long[starts[k] : stops[k]] = True
+    for start, stop in runs_of(blocks.held & use):
+        long[start:stop] = (stop - start) * block_s > blocks.long_s
     return use, long
 
 

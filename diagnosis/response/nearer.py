@@ -15,7 +15,6 @@ from diagnosis.response.drive import off_asked
 from diagnosis.response.machine import Judged
 from diagnosis.response.rivals import jumped
 from diagnosis.response.spells import Spell
-from replay.faults import FaultMode
 
 Array = NDArray[np.float64]
 
@@ -43,7 +42,7 @@ def nearer_to_its_command(
         Length of a block [s].
     """
     one = judged[wheel]
-    if spell.own or spell.kin or not (spell.mode.scaled or spell.mode is FaultMode.OUTSIDE_TABLE):
+    if spell.own or spell.kin or not spell.unspecific:
         return False
     beside = one.wheel.compared.split(" and ")
     others = [judged[w] for w in mates if judged[w].data.name in beside]

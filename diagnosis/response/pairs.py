@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 from diagnosis.response.machine import Judged
 from diagnosis.response.spells import Spell
-from replay.faults import FaultMode
 
 Array = NDArray[np.float64]
 
@@ -58,7 +57,7 @@ def anothers(spell: Spell, one: Judged, rival: Spell, other: Judged) -> bool | N
 
 def _shared(spell: Spell, one: Judged, other: Judged) -> Spell:
     """A spell with the share of its probability that is its own: `Spell.mine` 0 where both are as likely, 1 where it is surely its."""
-    if spell.own or not (spell.mode.scaled or spell.mode is FaultMode.OUTSIDE_TABLE):
+    if spell.own or not spell.unspecific:
         return spell
     width = int(one.wheel.blocks.start[1])
     odds = sum(_odds(at * width, one, other) for at in (spell.start, spell.stop))

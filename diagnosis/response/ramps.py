@@ -9,7 +9,6 @@ import numpy as np
 from diagnosis.response.machine import Judged
 from diagnosis.response.spells import Spell
 from diagnosis.results.assessment import Finding
-from replay.faults import FaultMode
 
 _FASTEST = 0.98  # quantile of a drive's changes of speed that is its limit
 _FASTER, _PACE = 1.1, 0.7  # times the limit: faster than it can, and at it
@@ -21,7 +20,7 @@ def only_a_ramp(spell: Spell, late: Sequence[Finding], one: Judged, width: int) 
 
     `late` are the times in which it comes late; `width` is the number of steps in a block.
     """
-    if spell.own or not (spell.mode.scaled or spell.mode is FaultMode.OUTSIDE_TABLE):
+    if spell.own or not spell.unspecific:
         return False
     start, stop = spell.start * width, spell.stop * width
     return any(2 * (min(f.stop, stop) - max(f.start, start)) >= stop - start and at_its_limit(f, one) for f in late)

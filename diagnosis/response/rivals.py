@@ -152,11 +152,7 @@ def told_and_doing_alike(spell: Spell, wheel: str, judged: Mapping[str, Judged])
     What a command makes of a wheel depends on the others, too: a limit, or a turn, that was seldom driven is no fault.
     """
     one, b = judged[wheel], judged[wheel].wheel.blocks
-    if (
-        one.speed is not None
-        or not one.response.answered
-        or not (spell.mode.scaled or spell.mode is FaultMode.OUTSIDE_TABLE)
-    ):
+    if one.speed is not None or not one.response.answered or not spell.unspecific:
         return False
     part, width = slice(spell.start, spell.stop), int(b.start[1]) if b.start.size > 1 else 1
     asked = {w: cells(j.data.asked, width)[part] for w, j in judged.items()}

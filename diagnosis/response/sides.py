@@ -86,7 +86,7 @@ def sides_of(
     for spell in spells:
         if not spell.own and _met(spell, drives, width):
             continue
-        if not spell.own and _met(spell, late, width) and (spell.mode.scaled or spell.mode is FaultMode.OUTSIDE_TABLE):
+        if not spell.own and _met(spell, late, width) and spell.unspecific:
             continue  # what is late is less, or more, whenever the speed changes
         long = (spell.stop - spell.start) * width * dt >= _LEAST_S
         found = finding_of(spell, *_shown_by(one, spell)) if long and spell.p >= LEAST_P else None

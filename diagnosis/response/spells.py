@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.response.models import FROZEN, NOISY, SCALES, SILENT
+from replay.arrays.runs import runs_of
 from replay.faults import FaultMode
 
 Array = NDArray[np.float64]
@@ -33,16 +34,41 @@ class Spell(NamedTuple):
     kin: bool = False
     turns: bool | None = None
 
+    @property
+    def unspecific(self) -> bool:
+        """Whether it is a share of the speed or outside the table, as slip, drag and other wheels make it of a healthy one as well."""
+        return self.mode.scaled or self.mode is FaultMode.OUTSIDE_TABLE
+
 
 def spans_of(there: Flags, gap: int = 0) -> list[tuple[int, int]]:
     """Steps [start, stop) of each stretch in which something holds, with interruptions of `gap` steps at most bridged; `there` of shape (n,)."""
-    edge = np.flatnonzero(np.diff(np.r_[False, there, False].astype(np.int8)))
     out: list[tuple[int, int]] = []
-    for start, stop in zip(edge[::2].tolist(), edge[1::2].tolist(), strict=True):
+    for start, stop in runs_of(there):
         if out and start - out[-1][1] <= gap:
             out[-1] = out[-1][0], stop
         else:
             out.append((start, stop))
+    return out
+
+
+def deviations_of(off: Flags, shows: Flags, gap: int) -> list[tuple[int, int]]:
+    """Blocks [start, stop) of each deviation, interrupted by few blocks that would show one and do not.
+
+    Parameters
+    ----------
+    off : Flags, shape (b,)
+        Blocks that deviate.
+    shows : Flags, shape (b,)
+        Blocks in which a deviation would show.
+    gap : int
+        How many of these may lie between two blocks of one deviation.
+    """
+    out: list[tuple[int, int]] = []
+    for k in np.flatnonzero(off).tolist():
+        if out and np.count_nonzero(shows[out[-1][1] : k]) <= gap:
+            out[-1] = out[-1][0], k + 1
+        else:
+            out.append((k, k + 1))
     return out
 
 

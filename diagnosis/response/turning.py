@@ -257,12 +257,7 @@ def wrong_yaw_rate(spell: Spell, one: Judged) -> bool:
     one : Judged
         The wheel.
     """
-    if (
-        one.across is None
-        or one.speed is None
-        or spell.own
-        or not (spell.mode.scaled or spell.mode is FaultMode.OUTSIDE_TABLE)
-    ):
+    if one.across is None or one.speed is None or spell.own or not spell.unspecific:
         return False
     part = slice(spell.start, spell.stop)
     y, x, view = one.wheel.blocks.mean[part], one.across[part], one.speed[part]

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from diagnosis.response.machine import Judged
 from diagnosis.response.spells import Spell
-from replay.faults import FaultMode
 
 Array = NDArray[np.float64]
 
@@ -46,11 +45,7 @@ def lower_by_a_load(spell: Spell, one: Judged) -> bool:
 
     Only where nothing but its command shows the speed of a wheel: another wheel, or the body, would be off as well.
     """
-    if (
-        one.speed is not None
-        or not one.response.answered
-        or not (spell.mode.scaled or spell.mode is FaultMode.OUTSIDE_TABLE)
-    ):
+    if one.speed is not None or not one.response.answered or not spell.unspecific:
         return False
     blocks, part = one.wheel.blocks, slice(spell.start, spell.stop)
     y, told = blocks.mean[part], 0.5 * (blocks.low + blocks.high)[part]

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from diagnosis.response.body import BodySpeed
 from diagnosis.response.inputs import FollowerData, cells
 from diagnosis.response.pulses import in_pulses
+from diagnosis.results.said import Said, Stated
 from replay.machine.config import Limits
 
 Array = NDArray[np.float64]
@@ -115,8 +116,8 @@ def contradicted(speeds: Sequence[BodySpeed], drives: Sequence[FollowerData], wi
 
 def denied(
     witness: Witness, idle: Sequence[tuple[int, int]], drives: Sequence[FollowerData], unread: Sequence[str], dt: float
-) -> tuple[str, ...]:
-    """A sentence where a receiver shows that it is the speeds which are wrong together, not the machine.
+) -> tuple[Said, ...]:
+    """What is said where a receiver shows that it is the speeds which are wrong together, not the machine.
 
     Parameters
     ----------
@@ -133,18 +134,21 @@ def denied(
     """
     names = " and ".join(d.name for d in drives)
     if unread:
-        return (
+        text = (
             f"The {witness.name} shows that the machine went as it was told; nothing relates that to {names}: a wrong unit, a channel of something "
-            "else, or readings that are wrong together.",
+            "else, or readings that are wrong together."
         )
+        return (Said(text),)
     total = sum(b - a for a, b in idle) * dt
     if total < _LEAST_S:
         return ()
     start, stop = max(idle, key=lambda s: s[1] - s[0])
-    return (
-        f"For {total:.1f} s {names} stood still together (longest {start * dt:.1f}–{stop * dt:.1f} s), while the {witness.name} shows that the "
-        "machine went as it was told: what they have in common failed, such as their supply, a controller or a driver; no {wheel} is blamed for it.",
+    longest = Stated.of(start * dt, stop * dt)
+    text = (
+        f"For {total:.1f} s {names} stood still together (longest {longest}), while the {witness.name} shows that the "
+        "machine went as it was told: what they have in common failed, such as their supply, a controller or a driver; no {wheel} is blamed for it."
     )
+    return (Said(text, (longest.span,)),)
 
 
 def witnessed(
@@ -154,8 +158,8 @@ def witnessed(
     drives: Sequence[FollowerData],
     speeds: Sequence[BodySpeed],
     steps: tuple[int, Limits, float],
-) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """What stays of *did not follow its commands*, and what is said of speeds that do not show it, one sentence each.
+) -> tuple[tuple[str, ...], tuple[Said, ...]]:
+    """What stays of *did not follow its commands*, a sentence, and what is said of speeds that do not show it.
 
     Parameters
     ----------
@@ -168,8 +172,8 @@ def witnessed(
     """
     width, limits, dt = steps
     if ignored and (pulses := in_pulses(drives)):
-        return (), (pulses,)
+        return (), (Said(pulses),)
     wrong = tuple(ignored) if witness.mostly else ()
     other = contradicted(speeds, drives, width, limits) if ignored and not wrong else ""
-    said = (other,) if other else denied(witness, idle, drives, wrong, dt)
+    said = (Said(other),) if other else denied(witness, idle, drives, wrong, dt)
     return () if wrong or other else tuple(ignored), said

@@ -30,7 +30,7 @@ class MachineEvent:
     model : bool
         Whether the wheel model alone is in doubt: what axles show without it stands.
     spans : tuple[tuple[float, float], ...]
-        Begin and end of each time at which it was so [s], where these are more than the text states.
+        Begin and end of each time at which it was so [s], by time; empty where it was so throughout.
     """
 
     title: str

@@ -15,6 +15,7 @@ from diagnosis.steering.inputs import AxleInputs
 from diagnosis.steering.model_bank import HEALTHY
 from diagnosis.steering.path import AxleFilter
 from diagnosis.steering.side_findings import SideFindings, Span
+from replay.arrays.runs import runs_of
 from replay.faults import Side, State
 
 _ALONE_S, _BETWEEN_S = 4.0, 10.0
@@ -61,10 +62,9 @@ def vouched(healthy: NDArray[np.bool_], shown: NDArray[np.bool_], dt: float, *, 
     """
     out = shown & healthy
     idle = healthy & ~shown
-    cut = np.flatnonzero(np.diff(np.concatenate([[0], idle.astype(np.int8), [0]])))
     alone = round((_SEEN_ALONE_S if seen else _ALONE_S) / dt)
     between = _SEEN_BETWEEN_S if seen else _BETWEEN_S
-    for a, b in zip(cut[::2].tolist(), cut[1::2].tolist(), strict=True):
+    for a, b in runs_of(idle):
         left, right = a > 0 and out[a - 1], b < idle.size and healthy[b] and shown[b]
         if left and right and (b - a) * dt <= between:
             out[a:b] = True

@@ -13,6 +13,7 @@ from diagnosis.results.assessment import Assessment
 from diagnosis.results.evidence_columns import Pictured, steps_of
 from diagnosis.results.loss import Loss
 from diagnosis.results.machine_event import MachineEvent, foreign, swinging
+from diagnosis.results.said import Said
 from diagnosis.results.vocabulary import Tier
 from diagnosis.wheels.blocks import WheelBlocks, blocks_of, per_sample
 from diagnosis.wheels.claims import as_claimed, or_off
@@ -92,7 +93,7 @@ def assess_wheels(data: WheelsData, limits: Limits, *, gains: bool) -> WheelsJud
         claimed = or_off(claimed, path.y, expected)
         sensor, actuator = _assessments(data, i, path, claimed, gains=gains)
         out[i] = sensor, actuator if measured[i] else replace(actuator, loss=losses[i])
-    events = ((swinging(swings.sentence).at(swings.spans),) if swings.spans else ()) + (
+    events = ((Said(swings.sentence, swings.spans).event(swinging),) if swings.spans else ()) + (
         (foreign(doubted.sentence),) if doubted.wheels else ()
     )
     return WheelsJudged(out, events)

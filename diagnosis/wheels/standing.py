@@ -18,6 +18,7 @@ from diagnosis.results.assessment import Finding
 from diagnosis.results.result import Hypothesis
 from diagnosis.results.sentence import About, is_about
 from diagnosis.wheels.findings import WheelFindings
+from replay.arrays.runs import runs_of
 from replay.faults import FaultMode, Side
 
 Array = NDArray[np.float64]
@@ -83,9 +84,7 @@ def _silent(f: Finding, y: Array) -> bool:
 
 def _stops(y: Array, findings: list[Finding], dt: float) -> Iterator[_Ends]:
     """What a sensor reads about every stop outside of its findings."""
-    zero = np.concatenate([[False], y == 0.0, [False]])
-    edge = np.flatnonzero(np.diff(zero.astype(np.int8)))
-    for start, stop in zip(edge[::2].tolist(), edge[1::2].tolist(), strict=True):
+    for start, stop in runs_of(y == 0.0):
         inside = start > 0 and stop < y.size and (stop - start) * dt >= _STANDS_S
         if inside and not any(f.start < stop and start < f.stop for f in findings):
             yield _ends(y, start, stop, dt)

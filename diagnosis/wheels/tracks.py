@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.wheels.models import A_BIAS, A_GAIN, A_NONE, A_STUCK, S_GAIN, S_NONE, S_STUCK, S_WHITE_8, Row
 from diagnosis.wheels.runs import Runs
+from replay.arrays.runs import runs_of
 from replay.faults import FaultMode, Side
 
 Array = NDArray[np.float64]
@@ -122,9 +124,8 @@ def segments_of(track: Track, side: Side, n: int, runs: Runs, dt: float) -> list
     p = track.probability[side]
     step = track.hop * dt
     faulty = _faulty(p[:, 0], round(_BRIDGED_S / step))
-    cut = np.flatnonzero(np.diff(np.r_[False, faulty, False].astype(np.int8)))
     out = []
-    for first, last in zip(cut[::2].tolist(), cut[1::2].tolist(), strict=True):
+    for first, last in runs_of(faulty):
         for a, b, k in _rows_between(p, first, last, step):
             stop = min(n, b * track.hop) if b < faulty.size else n
             start, stop = _edges(a * track.hop, stop, side, runs, round(_NEAR_S / dt))
@@ -136,8 +137,7 @@ def segments_of(track: Track, side: Side, n: int, runs: Runs, dt: float) -> list
 def _faulty(healthy: Array, bridged: int) -> NDArray[np.bool_]:
     """Frames of faults, shape (frames,), by the probability of a healthy side; a doubtful pause of `bridged` frames is bridged."""
     out = healthy < _FAULTY
-    edges = np.flatnonzero(np.diff(np.r_[False, out, False].astype(np.int8)))
-    for stop, start in zip(edges[1::2], edges[2::2], strict=False):
+    for (_, stop), (start, _) in pairwise(runs_of(out)):
         if start - stop <= bridged and healthy[stop:start].max() < _DOUBTED:
             out[stop:start] = True
     return out

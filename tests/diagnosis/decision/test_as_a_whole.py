@@ -12,7 +12,8 @@ import pytest
 from numpy.typing import NDArray
 
 from diagnosis.clearing.cells import Cells
-from diagnosis.decision.as_a_whole import _at_rest, _held, as_a_whole
+from diagnosis.decision.as_a_whole import _at_rest, _falls_behind, _held, as_a_whole
+from diagnosis.decision.course import Course
 from replay.machine.config import haulotte
 from replay.simulation.options import SimulatedMission
 from tests.diagnosis.clearing.missions import LENGTH, in_cells, simulated
@@ -112,3 +113,14 @@ def test_a_body_speed_that_is_held_while_all_wheels_change_theirs_is_told(
     body[slice(*held)] = body[held[0]]
     cells = cast(Cells, SimpleNamespace(dt=0.1))
     assert bool(_held(cells, body, np.column_stack([wheel, 1.02 * wheel]), 1.5)) is said
+
+
+def test_wheels_that_fall_behind_again_and_again_are_told_with_each_of_these_times() -> None:
+    share = np.full(200, 1.0)
+    for start in (20, 60, 100, 140):
+        share[start : start + 9] = 0.5
+    cells = cast(Cells, SimpleNamespace(dt=0.1, frame=SimpleNamespace(hop=5, length=10)))
+    found = _falls_behind(Course(share, cells), 0.25)
+    assert found is not None
+    assert "again and again, for 18 s in all" in found.text
+    assert found.spans == ((10.0, 15.0), (30.0, 35.0), (50.0, 55.0), (70.0, 75.0))

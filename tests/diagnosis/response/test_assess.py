@@ -99,7 +99,7 @@ def test_a_machine_that_stands_while_it_is_commanded_blames_no_wheel() -> None:
     j = judged(measured, asked, body)
     assert findings(j) == []
     assert len(j.events) == 1
-    assert "no {wheel} is blamed" in j.events[0]
+    assert "no {wheel} is blamed" in j.events[0].text
     assert all(j.parts[w][0].states[stop.start + 100] != CODE[State.HEALTHY] for w in WHEELS)
 
 
@@ -113,7 +113,7 @@ def test_commands_that_go_elsewhere_are_told_and_blame_no_wheel() -> None:
     assert findings(j) == []
     assert any("all drives together did something else" in n for n in j.parts["FR"][0].notes)
     assert len(j.events) == 1
-    assert "no {wheel} is blamed" in j.events[0]
+    assert "no {wheel} is blamed" in j.events[0].text
 
 
 @pytest.mark.parametrize("scale", campaign([0.5, 1.5, 0.7], 2))

@@ -38,7 +38,7 @@ def judged(
 def test_from_some_moment_on_side_factor_and_time_are_told(factor: float, wheel: str) -> None:
     found = judged(factor, LATER, wheel=wheel)
     assert len(found.scaled) == 1
-    text = found.scaled[0]
+    text = found.scaled[0].text
     assert f"as if {wheel} went " in text
     assert float(text.split(" went ")[1].split()[0]) == pytest.approx(factor, abs=0.05)
     assert float(text.split()[1]) == pytest.approx(LATER.start * DT, abs=4.0)
@@ -52,7 +52,7 @@ def test_from_some_moment_on_side_factor_and_time_are_told(factor: float, wheel:
 @pytest.mark.parametrize("factor", [0.75, 1.4])
 def test_all_through_a_log_both_sides_are_named(factor: float) -> None:
     found = judged(factor, WHOLE)
-    text = found.scaled[0]
+    text = found.scaled[0].text
     first, other = (
         float(text.split(before)[1].split()[0]) for before in (" went ", ", or R " if " if L " in text else ", or L ")
     )
@@ -91,7 +91,7 @@ def test_of_several_wheels_a_side_one_must_be_off_by_more() -> None:
     four = ("FR", "FL", "RR", "RL")
     one, several = (float(next(iter(judged(1.0, WHOLE, wheels=w, wheel=w[1]).parts.values()))[0].hidden.split(" from ")[1].split()[0]) for w in (PAIR, four))  # fmt: skip
     assert several > one
-    assert "the mean of FL and RL" in judged(1.8, LATER, wheel="FL", wheels=four).scaled[0]
+    assert "the mean of FL and RL" in judged(1.8, LATER, wheel="FL", wheels=four).scaled[0].text
 
 
 def test_a_car_is_held_against_the_yaw_rate_by_the_axle_that_it_does_not_steer() -> None:

@@ -33,21 +33,21 @@ def test_a_gyro_that_leaves_command_and_odometry_may_be_wheels_that_slip(gain: f
     (found,) = contradictions(gyro, odometry, asked, BLOCK_S)
     assert found.start == pytest.approx(PART.start, abs=12)
     assert found.stop == pytest.approx(PART.stop, abs=12)
-    assert "Odometry does as the command has it turn: the gyro is wrong, or the wheels slip" in found.text
+    assert "Odometry does as the command has it turn: the gyro is wrong, or the wheels slip" in found.said.text
 
 
 def test_a_heading_that_leaves_command_and_gyro_is_odometrys() -> None:
     gyro, odometry, asked = rates(2)
     odometry[PART] *= 0.3
     (found,) = contradictions(gyro, odometry, asked, BLOCK_S)
-    assert "the heading of odometry is wrong" in found.text
+    assert "the heading of odometry is wrong" in found.said.text
 
 
 def test_without_a_command_nobody_is_told() -> None:
     gyro, odometry, _ = rates(3)
     gyro[PART] = 0.0
     (found,) = contradictions(gyro, odometry, None, BLOCK_S)
-    assert "cannot be told" in found.text
+    assert "cannot be told" in found.said.text
 
 
 def test_what_was_never_alike_says_nothing() -> None:

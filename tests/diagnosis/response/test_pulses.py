@@ -36,5 +36,5 @@ def test_a_machine_whose_speed_comes_in_pulses_is_not_told_as_one_that_did_not_f
     y[at] = went[at] / 0.3
     body = np.column_stack([asked, np.zeros(n)])
     found = assess_response(followers_of({"D": y}, {"D": asked}, body), None, None, Limits(driving_speed=0.05), DT)
-    assert not any("did not follow" in text or "were commanded" in text for text in found.events)
-    assert any("comes in pulses" in text for text in found.unshown) or not found.events
+    assert not any("did not follow" in x.text or "were commanded" in x.text for x in found.events)
+    assert any("comes in pulses" in x.text for x in found.unshown) or not found.events

@@ -84,7 +84,7 @@ def test_a_drive_that_stands_for_a_time_is_the_machines_stop_before_it_is_a_faul
     ((finding,),) = (sides[0].findings for sides in j.parts.values())
     assert (finding.mode, finding.side) == (FaultMode.NO_SIGNAL, Side.SENSOR_OR_ACTUATOR)
     assert finding.probability < 0.5
-    assert any("only drive stood still" in e for e in j.events)
+    assert any("only drive stood still" in e.text for e in j.events)
     y[PART.start :] = y[PART].tolist()[-1]
     asked[PART.start :] = 0.6
     ((finding,),) = (sides[0].findings for sides in judged(y, asked, stretch).parts.values())

@@ -9,45 +9,43 @@ from __future__ import annotations
 import base64
 import hashlib
 from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from functools import lru_cache
 from pathlib import Path
 
 import jinja2
 from markupsafe import Markup
 
-from diagnosis.audit.fleet.fault_types import FleetFaultRow, MissionFaultRow
+from diagnosis.audit.fleet.fault_types import FleetFaultRow
 from diagnosis.audit.fleet.fleet_types import AuditRow, CountsRow, FleetDocument, MachineRow
 from diagnosis.audit.fleet.leave import GONE, Left, lists_of
 from diagnosis.audit.fleet.listed import machine_words
 from diagnosis.audit.fleet.page import rows
 from diagnosis.audit.fleet.page.changes import changes_of
+from diagnosis.audit.fleet.page.faults import fault_context
 from diagnosis.audit.fleet.page.figures import blind, hours, kpis, of_folders
 from diagnosis.audit.fleet.page.matrix import matrix
-from diagnosis.audit.fleet.page.shown import Context, ShownDocument, fault_address, shown
+from diagnosis.audit.fleet.page.shown import Context, ShownDocument, shown
 from diagnosis.audit.fleet.page.svg import LEGEND, mark, sparkline, sprite
 from diagnosis.audit.fleet.page.trends import MOST, chosen, course, dead_words, interest, is_lost, level_words
 from diagnosis.audit.fleet.trend_types import TrendRow
-from diagnosis.audit.fleet.words import count, missions_words, open_words, repair_command, share
+from diagnosis.audit.fleet.words import count, missions_words
 from diagnosis.pages import labels
 from diagnosis.pages.environment import DARK, SHARED, asset, environment, shared_style
 from diagnosis.pages.mode_style import mode_rules
-from diagnosis.results.candidates import UNCLEAR
 from diagnosis.results.fault_rows import state_label
 from diagnosis.results.machine_words import words_of
 from diagnosis.results.vocabulary import Leave, Verdict
-from replay.faults import SCALED, FaultMode
+from replay.faults import FaultMode
 
 _HERE = Path(__file__).parent
 _FAULTS = 400
-_COURSE = 5  # missions whose ε̂ a fault's course names
 _OPEN_ROWS = 40
 _STANDING = 2  # faults of a machine that its row names
 _BLIND = 100  # machines whose parts that were not judged are listed
 _FAILURES = 1000
 _FILTER = (Verdict.STOP, Verdict.WATCH, Verdict.READY, Verdict.NOT_ASSESSED)
 _UNITS = {"hours": "h", "days": "d"}
-_STATUS = {"new": "New", "recurring": "Recurring", "once": "Once", "past": "Past", "repaired": "Repaired"}
 _DEFINITIONS = (
     "The verdict of a machine is that of its last mission that could be judged. It is worse where no later mission judged "
     "the part of an earlier fault. A machine counts as ready only if no mission without a verdict may be later. A log that cannot "
@@ -115,9 +113,9 @@ def build_fleet_page(found: FleetDocument) -> str:
         "machines": [
             _machine(k, m, document, standing[k], own[k], lists[k].leave) for k, m in enumerate(document["machines"])
         ],
-        "faults": [_fault(f, document, directions) for f in present[:_FAULTS]],
+        "faults": [fault_context(f, document, directions) for f in present[:_FAULTS]],
         "unlisted": max(0, len(present) - _FAULTS),
-        "past": [_fault(f, document, directions) for f in past[:_FAULTS]],
+        "past": [fault_context(f, document, directions) for f in past[:_FAULTS]],
         "past_count": len(past),
         "trends": [course(t, document["machines"], _UNITS[axis], standing[t["machine"]]) for t in drawn],
         "quiet": len(trends) - len(drawn),
@@ -271,59 +269,4 @@ def _machine(
         "decided": "–" if m["decided"] is None else f"{100 * m['decided']:.0f} %",
         "share": m["decided"] or 0.0,
         "group": k,
-    }
-
-
-def _each(f: FleetFaultRow, document: ShownDocument) -> list[MissionFaultRow]:
-    """The worst fault of this row in each dated mission of its machine that has one, oldest first."""
-    about = (f["component"], f["side"], f["mode"])
-    missions, places = document["missions"].as_found, document["machines"][f["machine"]]["missions"]
-    each = (
-        [x for x in missions[k]["faults"] if (labels.visible(x["component"]), x["side"], x["mode"]) == about]
-        for k in places
-    )
-    return [same[0] for same in each if same]
-
-
-def _fault(f: FleetFaultRow, document: ShownDocument, directions: Mapping[tuple[int, str, str], str]) -> Context:
-    first, last = (document["missions"][place] for place in (f["first"], f["last"]))
-    e, found = f["epsilon"], _each(f, document)
-    notes = []
-    if e and f["mode"] in SCALED and not f.get("unclear"):
-        before = [
-            share(each["value"]).removesuffix(" %") for m in found[-_COURSE:-1] if (each := m["epsilon"]) is not None
-        ]
-        bounds = f"{share(e['low']).removesuffix(' %')} to {share(e['high'])}"
-        sizes = " → ".join([*before, f"{share(e['value'])} ({bounds})"])
-        notes.append(f"{sizes} lost in the fault{', mission by mission' if before else ''}")
-        direction = directions.get((f["machine"], f["component"], f["side"]), "not_known")
-        notes += [direction] if direction != "not_known" else []
-    if found and "lasting" in found[-1]:
-        notes.append("lasts to the end of its log" if found[-1]["lasting"] else "last seen before its log ended")
-    if f["status"] == "repaired" and f["repaired_ns"] is not None:
-        notes.append(f"repaired on {labels.utc_moment(f['repaired_ns'])}")
-    elif f["repaired_ns"] is not None:
-        notes.append(f"found again since the repair on {labels.utc_moment(f['repaired_ns'])}")
-    if f["open"] and f["since"]:
-        none = ", for none of the missions since would have shown it"
-        notes.append(f"open{open_words(True, f['clean'], f['needed']) or none}")
-    elif f["since"]:
-        last_ones = f"last {count(f['since'], 'mission')}" if f["since"] > 1 else "last mission"
-        notes.append(f"not in the {last_ones} that judged it")
-    return {
-        "machine": document["machines"][f["machine"]]["label"],
-        "symbol": rows.fault_symbol(f),
-        "words": UNCLEAR.capitalize() if f.get("unclear") else state_label(f["mode"], f["side"]),
-        "part": words_of(document["machines"][f["machine"]]).part_words(f["kind"], f["component"], f["side"]),
-        "severity": f["severity"],
-        "status": _STATUS[f["status"]],
-        "kind": f["status"],
-        "count": f"{f['missions']} of {f['assessed']}",
-        "first": rows.day(first.get("start_ns")),
-        "last": rows.day(last.get("start_ns")),
-        "address": fault_address(last["address"], f["last_id"]),
-        "course": ", ".join(notes) or "–",
-        "repair": ""
-        if f["status"] in GONE
-        else repair_command(document["machines"][f["machine"]]["label"], f["component"], f["side"]),
     }
