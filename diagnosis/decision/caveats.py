@@ -186,8 +186,10 @@ def doubt_of(watch: Sequence[FaultInterval], against: Reservations) -> str:
 
 
 def _most(fault: FaultInterval) -> float:
-    """What a part may have lost at most [1]; all of what may not answer."""
-    return 1.0 if unanswered(fault) or fault.epsilon is None else fault.epsilon.high
+    """What a part may have lost at most [1], or may give too much, as a share of that; all of what may not answer."""
+    if unanswered(fault) or fault.epsilon is None:
+        return 1.0
+    return max(fault.epsilon.high, 1.0 - 1.0 / (1.0 - min(fault.epsilon.low, 0.0)))
 
 
 def doubts_of(faults: Sequence[FaultInterval], words: MachineWords) -> list[tuple[FaultInterval, str]]:

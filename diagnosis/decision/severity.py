@@ -34,6 +34,8 @@ PROBABLY_TOTAL = 0.75  # that the named side is stuck or without signal, from wh
 _MAY_BE_TOTAL = 0.25  # ... and from which on it is looked at before the machine goes out
 HALF = 0.5  # of ε: a part that may have lost so much is no fault to drive on with
 _ALONE = "This alone is no reason to stop; check it before it grows."
+DOUBLE = -1.0  # of ε: one that gives twice what it should, and more, likewise
+_HARDLY_DOUBTED = 0.8
 #: The same in a mission that gives no leave for other reasons.
 HELD = (
     "Alone it would keep no machine in, but this mission does not clear it: check it before the machine goes out again."
@@ -80,9 +82,10 @@ def severity_of(
             return Severity.MEDIUM, words.fill(
                 "Check the zero and the response of the {valve}: no fault of the tables gives such a deviation."
             )
+        when = " before the machine goes out again" if halved else ""
         return (
             Severity.MEDIUM,
-            "Check scaling and sign of the channel: no fault of the tables gives such a gain.",
+            f"Check scaling and sign of the channel{when}: no fault of the tables gives such a gain.",
         )
     severity = Severity.MEDIUM if marked else Severity.LOW
     if halved:
@@ -151,7 +154,9 @@ def often_dead(faults: Sequence[FaultInterval]) -> list[list[FaultInterval]]:
 
 
 def halved_words(side: Side, mode: FaultMode, epsilon: Epsilon | None) -> str:
-    """That a part may have lost half or more, by the upper bound of ε̂, or that so much of what it gives may be noise; else empty."""
+    """That a part may have lost half or more, by the upper bound of ε̂, surely gives twice as much as it should, or may give so much noise; else empty."""
+    if epsilon is not None and mode is FaultMode.OUTSIDE_TABLE and epsilon.high <= DOUBLE:
+        return f"{'reads' if side is Side.SENSOR else 'gives'} at least {1.0 - epsilon.high:.2g} times what it should"
     if epsilon is None or epsilon.high < HALF:
         return ""
     if mode.varying:
@@ -160,8 +165,11 @@ def halved_words(side: Side, mode: FaultMode, epsilon: Epsilon | None) -> str:
 
 
 def unbounded_words(fault: FaultInterval) -> str:
-    """That nothing bounds what is left of a part whose fault is certain and in no row of the tables; else empty."""
-    open_ = fault.mode is FaultMode.OUTSIDE_TABLE and fault.epsilon is None and fault.severity is Severity.MEDIUM
+    """That nothing bounds what is left of a part whose fault is hardly in doubt and in no row of the tables; else empty."""
+    sure = fault.severity is Severity.MEDIUM or (
+        fault.severity is Severity.LOW and fault.probability >= _HARDLY_DOUBTED
+    )
+    open_ = fault.mode is FaultMode.OUTSIDE_TABLE and fault.epsilon is None and sure
     return "deviates in a way of which no row says how much is left" if open_ else ""
 
 

@@ -206,7 +206,7 @@ def _as_it_opens(
                     Hypothesis(Side.ACTUATOR.value, mode.value, _IT_IS),
                     Hypothesis("none", State.HEALTHY.value, 1.0 - _IT_IS),
                 ),
-                epsilon=Epsilon(lost, lost - _LOSES, min(1.0, lost + _LOSES)),
+                epsilon=Epsilon(lost, lost - _LOSES, min(1.0, lost + _LOSES)) if abs(lost) >= _LOSES else None,
                 sat=None,
                 evidence=(
                     _SHOWN.format(gain=gain, zero=100.0 * zero),

@@ -10,7 +10,7 @@ import pytest
 
 from diagnosis.decision.caveats import doubts_of
 from diagnosis.decision.intervals import intervals_of
-from diagnosis.decision.severity import AGAIN, advised, severity_of, unbounded_words
+from diagnosis.decision.severity import AGAIN, advised, halved_words, severity_of, unbounded_words
 from diagnosis.results.machine_words import HYDRAULIC
 from diagnosis.results.result import Epsilon, FaultInterval, Hypothesis
 from diagnosis.results.vocabulary import Severity, Verdict
@@ -204,16 +204,29 @@ def test_a_sensor_that_is_dead_briefly_again_and_again_is_looked_at_before_the_m
 
 
 @pytest.mark.parametrize(
-    ("mode", "size", "severity", "told"),
+    ("mode", "size", "severity", "p", "told"),
     [
-        (FaultMode.OUTSIDE_TABLE, None, Severity.MEDIUM, True),
-        (FaultMode.OUTSIDE_TABLE, None, Severity.LOW, False),
-        (FaultMode.OUTSIDE_TABLE, Epsilon(-0.3, -0.4, -0.2), Severity.MEDIUM, False),
-        (FaultMode.INEFFICIENT, None, Severity.MEDIUM, False),
+        (FaultMode.OUTSIDE_TABLE, None, Severity.MEDIUM, 0.95, True),
+        (FaultMode.OUTSIDE_TABLE, None, Severity.LOW, 0.85, True),
+        (FaultMode.OUTSIDE_TABLE, None, Severity.LOW, 0.6, False),
+        (FaultMode.OUTSIDE_TABLE, Epsilon(-0.3, -0.4, -0.2), Severity.MEDIUM, 0.95, False),
+        (FaultMode.INEFFICIENT, None, Severity.MEDIUM, 0.95, False),
     ],
 )
 def test_what_no_row_bounds_is_not_cleared(
-    mode: FaultMode, size: Epsilon | None, severity: Severity, *, told: bool
+    mode: FaultMode, size: Epsilon | None, severity: Severity, p: float, *, told: bool
 ) -> None:
-    fault = cast(FaultInterval, SimpleNamespace(mode=mode, epsilon=size, severity=severity))
+    fault = cast(FaultInterval, SimpleNamespace(mode=mode, epsilon=size, severity=severity, probability=p))
     assert bool(unbounded_words(fault)) is told
+
+
+@pytest.mark.parametrize(
+    ("side", "size", "words"),
+    [
+        (Side.SENSOR, Epsilon(-1.4, -1.5, -1.2), "reads at least 2.2 times what it should"),
+        (Side.ACTUATOR, Epsilon(-1.4, -1.5, -1.0), "gives at least 2 times what it should"),
+        (Side.SENSOR, Epsilon(-1.4, -1.9, -0.9), ""),
+    ],
+)
+def test_what_gives_twice_as_much_is_no_fault_to_drive_on_with(side: Side, size: Epsilon, words: str) -> None:
+    assert halved_words(side, FaultMode.OUTSIDE_TABLE, size) == words
