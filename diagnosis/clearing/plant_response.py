@@ -18,6 +18,7 @@ LIMIT = 0.65
 #: The same of what all wheels come to lose for a part of the mission, which slopes and loads that last for a while make more of.
 PART = 1.2
 _OF_IT, _SPLITS, _WHEELS = 0.2, 40, 3  # of the windows, at least; moments that are tried; that must be known at a time
+_PAIR = 2  # the same where no more are driven
 _SPELL_S, _SHORT = 20.0, 1.25  # in which all lose likewise, and by how many times as much: hills last as long
 #: Where what most wheels are off it hardly scatters [ln], the limit of the whole mission holds for parts, and for shorter spells.
 _FITS, _BRIEF_S = 0.05, 10.0
@@ -67,9 +68,9 @@ def beside_plant(cells: Cells, opening: Array, responses: Responses) -> tuple[li
             known = columns[-1][np.isfinite(columns[-1])]
             logs[i] = float(np.median(known)) if known.size >= _LEAST_WINDOWS else None
     together = _together(list(sums.values()), cells)
-    return [together if i in sums else log for i, log in enumerate(logs)], _for_a_part(
-        columns, cells.frame.hop * cells.dt
-    )
+    least = min(_WHEELS, max(_PAIR, len(cells.driven)))
+    part = _for_a_part(columns, cells.frame.hop * cells.dt, least)
+    return [together if i in sums else log for i, log in enumerate(logs)], part
 
 
 def _together(sums: Sequence[tuple[float, float]], cells: Cells) -> float | None:
@@ -88,12 +89,15 @@ def _windows(cells: Cells, moved: Array, expected: Array, wheel: str) -> Array:
     return np.where(full & np.isfinite(log) & ~cells.explained(wheel), log, np.nan)
 
 
-def _for_a_part(columns: Sequence[Array], hop_s: float) -> ForAPart | None:
-    """Largest median of what most wheels are off before, or from, any moment on, or for a spell; None of few wheels or windows, one every `hop_s`."""
-    if len(columns) < _WHEELS:
+def _for_a_part(columns: Sequence[Array], hop_s: float, wheels: int) -> ForAPart | None:
+    """Largest median of what most wheels are off before, or from, any moment on, or for a spell.
+
+    None of fewer than so many wheels known at a time, or of few windows, one every `hop_s`.
+    """
+    if len(columns) < wheels:
         return None
     every = np.column_stack(columns)
-    every = every[np.isfinite(every).sum(axis=1) >= _WHEELS]
+    every = every[np.isfinite(every).sum(axis=1) >= wheels]
     least = max(_LEAST_WINDOWS, round(_OF_IT * len(every)))
     if len(every) < 2 * least:
         return None

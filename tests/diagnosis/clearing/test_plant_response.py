@@ -75,16 +75,26 @@ def test_what_all_wheels_come_to_lose_shows_for_its_part(own_gain: float) -> Non
 def test_two_wheels_that_lose_for_ten_seconds_show_where_the_file_fits() -> None:
     every = np.random.default_rng(1).normal(0.0, 0.02, (140, 4))
     every[40:64, 2:] += np.log(0.7)
-    found = _for_a_part(list(every.T), 0.5)
+    found = _for_a_part(list(every.T), 0.5, 3)
     assert found is not None
     assert found.limit == LIMIT
     assert found.off == pytest.approx(-np.log(0.7), abs=0.05)
     every[:, 2:] += np.random.default_rng(2).normal(0.0, 0.3, (140, 1))
-    rough = _for_a_part(list(every.T), 0.5)
+    rough = _for_a_part(list(every.T), 0.5, 3)
     assert rough is not None
     assert rough.limit == PART
-    assert _for_a_part(list(every.T[:2]), 0.5) is _for_a_part([every[:9, 0]] * 4, 0.5) is None
+    assert _for_a_part(list(every.T[:2]), 0.5, 3) is _for_a_part([every[:9, 0]] * 4, 0.5, 3) is None
 
 
 def test_without_a_file_nothing_is_asked() -> None:
     assert by_file(None) == []
+
+
+def test_two_driven_wheels_that_lose_together_for_a_while_are_off_their_plants() -> None:
+    rng = np.random.default_rng(3)
+    every = 0.02 * rng.standard_normal((160, 2))
+    every[60:90] -= 0.3
+    found = _for_a_part(list(every.T), 0.5, 2)
+    assert found is not None
+    assert found.limit == LIMIT
+    assert 0.25 < found.off < 0.35
