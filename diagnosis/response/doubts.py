@@ -14,6 +14,7 @@ from diagnosis.response.disputed import DISPUTED, HIDES, disputed_steps, doubted
 from diagnosis.response.drive_faults import DriveFaults
 from diagnosis.response.late import smallest_delay
 from diagnosis.response.machine import lasting_losses, otherwise, unlike
+from diagnosis.response.majority import by_majority
 from diagnosis.response.motionless import motionless, not_moving
 from diagnosis.response.power import powers_of, unshown
 from diagnosis.response.rivals import held_back_together
@@ -70,9 +71,15 @@ def sides_of_all(
     """Both sides of every wheel; `spells` are those that are kept, and those that are nobody's for sure."""
     judged, width, (kept, nobodys) = scene.judged, given.width, spells
     together = held_back_together(judged)
+    against = by_majority(judged, given.block_s, sideways=scene.sideways or weighed.other_way)
     parts: Parts = {
         w: sides_of(
-            j, kept[w], (faults.weak.get(w, []), faults.late[w]), (drives.left_out[w], together), given.limits, given.dt
+            j,
+            kept[w],
+            (faults.weak.get(w, []), [*faults.late[w], *against[w]]),
+            (drives.left_out[w], together),
+            given.limits,
+            given.dt,
         )
         for w, j in judged.items()
     }
@@ -82,7 +89,7 @@ def sides_of_all(
     if len(drives.data) == 1:
         parts = {w: (either(a, judged[w], given.moves), b) for w, (a, b) in parts.items()}
     astray, lasts, elsewhere = otherwise(judged, given.block_s, drives.witness.there)
-    apart = unlike_in_motion(judged, scene.mates, sideways=scene.sideways)
+    apart = unlike_in_motion(judged, scene.mates, sideways=scene.sideways, speeds=given.speeds)
     none_read = motionless(judged, given.limits.driving_speed, given.block_s)
     doubts = {w: Reason(j.odd) for w, j in judged.items() if j.odd and not any(side.findings for side in parts[w])}
     doubts |= {w: j.joint.unlike for w, j in judged.items() if j.joint is not None and j.joint.unlike}
