@@ -61,7 +61,11 @@ def by_majority(judged: Mapping[str, Judged], block_s: float, *, sideways: bool)
         known = np.isfinite(speed) & np.isfinite(y)
         spells = [_spell(a, b, y, speed) for a, b in spans_of(off, round(_JOIN_S / block_s))]
         lasts = sum(np.count_nonzero(known[s.start : s.stop]) for s in spells) >= _LASTING * np.count_nonzero(known)
-        kept = [s for s in spells if _shows(s, j, speed, block_s) and not (lasts and not (jumps(j, s, speed) or _dies(s, y)))]
+        kept = [
+            s
+            for s in spells
+            if _shows(s, j, speed, block_s) and not (lasts and not (jumps(j, s, speed) or _dies(s, y)))
+        ]
         names = " and ".join(o.data.name for k, o in judged.items() if k != w)
         wheel = j.wheel._replace(compared=names, own=False)
         sure = [s._replace(p=_JUMPED_P if jumps(j, s, speed) else _STEADY_P) for s in kept]
