@@ -22,7 +22,7 @@ from diagnosis.response.scene import Drives, Given, Scene
 from diagnosis.response.sides import sides_of
 from diagnosis.response.unlike import contradicting, unlike_in_motion
 from diagnosis.response.weighed import Spells, Weighed
-from diagnosis.results.assessment import Assessment, Reason
+from diagnosis.results.assessment import Assessment, Finding, Reason
 
 Flags = NDArray[np.bool_]
 Parts = dict[str, tuple[Assessment, Assessment]]
@@ -71,18 +71,16 @@ def sides_of_all(
     """Both sides of every wheel; `spells` are those that are kept, and those that are nobody's for sure."""
     judged, width, (kept, nobodys) = scene.judged, given.width, spells
     together = held_back_together(judged)
-    against = by_majority(judged, given.block_s, sideways=scene.sideways or weighed.other_way)
-    parts: Parts = {
-        w: sides_of(
-            j,
-            kept[w],
-            (faults.weak.get(w, []), [*faults.late[w], *against[w]]),
-            (drives.left_out[w], together),
-            given.limits,
-            given.dt,
-        )
-        for w, j in judged.items()
-    }
+
+    def both(w: str, late: Sequence[Finding]) -> tuple[Assessment, Assessment]:
+        known, where = (faults.weak.get(w, []), late), (drives.left_out[w], together)
+        return sides_of(judged[w], kept[w], known, where, given.limits, given.dt)
+
+    parts: Parts = {w: both(w, faults.late[w]) for w in judged}
+    for w, against in by_majority(judged, given.block_s, sideways=scene.sideways or weighed.other_way).items():
+        told = [f for side in parts[w] for f in side.findings]
+        more = [f for f in against if not any(f.start < g.stop and g.start < f.stop for g in told)]
+        parts[w] = both(w, [*faults.late[w], *more]) if more else parts[w]
     for w, (sensor, drive) in parts.items():
         late = [slice(f.start, f.stop) for f in faults.unclear[w]]
         parts[w] = doubted(sensor, late + [slice(x.start * width, x.stop * width) for x in nobodys[w]]), drive

@@ -29,6 +29,7 @@ from diagnosis.results.machine_event import (
 )
 from diagnosis.results.vocabulary import Tier
 from replay.machine.config import Machine
+from replay.setup.turn_sizes import turn_size_doubt
 
 _TURNS_OTHERWISE = Reason("the gyro contradicts the heading of odometry, which its speed is a part of")
 
@@ -71,11 +72,17 @@ class ResponseEvidence:
             *map(not_related, judged.unrelated),
             *map(not_shown, judged.unshown),
             *map(one_side_otherwise, judged.scaled),
-            *map(gyro_or_slip, judged.gyro),
+            *map(gyro_or_slip, judged.gyro or _other_turns(mission)),
             *wheels_apart(judged.apart),
             *(turns_otherwise(t.text) for t in turns),
         )
         return Contribution(parts, events=events)
+
+
+def _other_turns(mission: MissionView) -> tuple[str, ...]:
+    """A sentence where the gyro turns otherwise than the wheels all through, by more than tyres make of it."""
+    text = turn_size_doubt(mission.timeline, mission.machine)
+    return (f"All through the mission {text}.",) if text else ()
 
 
 class TrackingEvidence:

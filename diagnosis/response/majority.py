@@ -28,7 +28,7 @@ _JOIN_S = 1.0
 _JUMPED_S, _STEADY_S = 2.0, 5.0  # how long it must last where it jumps, or nothing is read, and else
 _STEADY = 0.15  # of what it is off: by so much a steady share, or a steady offset, may scatter
 _LASTING = 0.8  # of the driving: what lasts longer, and does not jump, may be another size or another unit as well
-_JUMPED_P, _STEADY_P = 0.95, 0.85
+_JUMPED_P, _STEADY_P = 0.95, 0.7
 _LEAST_STEADY = 8  # blocks
 _DEAD = 0.85  # of the blocks, in which nothing but 0 is read
 _AT_ONCE, _AROUND_S = 0.6, 0.5  # of what it is off, from one reading to the next; around an end
@@ -100,7 +100,7 @@ def jumps(one: Judged, spell: Spell, speed: Array) -> bool:
     samples, width = one.wheel.samples, int(one.wheel.blocks.start[1])
     part = slice(spell.start, spell.stop)
     off = np.abs(one.wheel.blocks.mean - speed)[part]
-    least = _AT_ONCE * float(np.nanmedian(off))
+    least = _AT_ONCE * float(np.median(off[np.isfinite(off)]))
     change = np.abs(np.nan_to_num(samples.change))
     reach = _AROUND_S / one.wheel.dt
     return any(

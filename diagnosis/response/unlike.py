@@ -103,6 +103,8 @@ def _said(share: float, others: str) -> Reason:
 
 def _share(y: Array, x: Array) -> float | None:
     """What a wheel reads of another one's speed, all through [1]; None where the two do not go together."""
+    if not np.isfinite(x).any():
+        return None
     least = _MOVES * float(np.nanquantile(np.abs(x), 0.9))
     use = np.isfinite(y) & np.isfinite(x) & (np.abs(x) > least) & (y != 0.0)
     if np.count_nonzero(use) < _LEAST:
