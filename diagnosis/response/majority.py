@@ -23,6 +23,7 @@ Flags = NDArray[np.bool_]
 _WITNESSES = 3
 _AGREE = 0.08  # of their speed: so far apart are wheels that agree
 _OFF, _BEYOND = 0.2, 3.0  # of their speed, and times what they are apart: what is further off contradicts them
+_NEARLY = 0.5  # of that: what is so far off all along does not come and go
 _MOVES = 0.1  # of the usual largest speed
 _JOIN_S = 1.0
 _JUMPED_S, _STEADY_S = 2.0, 5.0  # how long it must last where it jumps, or nothing is read, and else
@@ -60,7 +61,8 @@ def by_majority(judged: Mapping[str, Judged], block_s: float, *, sideways: bool)
         )
         known = np.isfinite(speed) & np.isfinite(y)
         spells = [_spell(a, b, y, speed) for a, b in spans_of(off, round(_JOIN_S / block_s))]
-        lasts = sum(np.count_nonzero(known[s.start : s.stop]) for s in spells) >= _LASTING * np.count_nonzero(known)
+        near = np.abs(y - speed)[known] > _NEARLY * _OFF * np.abs(speed[known])
+        lasts = np.count_nonzero(near) >= _LASTING * max(near.size, 1)
         kept = [
             s
             for s in spells

@@ -84,7 +84,7 @@ def measured_turns(line: Timeline, machine: Machine) -> tuple[Array, Array, floa
         return None
     step = max(1, round(_STEP_S / line.dt), line.size // _MOST)
     names = ["imu.yaw_rate", "cmd.lateral", *(f"wheel.{w}.v" for w in machine.wheels)]
-    seen = {n: _means(line.signals[n], step) for n in names if n in line.signals}
+    seen = {n: _medians(line.signals[n], step) for n in names if n in line.signals}
     if "cmd.lateral" in seen and np.nanstd(seen["cmd.lateral"]) > _STRAFES:
         return None
     dt, pairs = line.dt * step, list(_pairs(seen, machine))
@@ -95,9 +95,9 @@ def measured_turns(line: Timeline, machine: Machine) -> tuple[Array, Array, floa
     return np.asarray(np.mean([p.turn for p in pairs], axis=0)), seen["imu.yaw_rate"], track, dt
 
 
-def _means(x: Array, width: int) -> Array:
-    """Means of `width` steps each, shape (m,); NaN where one is not known. `x` of shape (n,)."""
-    return np.asarray(np.mean(x[: x.size // width * width].reshape(-1, width), axis=1), dtype=np.float64)
+def _medians(x: Array, width: int) -> Array:
+    """Medians of `width` steps each, shape (m,); NaN where one is not known. `x` of shape (n,)."""
+    return np.asarray(np.median(x[: x.size // width * width].reshape(-1, width), axis=1), dtype=np.float64)
 
 
 def _doubts(

@@ -17,6 +17,7 @@ _LEAST_S = 10.0  # of turning
 _LEAST_YAW, _LEAST_MADE = 0.2, 0.02  # rad/s: a bias of the gyro, and noise of the wheels, are less
 _FITS = 0.2  # of the yaw rate: what one share of the wheels' turn may leave of it (median)
 _MOST, _LEAST = 1.6, 0.2  # of the wheels' turn: tyres that slip make it less, nothing makes it more
+_FAR_MORE = 3.0  # times the wheels' turn: no ground turns a machine further than its wheels
 _NOTHING = 0.02  # of its spread
 
 
@@ -47,18 +48,20 @@ def turn_size_doubt(line: Timeline, machine: Machine) -> str:
         return f"imu.yaw_rate gives nothing while the wheels' speeds turn the machine at up to {most:.2g} rad/s: a dead gyro, or another axis of it"
     size = np.abs(yaw)
     clear = size > max(_TURNS * float(np.quantile(size, 0.9)), _LEAST_YAW)
-    clear &= np.abs(made) > _LEAST_MADE
     if np.count_nonzero(clear) * dt < _LEAST_S:
         return ""
-    share = float(np.median(yaw[clear] / made[clear]))
-    if float(np.median(np.abs(yaw - share * made)[clear])) > _FITS * float(np.median(size[clear])):
-        return ""
-    if share < 0.0:
+    by_size = float(np.median(size[clear])) / max(float(np.median(np.abs(made[clear]))), 1e-9)
+    told = clear & (np.abs(made) > _LEAST_MADE)
+    share = float(np.median(yaw[told] / made[told])) if np.count_nonzero(told) * dt >= _LEAST_S else 0.0
+    fits = bool(share) and float(np.median(np.abs(yaw - share * made)[told])) <= _FITS * float(np.median(size[told]))
+    if fits and share < 0.0:
         return "imu.yaw_rate turns against the wheels: its sign is wrong, or left and right are exchanged"
-    if _LEAST <= share <= _MOST:
+    if not by_size > _FAR_MORE and not (fits and not _LEAST <= share <= _MOST):
         return ""
+    more = share if fits else by_size
+    other = f"another track (it would be {track / more:.2g} m), " if fits else ""
     return (
-        f"imu.yaw_rate is {share:.2g} × what the wheels' speeds make over their track of {track:.3g} m: another track (it would be {track / share:.2g} m), "
+        f"imu.yaw_rate is {more:.2g} × what the wheels' speeds make over their track of {track:.3g} m: {other}a wrong place of the wheels, "
         "or a wrong unit of the gyro or of the speeds"
     )
 
