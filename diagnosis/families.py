@@ -29,7 +29,13 @@ _WHOLE: tuple[EvidenceFamily, ...] = (
     ResponseEvidence(),
     TrackingEvidence(),
 )
-_BY_SPEEDS: tuple[EvidenceFamily, ...] = (ResponseEvidence(), WheelEvidence(), DriveEvidence(), TrackingEvidence())
+_BY_SPEEDS: tuple[EvidenceFamily, ...] = (
+    ResponseEvidence(),
+    WheelEvidence(),
+    DriveEvidence(),
+    UnmovedDrives(),
+    TrackingEvidence(),
+)
 
 
 def whole(mission: MissionView) -> tuple[EvidenceFamily, ...]:
