@@ -7,7 +7,7 @@ import numpy as np
 from diagnosis.channels.echo import not_measured
 from diagnosis.channels.standstill import STILL, together_idle
 from diagnosis.evidence import ACTUATOR, SENSOR, Contribution, MissionView, Part
-from diagnosis.response.assess import assess_response
+from diagnosis.response.assess import Judgement, assess_response
 from diagnosis.response.body import body_speeds
 from diagnosis.response.by_body import beside_the_body
 from diagnosis.response.disputed import doubted
@@ -72,15 +72,17 @@ class ResponseEvidence:
             *map(not_related, judged.unrelated),
             *map(not_shown, judged.unshown),
             *map(one_side_otherwise, judged.scaled),
-            *map(gyro_or_slip, judged.gyro or _other_turns(mission)),
+            *map(gyro_or_slip, judged.gyro or _other_turns(mission, judged)),
             *wheels_apart(judged.apart),
             *(turns_otherwise(t.text) for t in turns),
         )
         return Contribution(parts, events=events)
 
 
-def _other_turns(mission: MissionView) -> tuple[str, ...]:
-    """A sentence where the gyro turns otherwise than the wheels all through, by more than tyres make of it."""
+def _other_turns(mission: MissionView, judged: Judgement) -> tuple[str, ...]:
+    """A sentence where the gyro turns otherwise than the wheels all through, by more than tyres make of it, and no wheel is what is wrong."""
+    if judged.apart or judged.scaled or any(side.findings for both in judged.parts.values() for side in both):
+        return ()
     text = turn_size_doubt(mission.timeline, mission.machine)
     return (f"All through the mission {text}.",) if text else ()
 

@@ -18,7 +18,7 @@ _LEAST_YAW, _LEAST_MADE = 0.2, 0.02  # rad/s: a bias of the gyro, and noise of t
 _FITS = 0.2  # of the yaw rate: what one share of the wheels' turn may leave of it (median)
 _MOST, _LEAST = 1.6, 0.2  # of the wheels' turn: tyres that slip make it less, nothing makes it more
 _FAR_MORE = 3.0  # times the wheels' turn: no ground turns a machine further than its wheels
-_NOTHING = 0.02  # of its spread
+_ONE_VALUE = 0.98  # of the time, in which a dead gyro gives one value
 
 
 def turn_size_doubt(line: Timeline, machine: Machine) -> str:
@@ -43,7 +43,7 @@ def turn_size_doubt(line: Timeline, machine: Machine) -> str:
     clear = np.abs(made) > max(_TURNS * float(np.quantile(np.abs(made), 0.9)), _LEAST_TURN)
     if np.count_nonzero(clear) * dt < _LEAST_S:
         return ""
-    if float(np.std(yaw)) < _NOTHING * float(np.std(made)):
+    if float(np.mean(yaw == np.median(yaw))) > _ONE_VALUE:
         most = float(np.quantile(np.abs(made[clear]), 0.9))
         return f"imu.yaw_rate gives nothing while the wheels' speeds turn the machine at up to {most:.2g} rad/s: a dead gyro, or another axis of it"
     size = np.abs(yaw)
