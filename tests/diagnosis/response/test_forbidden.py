@@ -20,7 +20,7 @@ T = np.arange(0.0, SECONDS, DT)
 PLACES = {"R": WheelGeometry(0.0, -TRACK / 2, 0.0, "fixed"), "L": WheelGeometry(0.0, TRACK / 2, 0.0, "fixed")}
 
 
-def judged(noise: dict[str, Array], *, gyro: bool, seed: int = 2) -> Judgement:
+def judged(noise: dict[str, Array], *, gyro: bool, seed: int = 2, edit: dict[str, float] | None = None) -> Judgement:
     """Two motors at 3 to 5 m/s without a command; `noise` of one sample by wheel [m/s]."""
     rng = np.random.default_rng(seed)
     v, yaw = 4.0 + np.sin(0.2 * T), 0.8 * np.sin(0.3 * T)
@@ -29,6 +29,7 @@ def judged(noise: dict[str, Array], *, gyro: bool, seed: int = 2) -> Judgement:
     data = {}
     for w, place in PLACES.items():
         y = v - place.y * yaw + (0.03 + noise.get(w, np.zeros(T.size))) * rng.normal(size=T.size)
+        y = (edit or {}).get(w, 1.0) * y
         data[w] = FollowerData(y, np.ones(T.size, np.bool_), cells, nothing, f"wheel.{w}.v")
     return assess_response(data, Geometry(PLACES, 0.4), yaw if gyro else None, Limits(driving_speed=0.5), DT)
 
@@ -56,3 +57,11 @@ def test_what_inertia_allows_in_both_wheels_is_ground(gyro: bool) -> None:
     shaken = np.where(T > 30.0, 0.12, 0.0)
     assert noisy(judged({"R": shaken, "L": shaken}, gyro=gyro)) == set()
     assert noisy(judged({}, gyro=gyro)) == set()
+
+
+def test_of_two_the_one_that_reads_nothing_is_told_and_is_no_measure_of_the_other() -> None:
+    j = judged({}, gyro=False, edit={"R": 0.0})
+    assert noisy(j) == set()
+    (sentence,) = j.apart
+    assert sentence.startswith("R")
+    assert "reads 0 from start to end" in sentence

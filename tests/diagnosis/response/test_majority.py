@@ -92,3 +92,9 @@ def test_a_side_is_told_by_the_speed_of_the_body() -> None:
     assert all("speed over ground" in s for s in told)
     assert car(bodies=(body,)).apart == ()
     assert car(bodies=(body._replace(speed=2.0 * speed),)).apart == ()  # all wheels alike are none of theirs
+
+
+def test_what_lasts_from_start_to_end_shows_by_the_speed_of_the_body() -> None:
+    body = BodySpeed("speed over ground", 14.0 + 4.0 * np.sin(0.1 * T[:: round(0.25 / DT)]), signed=False, reach=1)
+    assert "by the measured speed of the machine alone" in car(bodies=(body,)).parts["RR"][0].hidden
+    assert "would not show" in car().parts["RR"][0].hidden
