@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from diagnosis.channels.liveness import alive_sources
 from diagnosis.evidence import ACTUATOR, SENSOR, MissionView, Part
 from diagnosis.families import AXLES, SINGLE, whole
+from diagnosis.response.unquiet import left_open
 from diagnosis.results.assessment import Assessment, unassessed
 from diagnosis.results.free_wheels import only_rolls
 from diagnosis.results.limited import believed
@@ -68,6 +69,7 @@ def assess_components(
         if side == SENSOR or component not in machine.unpowered
     ]
     found = {part: mission.known.get(part) or _without_evidence(mission, *part) for part in parts}
+    found |= _no_louder(found, mission)
     found = {part: only_rolls(a) if part[0] in machine.unpowered else a for part, a in found.items()}
     words = machine_words(machine, timeline.signals if logged is None else logged)
     return ComponentResult(
@@ -76,6 +78,14 @@ def assess_components(
         tuple(event.worded(words) for event in mission.events),
         words,
     )
+
+
+def _no_louder(found: dict[Part, Assessment], mission: MissionView) -> dict[Part, Assessment]:
+    """Speed sensors as found, but for times in which they are rough as no other wheel's is."""
+    sensors = {w: a for (w, side), a in found.items() if side == SENSOR and w in mission.machine.wheels}
+    names = {w: f"wheel.{w}.v" for w in mission.machine.wheels if mission.logged(f"wheel.{w}.v")}
+    speeds = {w: (mission.values(n), mission.timeline.fresh[n]) for w, n in names.items()}
+    return {(w, SENSOR): a for w, a in left_open(sensors, speeds, mission.timeline.dt).items()}
 
 
 def _measured(mission: MissionView) -> MissionView:

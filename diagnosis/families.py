@@ -13,6 +13,7 @@ from diagnosis.direct.family import DirectEvidence
 from diagnosis.drives.family import DriveEvidence
 from diagnosis.evidence import EvidenceFamily, MissionView
 from diagnosis.response.family import ResponseEvidence, TrackingEvidence
+from diagnosis.response.never_moves import UnmovedDrives
 from diagnosis.steering.family import SteeringEvidence
 from diagnosis.wheels.family import WheelEvidence
 
@@ -21,8 +22,20 @@ AXLES: tuple[EvidenceFamily, ...] = (SteeringEvidence(),)
 #: What the channels of a single wheel show: these look at nothing that the axles hand on, and hand on parts alone.
 SINGLE: tuple[EvidenceFamily, ...] = (DeadSensors(), DirectEvidence())
 #: What wheels show beside each other and beside their commands.
-_WHOLE: tuple[EvidenceFamily, ...] = (WheelEvidence(), DriveEvidence(), ResponseEvidence(), TrackingEvidence())
-_BY_SPEEDS: tuple[EvidenceFamily, ...] = (ResponseEvidence(), WheelEvidence(), DriveEvidence(), TrackingEvidence())
+_WHOLE: tuple[EvidenceFamily, ...] = (
+    WheelEvidence(),
+    DriveEvidence(),
+    UnmovedDrives(),
+    ResponseEvidence(),
+    TrackingEvidence(),
+)
+_BY_SPEEDS: tuple[EvidenceFamily, ...] = (
+    ResponseEvidence(),
+    WheelEvidence(),
+    DriveEvidence(),
+    UnmovedDrives(),
+    TrackingEvidence(),
+)
 
 
 def whole(mission: MissionView) -> tuple[EvidenceFamily, ...]:

@@ -115,7 +115,7 @@ def _unmoved(d: Document) -> None:
 def _moment(d: Document) -> None:
     fault = _first(d, "high")
     window = f"{fault['start_s'] - 2.9:.1f}–{fault['start_s'] + 0.1:.1f} s"
-    reason = f"At the time of {fault['id']}, which may explain it: the speed of FR jumps by 20 % of itself at {window}."
+    reason = f"At the time of {fault['id']}, which may explain it: the speed of FR changes quickly, in the mean of 3 s by 20 % of itself at {window}."
     d["verdict"]["to_clear"].append({"reason": reason, "act": "repair it"})
 
 

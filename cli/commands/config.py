@@ -143,6 +143,7 @@ def _contradictions(signals: Signals, machine: Machine) -> tuple[tuple[str, ...]
     from diagnosis.results.machine_words import machine_words
     from replay.setup.body_scale import scale_doubts
     from replay.setup.places import place_doubts
+    from replay.setup.turn_sizes import turn_size_doubt
     from replay.signals.opening_doubts import opening_doubt
     from replay.signals.speed_doubts import speed_doubt
     from replay.signals.timeline import align
@@ -157,7 +158,9 @@ def _contradictions(signals: Signals, machine: Machine) -> tuple[tuple[str, ...]
     speeds = speed_doubt(line, signals.items, machine, lambda: witnesses_of(line))
     of_speeds = () if speeds is None else (f"{speeds.text.partition(':')[0]}; {speeds.act}",)
     doubts = (*of_openings, *of_speeds, *scale_doubts(line, machine, wheels))
-    return place_doubts(line, machine), doubts, openings is not None
+    against = place_doubts(line, machine)
+    size = turn_size_doubt(line, machine) if not against else ""
+    return against, (*doubts, size) if size else doubts, openings is not None
 
 
 def show(context: typer.Context, machine: MachineFile = None, quiet: Quiet = False, verbose: Verbose = False) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -112,7 +113,9 @@ def short_parts(
         if silent:
             out.append(ToClear(f"Not judged: {who}{why}.", named, tuple(parts), why=reason))
             continue
-        judged = _span([decided_s[part] for part in parts], ".1f")
+        judged = _span(
+            [math.floor(10.0 * decided_s[part]) / 10.0 for part in parts], ".1f"
+        )  # never as long as it should
         asked = [needed_s(driven.get(part, 0.0), limits.min_assessed) for part in parts]
         needed = _span(asked if max(asked) - min(asked) >= 1.0 else [max(asked)], ".3g")
         out.append(

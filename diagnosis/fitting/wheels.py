@@ -19,6 +19,7 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 _TAUS = np.geomspace(0.01, 3.0, 13)
+_RESOLVED = 1.5  # steps of the log: a shorter lag is known to half a step at best
 _LEAST_WINDOWS = 8
 _FLOOR = 0.05
 _MAX_LEFT_OUT = 1 / 3
@@ -163,7 +164,9 @@ def _lag(cuts: Cuts, dead: float, start: float, allowed: list[int]) -> Estimate:
     if len(cells[0]) < 3:
         return Estimate(start, float("nan"), "the commanded speed never changes while driving")
     table = np.array([c.sum(axis=0) for c in cells])
-    fine = np.maximum(minimum(taus, table) * np.geomspace(0.7, 1 / 0.7, 7), step)
+    fine = max(minimum(taus, table), step / 0.7) * np.geomspace(
+        0.7, 1 / 0.7, 7
+    )  # a shorter one than a step does not show
     groups = sums(float(fine[0]))[1]
     stack = np.array([sums(float(t))[0] for t in fine])  # (taus, windows, 3)
     tau = minimum(fine, stack.sum(axis=1))
@@ -172,7 +175,8 @@ def _lag(cuts: Cuts, dead: float, start: float, allowed: list[int]) -> Estimate:
     if best > 0.5 or float(misfit(table).max()) < 1.02 * best:
         why = f"the best lag explains {100 * (1 - best):.0f} % of the changes of speed only"
         return Estimate(start, float("nan"), why)
-    return Estimate(tau, float(np.hypot(std, _LAG_DOUBT * tau)))
+    unresolved = 0.5 * step if tau < _RESOLVED * step else 0.0
+    return Estimate(tau, float(np.hypot(np.hypot(std, _LAG_DOUBT * tau), unresolved)))
 
 
 def fit_wheel(records: list[WheelRecord], start_tau: float) -> WheelFit:

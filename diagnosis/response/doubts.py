@@ -14,6 +14,7 @@ from diagnosis.response.disputed import DISPUTED, HIDES, disputed_steps, doubted
 from diagnosis.response.drive_faults import DriveFaults
 from diagnosis.response.late import smallest_delay
 from diagnosis.response.machine import lasting_losses, otherwise, unlike
+from diagnosis.response.majority import by_majority
 from diagnosis.response.motionless import motionless, not_moving
 from diagnosis.response.power import powers_of, unshown
 from diagnosis.response.rivals import held_back_together
@@ -21,7 +22,7 @@ from diagnosis.response.scene import Drives, Given, Scene
 from diagnosis.response.sides import sides_of
 from diagnosis.response.unlike import contradicting, unlike_in_motion
 from diagnosis.response.weighed import Spells, Weighed
-from diagnosis.results.assessment import Assessment, Reason
+from diagnosis.results.assessment import Assessment, Finding, Reason
 from diagnosis.results.said import Said
 
 Flags = NDArray[np.bool_]
@@ -68,19 +69,23 @@ def sides_of_all(
     """Both sides of every wheel; `spells` are those that are kept, and those that are nobody's for sure."""
     judged, width, (kept, nobodys) = scene.judged, given.width, spells
     together = held_back_together(judged)
-    parts: Parts = {
-        w: sides_of(
-            j, kept[w], (faults.weak.get(w, []), faults.late[w]), (drives.left_out[w], together), given.limits, given.dt
-        )
-        for w, j in judged.items()
-    }
+
+    def both(w: str, late: Sequence[Finding]) -> tuple[Assessment, Assessment]:
+        known, where = (faults.weak.get(w, []), late), (drives.left_out[w], together)
+        return sides_of(judged[w], kept[w], known, where, given.limits, given.dt)
+
+    parts: Parts = {w: both(w, faults.late[w]) for w in judged}
+    for w, against in by_majority(judged, given.block_s, sideways=scene.sideways or weighed.other_way).items():
+        told = [f for side in parts[w] for f in side.findings]
+        more = [f for f in against if not any(f.start < g.stop and g.start < f.stop for g in told)]
+        parts[w] = both(w, [*faults.late[w], *more]) if more else parts[w]
     for w, (sensor, drive) in parts.items():
         late = [slice(f.start, f.stop) for f in faults.unclear[w]]
         parts[w] = doubted(sensor, late + [slice(x.start * width, x.stop * width) for x in nobodys[w]]), drive
     if len(drives.data) == 1:
         parts = {w: (either(a, judged[w], given.moves), b) for w, (a, b) in parts.items()}
     astray, lasts = otherwise(judged, given.block_s, drives.witness.there)
-    apart = unlike_in_motion(judged, scene.mates, sideways=scene.sideways)
+    apart = unlike_in_motion(judged, scene.mates, sideways=scene.sideways, speeds=given.speeds)
     none_read = motionless(judged, given.limits.driving_speed, given.block_s)
     doubts = {w: Reason(j.odd) for w, j in judged.items() if j.odd and not any(side.findings for side in parts[w])}
     doubts |= {w: j.joint.unlike for w, j in judged.items() if j.joint is not None and j.joint.unlike}

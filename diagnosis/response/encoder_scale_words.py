@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from diagnosis.response.body import BodySpeed
 from diagnosis.response.disputed import unproved
 from diagnosis.response.encoder_scale import LENGTH_S, Scaled, Sought
 from diagnosis.response.machine import Judged
@@ -20,6 +21,11 @@ _UNTOLD = (
     "No command says what the {wheels} should do, so that a factor on one side, or on all of them, from the start of the log to its end would not show, "
     "and is not assessed: log the commands (cmd.v, cmd.omega)."
 )
+_BY_BODY = (
+    "No command says what the {wheels} should do, so that a factor on one side, or on all of them, from the start of the log to its end shows by the "
+    "measured speed of the machine alone, and a small one is not assessed: log the commands (cmd.v, cmd.omega)."
+)
+_LEAST_BLOCKS = 80  # of a speed of the body, by which a lasting factor shows
 OTHERWISE = "it keeps to its command, but the gyro shows that one side of the machine goes otherwise than it reads"
 
 
@@ -37,6 +43,7 @@ def by_the_gyro(
     sought: Sought,
     turning: Turning | None,
     open_to: Sequence[slice] = (),
+    bodies: Sequence[BodySpeed] = (),
 ) -> Assessment:
     """A wheel's sensor with nothing healthy said of it while the gyro contradicts its side, and with what does not show.
 
@@ -54,13 +61,16 @@ def by_the_gyro(
         How the body is turned.
     open_to : Sequence[slice]
         Steps in which the gyro may be wrong, or either side.
+    bodies : Sequence[BodySpeed]
+        The body's speed by its own sensors.
     """
     one = judged[wheel]
     if turning is not None and wheel not in turning.sides:  # a steered one, of which the yaw rate says nothing
         sought, turning = Sought(), None
     if not one.response.answered:
         untold = not np.isfinite(one.data.asked).any() and len(judged) > 1
-        return replace(sensor, hidden=_UNTOLD) if untold else sensor
+        seen = any(b.name != "odometry" and np.count_nonzero(np.isfinite(b.speed)) >= _LEAST_BLOCKS for b in bodies)
+        return replace(sensor, hidden=_BY_BODY if seen else _UNTOLD) if untold else sensor
     several = len(judged) > 1
     if (several or one.view is None) and not one.data.unpowered:  # which closes no loop
         sensor = replace(

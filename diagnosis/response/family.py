@@ -7,7 +7,7 @@ import numpy as np
 from diagnosis.channels.echo import not_measured
 from diagnosis.channels.standstill import STILL, together_idle
 from diagnosis.evidence import ACTUATOR, SENSOR, Contribution, MissionView, Part
-from diagnosis.response.assess import assess_response
+from diagnosis.response.assess import Judgement, assess_response
 from diagnosis.response.body import body_speeds
 from diagnosis.response.by_body import beside_the_body
 from diagnosis.response.disputed import doubted
@@ -27,8 +27,10 @@ from diagnosis.results.machine_event import (
     turns_otherwise,
     wheels_apart,
 )
+from diagnosis.results.said import Said
 from diagnosis.results.vocabulary import Tier
 from replay.machine.config import Machine
+from replay.setup.turn_sizes import turn_size_doubt
 
 _TURNS_OTHERWISE = Reason("the gyro contradicts the heading of odometry, which its speed is a part of")
 
@@ -71,11 +73,19 @@ class ResponseEvidence:
             *map(not_related, judged.unrelated),
             *(x.event(not_shown) for x in judged.unshown),
             *(x.event(one_side_otherwise) for x in judged.scaled),
-            *(x.event(gyro_or_slip) for x in judged.gyro),
+            *(x.event(gyro_or_slip) for x in judged.gyro or _other_turns(mission, judged)),
             *wheels_apart(judged.apart),
             *(t.said.event(turns_otherwise) for t in turns),
         )
         return Contribution(parts, events=events)
+
+
+def _other_turns(mission: MissionView, judged: Judgement) -> tuple[Said, ...]:
+    """A sentence where the gyro turns otherwise than the wheels all through, by more than tyres make of it, and no wheel is what is wrong."""
+    if judged.apart or judged.scaled or any(side.findings for both in judged.parts.values() for side in both):
+        return ()
+    text = turn_size_doubt(mission.timeline, mission.machine)
+    return (Said(f"All through the mission {text}."),) if text else ()
 
 
 class TrackingEvidence:

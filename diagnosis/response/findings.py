@@ -87,7 +87,8 @@ def _silent(spell: Spell, wheel: Wheel, first: int, last: int, speed: Array | No
     end = last if rose is None else int(wheel.samples.step[rose])
     if fell is None and rose is None and _asked_little(wheel, part) and _lives(wheel, begin, end):
         return None
-    texts = [f"{wheel.name} read 0 for {(end - begin) * wheel.dt:.2f} s while its command asked for motion."]
+    asked = "its command asked for motion" if np.isfinite(wheel.blocks.low[part]).any() else "other {wheels} turned"
+    texts = [f"{wheel.name} read 0 for {(end - begin) * wheel.dt:.2f} s while {asked}."]
     # a wheel that comes free leaps ahead, for its loop has wound up
     sensor = _by_jumps(wheel, 0 if fell is None else 1 + (rose is not None))
     if fell is not None or rose is not None:

@@ -64,6 +64,8 @@ class Blocks(NamedTuple):
         Whether values that are held for long may be the channel's habit, as other wheels have it.
     long_s : float
         Time from which on a value is held for long [s].
+    most : Array or float, shape (b,)
+        Most that may be usual of what changes from sample to sample, by the inertia of a wheel, whatever other wheels do [m/s].
     """
 
     start: NDArray[np.intp]
@@ -78,6 +80,7 @@ class Blocks(NamedTuple):
     usual: Array
     habitual: bool = True
     long_s: float = _LONG_S
+    most: Array | float = np.inf
 
     @property
     def white(self) -> Array:

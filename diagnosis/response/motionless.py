@@ -13,12 +13,13 @@ from diagnosis.results.assessment import CODE, Assessment, Reason
 from diagnosis.results.vocabulary import Tier
 from replay.faults import State
 
-_OTHERS = 2  # wheels that must turn meanwhile: of two a machine may turn about one
+_OTHERS = 2  # wheels that must turn meanwhile, or the only other one
 _TURNS_S = 10.0  # for which each of them drives
 _SAID = (
-    "it reads 0 from start to end while all other {wheels} turn, and no command says what it should do: a dead sensor, a drive that never turns, or a "
+    "it reads 0 from start to end while every other {wheel} turns, and no command says what it should do: a dead sensor, a drive that never turns, or a "
     "channel that nothing fills"
 )
+_ABOUT = "; or a machine that did nothing but turn about this {wheel}"
 
 
 def motionless(judged: Mapping[str, Judged], driving_speed: float, block_s: float) -> dict[str, Reason]:
@@ -36,9 +37,11 @@ def motionless(judged: Mapping[str, Judged], driving_speed: float, block_s: floa
     speeds = {w: np.abs(np.nan_to_num(j.wheel.blocks.mean)) for w, j in judged.items()}
     turns = {w: float(np.count_nonzero(x > driving_speed)) * block_s >= _TURNS_S for w, x in speeds.items()}
     still = [w for w, x in speeds.items() if np.max(x, initial=0.0) <= STILL * driving_speed]
-    if sum(turns.values()) < _OTHERS or len(still) + sum(turns.values()) < len(judged):
+    turning = sum(turns.values())
+    if turning < min(_OTHERS, len(judged) - 1) or not turning or len(still) + turning < len(judged):
         return {}
-    return {w: Reason(_SAID) for w in still if not judged[w].response.answered}
+    why = Reason(_SAID + (_ABOUT if turning == 1 else ""))
+    return {w: why for w in still if not judged[w].response.answered}
 
 
 def not_moving(sensor: Assessment, drive: Assessment, why: Reason) -> tuple[Assessment, Assessment]:

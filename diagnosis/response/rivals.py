@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.response.channel import Samples
+from diagnosis.response.forbidden import allowed, calm_enough, largest_roughness
 from diagnosis.response.inputs import cells
 from diagnosis.response.lasting_noise import quiet_level
 from diagnosis.response.machine import Judged, unlike_others
@@ -28,6 +29,7 @@ _DOUBT_S = 0.5  # around the beginning and the end of a spell
 _ROUGHER = 2.0  # times what changes from sample to sample in other wheels, at most, is usual
 _SPIKIER = 4.0  # times the wild readings of the other wheels (median): fewer are a habit of the machine, as coarse encoders have
 _TURNS = 0.05  # of the usual speed
+_LEAST_NOISY = 20  # blocks in which a channel changes: fewer tell nothing of its noise
 _ALSO_HELD = 0.05  # of the driving in which another wheel stays at one value for long: then it is a habit
 _WITHIN, _LONGER = 0.9, 2.0  # of a spell, and times its length: what lies so within another wheel's is its consequence
 _STEADIER = 1.3  # times the misfit beside one gain: the wheel whose gain is the steadier one is at fault
@@ -44,28 +46,42 @@ def by_each_other(found: Mapping[str, Judged], block_s: float, rest: Mapping[str
     rough = {w: float(np.median(j.wheel.blocks.usual)) for w, j in found.items()}
     held = {w: held_long(j.wheel.blocks, j.driving, block_s) for w, j in found.items()}
     wild = {w: _wild_share(s) for w, s in {**rest, **{w: j.wheel.samples for w, j in found.items()}}.items()}
+    calm = {
+        w: calm_enough(j.wheel.blocks, j.driving, largest_roughness(j.wheel.blocks, j.wheel.samples, j.wheel.dt))
+        for w, j in found.items()
+    }
     out = {}
     for w, j in found.items():
         others = [o for o in found if o != w]
+        turning = [o for o in others if _shows_noise(found[o])]
         blocks = j.wheel.blocks
-        if others:
-            most = _ROUGHER * float(np.median([rough[o] for o in others]))
-            share = min(1.0, most / rough[w]) if rough[w] > 0.0 and most > 0.0 else 1.0
+        most = allowed(blocks, j.wheel.samples, j.driving, j.wheel.dt, [calm[o] for o in others])
+        if turning:
+            likely = _ROUGHER * float(np.median([rough[o] for o in turning]))
+            share = min(1.0, likely / rough[w]) if rough[w] > 0.0 and likely > 0.0 else 1.0
             speed = np.abs(np.nan_to_num(blocks.mean))
-            likewise = _ROUGHER * np.median([_usual_at(found[o].wheel.blocks, speed) for o in others], axis=0)
+            likewise = _ROUGHER * np.median([_usual_at(found[o].wheel.blocks, speed) for o in turning], axis=0)
             mine = _usual_at(blocks, speed)
             shares = np.divide(likewise, mine, out=np.ones(mine.size), where=(mine > 0.0) & (likewise > 0.0))
-            quiet = quiet_level(blocks, j.driving, block_s, [found[o].wheel.blocks.rough for o in others])
+            quiet = quiet_level(blocks, j.driving, block_s, [found[o].wheel.blocks.rough for o in turning])
             blocks = blocks._replace(
                 usual=np.minimum(np.clip(shares, 0.0, share) * blocks.usual, np.maximum(quiet, likewise / _ROUGHER)),
-                habitual=max(held[o] for o in others) > _ALSO_HELD,
             )
-        elif not rest:
+        elif not rest and not others:  # beside one that shows nothing it may as well be the ground
             blocks = blocks._replace(usual=quiet_level(blocks, j.driving, block_s))
+        if others:
+            blocks = blocks._replace(habitual=max(held[o] for o in others) > _ALSO_HELD)
+        blocks = blocks._replace(usual=np.minimum(blocks.usual, most), most=most)
         known = [x for o, x in wild.items() if o != w]
         usual = bool(known) and wild[w] <= _SPIKIER * float(np.median(known))
         out[w] = j._replace(wheel=j.wheel._replace(blocks=blocks, spiky=not usual))
     return out
+
+
+def _shows_noise(one: Judged) -> bool:
+    """Whether readings of a wheel change where it drives: one that is dead, held or at rest says nothing of how much others may."""
+    b = one.wheel.blocks
+    return int(np.count_nonzero((b.readings > 0) & ~b.held & ~b.dead & (b.zero < b.readings))) >= _LEAST_NOISY
 
 
 def _usual_at(blocks: Blocks, speed: Array) -> Array:

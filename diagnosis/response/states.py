@@ -31,8 +31,8 @@ def judge(one: Judged, beside: Beside | None, dt: float, width: int) -> Judged:
         Steps in a block.
     """
     block_s, blocks = width * dt, one.wheel.blocks
-    if beside is not None:  # what shakes other wheels too is no sensor's noise
-        blocks = blocks._replace(usual=np.maximum(blocks.usual, beside.rough))
+    if beside is not None:  # what shakes other wheels too is no sensor's noise, up to what a wheel's inertia allows
+        blocks = blocks._replace(usual=np.maximum(blocks.usual, np.minimum(beside.rough, blocks.most)))
     rolled = one.data.rolled
     usual, name = as_usual(blocks.mean, one.data.joint_share, width), f"{one.data.name}_position"
     joint = None if rolled is None else joint_of(blocks, cells(rolled, width), beside, name, usual)

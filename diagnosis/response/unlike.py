@@ -7,7 +7,9 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from diagnosis.response.body import BodySpeed
 from diagnosis.response.machine import Judged
+from diagnosis.response.majority import agreed
 from diagnosis.results.assessment import Reason
 
 Array = NDArray[np.float64]
@@ -19,10 +21,15 @@ _MOVES = 0.1  # of the usual largest speed
 _FITS = 0.15  # median misfit of two wheels of a side, of their speed: else the ground makes more of it
 _TOGETHER, _APART = 4, 0.25  # wheels that one sum relates; the size of what it leaves beside the least motion
 _KEPT, _ROUNDS = 0.8, 4
+_WITNESSES, _MOSTLY = 3, 0.5  # wheels that agree, and in how much of the motion
 
 
 def unlike_in_motion(
-    judged: Mapping[str, Judged], mates: Mapping[str, Sequence[str]], *, sideways: bool
+    judged: Mapping[str, Judged],
+    mates: Mapping[str, Sequence[str]],
+    *,
+    sideways: bool,
+    speeds: Sequence[BodySpeed] = (),
 ) -> dict[str, Reason]:
     """Wheels without a command that answers for them, which read another share of the motion than others, with a sentence.
 
@@ -34,6 +41,8 @@ def unlike_in_motion(
         Others of the same side, by wheel.
     sideways : bool
         Whether the machine also moves sideways, so that wheels of one side are not alike.
+    speeds : Sequence[BodySpeed]
+        Sensors of the body's speed.
     """
     bare = [w for w, j in judged.items() if not j.response.answered]
     means = {w: j.wheel.blocks.mean for w, j in judged.items()}
@@ -46,9 +55,37 @@ def unlike_in_motion(
         told = {o: x for o in beside if (x := _share(means[w], means[o])) is not None}
         if known:
             if abs(np.log(known[w])) > _ROLLERS:
-                out[w] = _said(known[w], "all others")
+                out[w] = _said(known[w], "all others make")
         elif told and all(abs(np.log(x)) > _ALIKE for x in told.values()):
-            out[w] = _said(float(np.median(list(told.values()))), " and ".join(told))
+            out[w] = _said(float(np.median(list(told.values()))), " and ".join(told) + " make")
+        elif not told and (share := _beside_all(means, w)) is not None:
+            out[w] = _said(share, "all others make")
+    return out | {w: why for w, why in _beside_body(means, speeds).items() if w in bare and w not in out}
+
+
+def _beside_all(means: Mapping[str, Array], wheel: str) -> float | None:
+    """What a wheel reads of three or more others that agree [1]; None where it is as they are, or they do not agree in most of its motion."""
+    others = [x for w, x in means.items() if w != wheel]
+    if len(others) < _WITNESSES:
+        return None
+    speed, _ = agreed(others)
+    share = _share(means[wheel], speed)
+    moves = np.abs(np.median(np.array(others), axis=0)) > 0.0
+    agree = np.count_nonzero(np.isfinite(speed)) >= _MOSTLY * np.count_nonzero(moves)
+    return share if share is not None and agree and abs(np.log(share)) > _ALIKE else None
+
+
+def _beside_body(means: Mapping[str, Array], speeds: Sequence[BodySpeed]) -> dict[str, Reason]:
+    """Wheels that read another share of the body's measured speed than 1 while as many others, at least, read what it says, with a sentence."""
+    out: dict[str, Reason] = {}
+    for body in speeds:
+        if body.name == "odometry":  # made of the wheels
+            continue
+        size = np.abs(body.speed)
+        shares = {w: x for w, y in means.items() if (x := _share(np.abs(y), size)) is not None}
+        off = {w: x for w, x in shares.items() if abs(np.log(x)) > _ALIKE}
+        if off and 2 * len(off) <= len(shares):
+            out |= {w: _said(x, f"{body.name} show") for w, x in off.items()}
     return out
 
 
@@ -59,13 +96,15 @@ def contradicting(apart: Mapping[str, Reason], still: Mapping[str, Reason]) -> t
 
 def _said(share: float, others: str) -> Reason:
     return Reason(
-        f"over the whole mission it reads {share:.2f} × what {others} make of the same motion, and no command tells which of them is right: a scaled or "
+        f"over the whole mission it reads {share:.2f} × what {others} of the same motion, and no command tells which of them is right: a scaled or "
         "wrongly mapped sensor, or another {wheel} diameter"
     )
 
 
 def _share(y: Array, x: Array) -> float | None:
     """What a wheel reads of another one's speed, all through [1]; None where the two do not go together."""
+    if not np.isfinite(x).any():
+        return None
     least = _MOVES * float(np.nanquantile(np.abs(x), 0.9))
     use = np.isfinite(y) & np.isfinite(x) & (np.abs(x) > least) & (y != 0.0)
     if np.count_nonzero(use) < _LEAST:

@@ -91,7 +91,10 @@ CHECK_WORDS: dict[Check, tuple[str, str]] = {
         "error of tracking, less that of the other {wheels}",
         "the error of {part} against its commanded speed exceeds the other {wheels}' by {value} of that speed",
     ),
-    Check.ROUGHNESS: ("quick changes of the speed", "the speed of {part} jumps by {value} of itself"),
+    Check.ROUGHNESS: (
+        "quick changes of the speed",
+        "the speed of {part} changes quickly, in the mean of 3 s by {value} of itself",
+    ),
     Check.DELAY: (
         "delay against the other {wheels}",
         "the speed of {part} comes {value} later than the other {wheels}'",

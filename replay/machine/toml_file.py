@@ -30,6 +30,7 @@ _SECTIONS = {
 _HEAD = {"name", "id", "wheels", "unpowered", "drive", "part", "speed_unit"}
 _STANDARD = ("wheelbase", "joint_spacing", "wheel_offset")
 _LONGEST = 1000
+_FASTEST_DRIVING = 2.0  # m/s: the least driving speed is a share of max_speed, but no more than that
 _SIDES = tuple(side.value for side in Side)
 _MODES = tuple(mode.value for mode in FaultMode)
 #: Keys of [geometry] that are the machine's own.
@@ -88,7 +89,10 @@ def _machine(data: Mapping[str, Any]) -> Machine:
         "geometry.max_speed", speed, 1e-6, 1e6, str(head.get("speed_unit", base.speed_unit))
     )  # before limits are made of it
     limits = dict(data.get("limits", {}))
-    limits.setdefault("driving_speed", round(base.limits.driving_speed * speed / base.max_speed, 9))
+    driving = base.limits.driving_speed * speed / base.max_speed
+    if head.get("speed_unit", base.speed_unit) == "m/s":
+        driving = min(driving, _FASTEST_DRIVING)  # a car on a yard drives as well
+    limits.setdefault("driving_speed", round(driving, 9))
     limits.setdefault("min_sat", round(base.limits.min_sat * speed / base.max_speed, 9))
     axles = () if geometry is None else geometry.axles
     signals = {_of_own_axle(k, axles): _signal(k, v) for k, v in data.get("signals", {}).items()}

@@ -75,6 +75,31 @@ def place_doubts(line: Timeline, machine: Machine) -> tuple[str, ...]:
     return tuple(_doubts(pairs, views, seen, machine, speed, dt))
 
 
+def measured_turns(line: Timeline, machine: Machine) -> tuple[Array, Array, float, float] | None:
+    """Turn by the wheels' differences and by the gyro [rad/s], each of shape (m,), the mean track [m], and the step of both [s].
+
+    None where wheels without places, or no gyro, are in the log, or the machine also goes sideways.
+    """
+    if machine.geometry is None or machine.speed_unit != "m/s":
+        return None
+    step = max(1, round(_STEP_S / line.dt), line.size // _MOST)
+    names = ["imu.yaw_rate", "cmd.lateral", *(f"wheel.{w}.v" for w in machine.wheels)]
+    seen = {n: _medians(line.signals[n], step) for n in names if n in line.signals}
+    if "cmd.lateral" in seen and np.nanstd(seen["cmd.lateral"]) > _STRAFES:
+        return None
+    dt, pairs = line.dt * step, list(_pairs(seen, machine))
+    if not pairs or "imu.yaw_rate" not in seen:
+        return None
+    places = machine.geometry.wheels
+    track = float(np.mean([places[p.left].y - places[p.right].y for p in pairs]))
+    return np.asarray(np.mean([p.turn for p in pairs], axis=0)), seen["imu.yaw_rate"], track, dt
+
+
+def _medians(x: Array, width: int) -> Array:
+    """Medians of `width` steps each, shape (m,); NaN where one is not known. `x` of shape (n,)."""
+    return np.asarray(np.median(x[: x.size // width * width].reshape(-1, width), axis=1), dtype=np.float64)
+
+
 def _doubts(
     pairs: list[_Pair], views: list[_View], seen: Mapping[str, Array], machine: Machine, speed: Array, dt: float
 ) -> Iterator[str]:

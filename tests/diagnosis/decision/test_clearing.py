@@ -145,7 +145,7 @@ def test_every_check_has_words(check: Check) -> None:
             1.78,
             "the error of FR against its commanded speed exceeds the other wheels' by 178 % of that speed",
         ),
-        (Check.ROUGHNESS, 0.2, "the speed of FR jumps by 20 % of itself"),
+        (Check.ROUGHNESS, 0.2, "the speed of FR changes quickly, in the mean of 3 s by 20 % of itself"),
     ],
 )
 def test_ratios_are_told_as_such_and_nothing_is_below_by_more_than_all(check: Check, worst: float, words: str) -> None:

@@ -290,3 +290,8 @@ def test_what_is_left_out_is_named(folder: Path, text: str, words: str) -> None:
     (folder / "part.toml").write_text(text)
     with pytest.raises(ConfigError, match=words):
         load_machine(folder / "part.toml")
+
+
+def test_the_least_driving_speed_of_fast_machines_is_that_of_a_yard(folder: Path) -> None:
+    assert load(folder, "[geometry]\nmax_speed = 3.6\n").limits.driving_speed == pytest.approx(0.5)
+    assert load(folder, "[geometry]\nmax_speed = 40\n").limits.driving_speed == 2.0
