@@ -145,10 +145,10 @@ def _faulty(f: Finding) -> float:
 def without_explained(
     found: Mapping[str, Finding], events: Sequence[MachineEvent], axles: Collection[str]
 ) -> dict[str, Finding]:
-    """What stands out, by component, less what events of the whole machine explain; a wheel model that does not fit explains no axle."""
+    """What stands out, by component, less what events of the whole machine explain; a wheel model that does not fit explains no axle, nor does a gyro."""
     if not events:
         return dict(found)
-    return {part: f for part, f in found.items() if part in axles and all(event.model for event in events)}
+    return {part: f for part, f in found.items() if part in axles and all(e.model or e.body for e in events)}
 
 
 def with_findings(assessments: Mapping[Part, Assessment], found: Mapping[str, Finding]) -> dict[Part, Assessment]:
