@@ -19,6 +19,7 @@ from diagnosis.clearing.cells import Cells
 from diagnosis.clearing.jumps import fault_of_jumps
 from diagnosis.clearing.limits import Limits, measured_twice, usual_limits
 from diagnosis.clearing.openings import speeds_follow_openings
+from diagnosis.clearing.second_angles import scaled_angles
 from diagnosis.clearing.still import rate_of
 from diagnosis.clearing.untold_faults import fault_of_angle, fault_of_axle, fault_of_wheel
 from diagnosis.results.assessment import CODE, Assessment, Finding
@@ -72,6 +73,7 @@ def what_stands_out(checks: Sequence[Checked], cells: Cells, words: MachineWords
     jumping = {c.component: fault_of_jumps(c, cells) for c in checks if c.check is Check.JUMP and not c.passed}
     found = {component: fault for component, fault in jumping.items() if fault is not None}
     found |= {check.component: fault_of_angle(check, cells) for check in checks if _off_second_angle(check)}
+    found |= {c: f for c, f in scaled_angles(checks, cells).items() if not cells.stated.get(c)}
     axles = {c.component: fault_of_axle(c, cells) for c in checks if _does_not_answer(c, cells)}
     still = {component: fault for component, fault in axles.items() if fault is not None}
     found |= _less_sure_together(still, cells)
