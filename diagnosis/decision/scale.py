@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from diagnosis.clearing.cells import Array, Cells
-from diagnosis.clearing.yaw import ends_of
+from diagnosis.clearing.yaw import turning_ends
 from diagnosis.decision.turn_scale import ANGLE, GYRO, SECOND_ANGLES, Meant, factor_of, meant
 from diagnosis.response.body import BodySpeed, body_speeds
 from diagnosis.results.machine_event import MachineEvent, other_angle, other_turn, other_yaw_rate
@@ -273,10 +273,10 @@ def _by_sides(cells: Cells, geometry: Geometry, speeds: Array) -> tuple[Array, s
 
 
 def _by_angles(cells: Cells, geometry: Geometry, v: Array) -> tuple[Array, str] | None:
-    """Yaw rate by speed and steering angles [rad/s], shape (cells,), where these are large; None without two ends."""
-    ends = ends_of(cells.machine)
+    """Yaw rate by speed and steering angles [rad/s], shape (cells,), where these are large; None without two ends that turn the machine."""
+    ends = turning_ends(cells.machine)
     names = [name for end in ends.values() for name in end]
-    if len(ends) != 2 or len({p.axle for p in geometry.wheels.values()} - set(names)) or set(names) == {"fixed"}:
+    if len(ends) != 2 or not set(names) & set(cells.machine.axles):
         return None
     angles = [
         np.mean([np.zeros(cells.size) if n == "fixed" else cells.means(f"steer.{n}.phi") for n in end], axis=0)
