@@ -20,6 +20,7 @@ from diagnosis.clearing.jumps import fault_of_jumps
 from diagnosis.clearing.limits import Limits, measured_twice, usual_limits
 from diagnosis.clearing.openings import speeds_follow_openings
 from diagnosis.clearing.second_angles import scaled_angles
+from diagnosis.clearing.spikes import fault_of_spikes
 from diagnosis.clearing.still import rate_of
 from diagnosis.clearing.untold_faults import fault_of_angle, fault_of_axle, fault_of_wheel
 from diagnosis.results.assessment import CODE, Assessment, Finding
@@ -74,6 +75,8 @@ def what_stands_out(checks: Sequence[Checked], cells: Cells, words: MachineWords
     found = {component: fault for component, fault in jumping.items() if fault is not None}
     found |= {check.component: fault_of_angle(check, cells) for check in checks if _off_second_angle(check)}
     found |= {c: f for c, f in scaled_angles(checks, cells).items() if not cells.stated.get(c)}
+    rough = {c.component for c in checks if c.check is Check.ROUGHNESS and not c.passed}
+    found |= {wheel: fault for wheel in rough if (fault := fault_of_spikes(wheel, cells)) is not None}
     axles = {c.component: fault_of_axle(c, cells) for c in checks if _does_not_answer(c, cells)}
     still = {component: fault for component, fault in axles.items() if fault is not None}
     found |= _less_sure_together(still, cells)
