@@ -93,7 +93,7 @@ def assess_response(
     gyro = wrong_gyro(judged, unsettled, apart.turning, block_s, heading, aside, across)
     open_to = [slice(x.start * width, x.stop * width) for x in gyro if not x.sure]
     parts = {
-        w: (by_the_gyro(w, sensor, judged, sought, apart.turning, open_to, ground=bool(speeds)), drive)
+        w: (by_the_gyro(w, sensor, judged, sought, apart.turning, open_to, speeds), drive)
         for w, (sensor, drive) in sides.parts.items()
     }
     ignored = () if any(j.response.answered for j in judged.values()) else _unexplained(drives, given)

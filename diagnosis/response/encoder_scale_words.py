@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from diagnosis.response.body import BodySpeed
 from diagnosis.response.disputed import unproved
 from diagnosis.response.encoder_scale import LENGTH_S, Scaled, Sought
 from diagnosis.response.machine import Judged
@@ -18,7 +19,6 @@ _UNTOLD = (
     "No command says what the {wheels} should do, so that a factor on one side, or on all of them, from the start of the log to its end would not show, "
     "and is not assessed: log the commands (cmd.v, cmd.omega)."
 )
-COUNT = "let each {wheel} make ten turns by its encoder, and count them"
 OTHERWISE = "it keeps to its command, but the gyro shows that one side of the machine goes otherwise than it reads"
 
 
@@ -36,8 +36,7 @@ def by_the_gyro(
     sought: Sought,
     turning: Turning | None,
     open_to: Sequence[slice] = (),
-    *,
-    ground: bool = False,
+    bodies: Sequence[BodySpeed] = (),
 ) -> Assessment:
     """A wheel's sensor with nothing healthy said of it while the gyro contradicts its side, and with what does not show.
 
@@ -55,8 +54,8 @@ def by_the_gyro(
         How the body is turned.
     open_to : Sequence[slice]
         Steps in which the gyro may be wrong, or either side.
-    ground : bool
-        Whether a speed over ground is in the log already.
+    bodies : Sequence[BodySpeed]
+        The body's speed by its own sensors.
     """
     one = judged[wheel]
     which = ""
@@ -70,6 +69,7 @@ def by_the_gyro(
     several = len(judged) > 1
     if (several or one.view is None) and not one.data.unpowered:  # which closes no loop
         by_turns = several and not (turning is None and one.yaw is not None)
+        ground = any(b.name != "odometry" for b in bodies)
         sensor = replace(sensor, hidden=unseen(sought, which, several=by_turns, ground=ground))
     blocks = one.wheel.blocks.start
     width, where = int(blocks[1]) if blocks.size > 1 else 1, np.zeros(one.data.y.size, np.bool_)
@@ -132,6 +132,7 @@ def unseen(sought: Sought, which: str = "", *, several: bool, ground: bool = Fal
             f"{of} shows by the gyro alone, on one {{wheel}} from {x:.2f} × (or {1.0 / x:.2f} ×) on where it lasts {LENGTH_S:.0f} s of driving; a smaller "
             "one is not assessed."
         )
-    does = "log a speed over ground (gnss.speed)" if not ground else COUNT
+    count = "let each {wheel} make ten turns by its encoder, and count them"
+    does = count if ground else "log a speed over ground (gnss.speed)"
     does = "log a yaw rate (imu.yaw_rate) with turns both ways" if several else does
     return f"{of} would not show in this log, and is not assessed: {does}."
