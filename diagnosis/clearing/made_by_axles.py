@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 
 from diagnosis.results.assessment import Assessment, Finding
-from diagnosis.results.event_times import times_said
 from diagnosis.results.machine_event import MachineEvent
 
 _MOSTLY = 0.8  # of the time of an event
@@ -16,7 +15,6 @@ def without_made_by_axles(
     events: Sequence[MachineEvent],
     assessments: Mapping[tuple[str, str], Assessment],
     axles: Collection[str],
-    size: int,
     dt: float,
 ) -> tuple[MachineEvent, ...]:
     """Events of the machine less those of its body's sensors that faults of its axles make.
@@ -32,8 +30,6 @@ def without_made_by_axles(
         By component and side.
     axles : Collection[str]
         Steering axles.
-    size : int
-        Samples of the mission.
     dt : float
         Step [s].
     """
@@ -43,19 +39,18 @@ def without_made_by_axles(
         for f in a.findings
         if component in axles and _total(f)
     }
-    return tuple(e for e in events if not (e.body and _within(e, dead, size * dt)))
+    return tuple(e for e in events if not (e.body and _within(e, dead)))
 
 
 def _total(f: Finding) -> bool:
     return f.mode.total and f.probability >= 0.5
 
 
-def _within(event: MachineEvent, dead: Collection[tuple[float, float]], length_s: float) -> bool:
+def _within(event: MachineEvent, dead: Collection[tuple[float, float]]) -> bool:
     """Whether an event lasts for a while, and for most of it a fault, both in s."""
-    spans = event.spans or times_said(event.text, length_s)
-    return bool(spans) and all(
+    return bool(event.spans) and all(
         sum(max(0.0, min(b, stop) - max(a, start)) for start, stop in _united(dead)) >= _MOSTLY * (b - a)
-        for a, b in spans
+        for a, b in event.spans
     )
 
 

@@ -17,7 +17,7 @@ DT, SIZE = 0.1, 1000
 def _left(event: MachineEvent, *, mode: FaultMode = FaultMode.NO_SIGNAL, axle: str = "rear") -> bool:
     fault = finding_of((300, 500), mode, None, ())
     told = {(axle, "sensor"): Assessment(np.zeros(SIZE, np.int8), findings=(fault,))}
-    return without_made_by_axles((event,), told, ("front", "rear"), SIZE, DT) == (event,)
+    return without_made_by_axles((event,), told, ("front", "rear"), DT) == (event,)
 
 
 def _between(start: float, stop: float) -> MachineEvent:
@@ -38,4 +38,4 @@ def test_what_begins_before_comes_later_or_is_so_throughout_is_told(event: Machi
 def test_no_partial_fault_no_wheel_and_no_other_event_is_meant() -> None:
     assert _left(_between(35.0, 45.0), mode=FaultMode.INEFFICIENT)
     assert _left(_between(35.0, 45.0), axle="RR")
-    assert _left(not_following("From 35.0 to 45.0 s nothing moved."))
+    assert _left(not_following("Nothing moved.").at([(35.0, 45.0)]))
