@@ -21,9 +21,8 @@ def _left(event: MachineEvent, *, mode: FaultMode = FaultMode.NO_SIGNAL, axle: s
 
 
 def _between(start: float, stop: float) -> MachineEvent:
-    return gyro_or_slip(
-        f"From {start} to {stop} s the gyro reads 0.55 × what the wheels make, unless the ground let them slip."
-    )
+    text = "The gyro reads 0.55 × what the wheels make, unless the ground let them slip."
+    return gyro_or_slip(text).at([(start, stop)])
 
 
 def test_what_an_axle_that_does_not_answer_makes_is_no_event_of_its_own() -> None:
