@@ -93,7 +93,8 @@ def _of_valve(found: SideFindings, inputs: AxleInputs, min_sat: float) -> SideFi
     off = told(SideFindings(tuple(off_command(found.findings, measured)), ())).findings
     pieces = tuple(sorted([*found.findings, *off], key=lambda f: f.start))
     found = _as_it_opens(found._replace(findings=pieces), (y, x, use), inputs, min_sat)
-    open_, stands = [], []
+    open_: list[Finding] = []
+    stands: list[Finding] = []
     for f in as_late(_explained(found, measured), y, command, use, inputs.timeline.dt):
         stays = f.mode.total and _stands_while_told(f, y, command, use, inputs.timeline.dt)
         (stands if stays else open_).append(f)
