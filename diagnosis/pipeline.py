@@ -24,6 +24,7 @@ from diagnosis.clearing.beside import (
     less_sure_beside_wrong_angles,
 )
 from diagnosis.clearing.contradicted import without_contradicted
+from diagnosis.clearing.made_by_axles import without_made_by_axles
 from diagnosis.clearing.nothing_moves import supply_gone
 from diagnosis.clearing.standing_out import what_stands_out, with_findings, without_explained, without_followers
 from diagnosis.decision import quality
@@ -278,7 +279,8 @@ def _with_what_stands_out(judged: Judged) -> Judged:
         return judged
     machine = judged.machine
     seen = less_sure_beside_wrong_angles(with_findings(found.assessments, more), machine.wheels, machine.axles)
-    told = replace(found, assessments=seen)
+    events = without_made_by_axles(found.events, seen, machine.axles, judged.mission.timeline.dt)
+    told = replace(found, assessments=seen, events=events)
     open_ = tuple(c for c in judged.checks if c.component in more and not c.passed)
     return replace(judged, found=told, named_by=open_)
 

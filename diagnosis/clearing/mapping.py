@@ -20,6 +20,11 @@ _LEAST_S = 5.0
 _AGAINST, _MOVES_AGAINST = -0.8, -0.5  # correlation, about zero and about the means
 _STEADY, _SMALL = 0.1, 0.1  # of its size: a command that varies by less, a reading that is less
 _APART, _EVEN = 0.08, 0.12  # of a factor from a known one, and how much it may vary [ln]
+_BRIEFLY_S, _ELSE_S = (
+    1.0,
+    3.0,
+)  # of a stretch; of all stretches in which a signal has its right size: it is then no other one throughout
+_NEARER = 0.5  # of its factor [ln]: a stretch with less of it is nearer to the right size
 _TRACKS = 0.3  # by how much a loop usually stays behind its command [ln]
 _GEARED = 1.2
 _NO_LOOP = 1.1  # ln: a third of its command, or three times as much, over a whole mission
@@ -168,6 +173,7 @@ def _hints(
         elif (
             sizes
             and not (works is not None and _believed(works, follows, i, ratios[i]))
+            and _throughout(*pairs[i], ratios[i], cells.dt)
             and (words := _factor(ratios[i] - (usual if abs(usual) < _TRACKS else 0.0), cells.machine.gear_ratio))
         ):
             # one factor of all of them is a unit's or a size's, and no part's fault
@@ -233,6 +239,21 @@ def _ratio(y: Array, x: Array) -> float:
         return np.nan
     middle = float(np.median(ratio))
     return middle if 1.4826 * float(np.median(np.abs(ratio - middle))) < _EVEN else np.nan
+
+
+def _throughout(y: Array, x: Array, ratio: float, dt: float) -> bool:
+    """Whether y has its ratio [ln] to x in all parts of a mission: what fails has its right size before, or after.
+
+    Of shape (n,) each, where x is large.
+    """
+    width = max(1, round(_BRIEFLY_S / dt))
+    count = y.size // width
+    if not count or not np.isfinite(ratio):
+        return True
+    with np.errstate(divide="ignore", invalid="ignore"):
+        size = np.log(np.abs(y[: count * width]) / np.abs(x[: count * width])).reshape(count, width)
+    right = np.abs(np.median(size, axis=1)) < _NEARER * abs(ratio)
+    return bool(np.count_nonzero(right) * width * dt < _ELSE_S)
 
 
 def _factor(ratio: float, gear: float) -> str:

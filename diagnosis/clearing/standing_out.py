@@ -19,6 +19,8 @@ from diagnosis.clearing.cells import Cells
 from diagnosis.clearing.jumps import fault_of_jumps
 from diagnosis.clearing.limits import Limits, measured_twice, usual_limits
 from diagnosis.clearing.openings import speeds_follow_openings
+from diagnosis.clearing.second_angles import scaled_angles
+from diagnosis.clearing.spikes import fault_of_spikes
 from diagnosis.clearing.still import rate_of
 from diagnosis.clearing.untold_faults import fault_of_angle, fault_of_axle, fault_of_wheel
 from diagnosis.results.assessment import CODE, Assessment, Finding
@@ -72,6 +74,9 @@ def what_stands_out(checks: Sequence[Checked], cells: Cells, words: MachineWords
     jumping = {c.component: fault_of_jumps(c, cells) for c in checks if c.check is Check.JUMP and not c.passed}
     found = {component: fault for component, fault in jumping.items() if fault is not None}
     found |= {check.component: fault_of_angle(check, cells) for check in checks if _off_second_angle(check)}
+    found |= {c: f for c, f in scaled_angles(checks, cells).items() if not cells.stated.get(c)}
+    rough = {c.component for c in checks if c.check is Check.ROUGHNESS and not c.passed}
+    found |= {wheel: fault for wheel in rough if (fault := fault_of_spikes(wheel, cells)) is not None}
     axles = {c.component: fault_of_axle(c, cells) for c in checks if _does_not_answer(c, cells)}
     still = {component: fault for component, fault in axles.items() if fault is not None}
     found |= _less_sure_together(still, cells)
@@ -145,10 +150,10 @@ def _faulty(f: Finding) -> float:
 def without_explained(
     found: Mapping[str, Finding], events: Sequence[MachineEvent], axles: Collection[str]
 ) -> dict[str, Finding]:
-    """What stands out, by component, less what events of the whole machine explain; a wheel model that does not fit explains no axle."""
+    """What stands out, by component, less what events of the whole machine explain; a wheel model that does not fit explains no axle, nor does a gyro."""
     if not events:
         return dict(found)
-    return {part: f for part, f in found.items() if part in axles and all(event.model for event in events)}
+    return {part: f for part, f in found.items() if part in axles and all(e.model or e.body for e in events)}
 
 
 def with_findings(assessments: Mapping[Part, Assessment], found: Mapping[str, Finding]) -> dict[Part, Assessment]:

@@ -37,6 +37,7 @@ _ROWS = {
         FaultMode.INEFFICIENT: 0.05,
     },
     FaultMode.OUTSIDE_TABLE: {FaultMode.OUTSIDE_TABLE: 1.0},
+    FaultMode.NOISY: {FaultMode.NOISY: 1.0},
 }
 #: The same of wheels that stand: of 16 (campaigns) 7 were dead or locked, 8 stuck within their dead band or against their command.
 _STANDS = {

@@ -33,7 +33,8 @@ def wild_readings(cells: Cells, speed: Array, floor: float) -> Array:
     frame = cells.frame
     height, count = np.zeros(speed.shape), np.zeros(speed.shape)
     for i, wheel in enumerate(cells.machine.wheels):
-        cell, wild = cells.once(f"wild {wheel}", partial(_wild, cells, f"wheel.{wheel}.v"))
+        at, wild = wild_at(cells, f"wheel.{wheel}.v")
+        cell = at // cells.width
         apart = cells.apart(wheel)
         height[:, i] = np.bincount(cell, wild, minlength=cells.size) * apart
         count[:, i] = np.bincount(cell, minlength=cells.size) * apart
@@ -42,8 +43,12 @@ def wild_readings(cells: Cells, speed: Array, floor: float) -> Array:
     return np.asarray(np.where(many >= _FEW, mean / np.maximum(np.nan_to_num(frame.rms(speed)), floor), 0.0))
 
 
+def wild_at(cells: Cells, name: str) -> tuple[NDArray[np.intp], Array]:
+    """Samples of a signal's wild readings, and their heights [m/s], each of shape (k,)."""
+    return cells.once(f"wild {name}", partial(_wild, cells, name))
+
+
 def _wild(cells: Cells, name: str) -> tuple[NDArray[np.intp], Array]:
-    """Cells of a signal's wild readings, and their heights [m/s]."""
     y = cells.timeline.get(name)
     at = np.zeros(0, dtype=np.intp) if y is None else np.flatnonzero(cells.timeline.fresh[name] & np.isfinite(y))
     if y is None or at.size < _FEW:
@@ -54,4 +59,4 @@ def _wild(cells: Cells, name: str) -> tuple[NDArray[np.intp], Array]:
     alone = np.where(before * after > 0.0, np.minimum(np.abs(before), np.abs(after)), 0.0)
     usual = float(np.median(np.abs(before + after))) / 0.6745 / np.sqrt(6.0)
     wild = alone > max(_NOISES * usual, _OF_TOP * cells.machine.max_speed)
-    return at[1:-1][wild] // cells.width, np.asarray(alone[wild], dtype=np.float64)
+    return at[1:-1][wild], np.asarray(alone[wild], dtype=np.float64)

@@ -134,6 +134,18 @@ def turn_by_angles(cells: Cells) -> tuple[Array, Array] | None:
     return np.where(use, path.yaw, np.nan), expected
 
 
+def turn_by(cells: Cells, leaf: str) -> tuple[Array, Array] | None:
+    """Turn by the gyro, and by one measurement of all angles, each as a difference of the ends' tangents, shape (cells,), NaN where the machine is too slow.
+
+    `leaf` is ``phi`` or ``phi_true``. None without a gyro, or where an angle is not measured so.
+    """
+    path = _path(cells, leaf)
+    if path is None or path.by_wheels:
+        return None
+    with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
+        return np.where(path.moving, path.yaw / path.speed * path.length, np.nan), path.turn
+
+
 def turn_of_ends(cells: Cells) -> tuple[Array, dict[str, Array]] | None:
     """Turn by the gyro beyond that by all angles, as a difference of the ends' tangents, and each axle's own part of it; all of shape (cells,).
 
@@ -207,8 +219,8 @@ def _off_angles(cells: Cells) -> _Off | None:
     return _Off(off, path.turn, np.abs(path.turn) < _STRAIGHT, path.by_wheels)
 
 
-def _path(cells: Cells) -> _Path | None:
-    """How the machine turns, and where its angles point; None without yaw rate, or an axle's angle."""
+def _path(cells: Cells, leaf: str = "phi") -> _Path | None:
+    """How the machine turns, and where its angles point by one measurement of them; None without yaw rate, or an axle's angle."""
     geometry, axles = cells.machine.geometry, cells.machine.axles
     if geometry is None:
         return None
@@ -220,7 +232,7 @@ def _path(cells: Cells) -> _Path | None:
     if not axles or len(ends) != _ENDS or not np.isfinite(yaw).any():
         return None
     (first, one), (last, other) = ends.items()
-    length, angles, speeds = first - last, cells.axles("phi"), cells.wheels("v")
+    length, angles, speeds = first - last, cells.axles(leaf), cells.wheels("v")
     by_name = {**dict(zip(axles, angles.T, strict=True)), _FIXED: np.zeros(len(angles))}
     if any(not np.isfinite(by_name[name]).any() for name in (*one, *other)):
         return None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
@@ -43,6 +44,7 @@ from replay.machine.config import Limits
 #: A component and its side.
 Part = tuple[str, str]
 
+_WHAT_TO_DO = re.compile(r": (?:log|let) ")
 _COMPARED_WHEELS = 3
 _UNEXPLAINED_S = 0.5
 _MOSTLY = 0.5
@@ -142,7 +144,7 @@ def decide(
     said = found.title in TITLES  # which parts are not judged, and why
     unseen = tuple(dict.fromkeys(a.hidden for a in assessments.values() if a.hidden))
     told = said or found.status is Verdict.READY  # which call sensors healthy
-    short = tuple(x.partition(": log ")[0] for x in unseen) if said else unseen  # what to log for it is a caveat
+    short = tuple(_WHAT_TO_DO.split(x)[0] for x in unseen) if said else unseen  # what to log for it is a caveat
     found = replace(found, text=_with_limits(found.text, short)) if told else found
     if found.status is Verdict.NOT_ASSESSED and open_points and not against.misplaced:  # which says it itself
         found = replace(found, text=f"{found.text} To clear it: {open_points[0].act}.")

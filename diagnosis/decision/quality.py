@@ -9,6 +9,7 @@ from pathlib import PurePath
 import numpy as np
 
 from diagnosis.channels.noise import rounding_step
+from diagnosis.decision.alike_notes import alike_notes
 from diagnosis.decision.missing import applies, cost_of_missing
 from diagnosis.decision.scale import Scale
 from diagnosis.results.assessment import Assessment
@@ -200,7 +201,7 @@ def _wheel_model(model: WheelModelFit | None, words: MachineWords) -> list[Quali
 def _notes(texts: Iterable[str], clocks: Sequence[SourceClock]) -> list[QualityRow]:
     """Notes of readers and timeline, each once, without those on clocks, which have rows of their own."""
     on_clocks = {clock.sentence for clock in clocks}
-    return [_row("Note", text, "see text") for text in dict.fromkeys(texts) if text not in on_clocks]
+    return [_row("Note", text, "see text") for text in alike_notes(t for t in texts if t not in on_clocks)]
 
 
 def _effect_of(clock: SourceClock) -> tuple[str, bool]:

@@ -12,8 +12,8 @@ from typing import NamedTuple
 import numpy as np
 
 from diagnosis.clearing.cells import Array, Cells
-from diagnosis.clearing.yaw import ends_of
-from diagnosis.decision.turn_scale import ANGLE, GYRO, Meant, factor_of, meant
+from diagnosis.clearing.yaw import turning_ends
+from diagnosis.decision.turn_scale import ANGLE, GYRO, SECOND_ANGLES, Meant, factor_of, meant
 from diagnosis.response.body import BodySpeed, body_speeds
 from diagnosis.results.machine_event import MachineEvent, other_angle, other_turn, other_yaw_rate
 from replay.machine.geometry import Geometry
@@ -136,10 +136,11 @@ class Scale(NamedTuple):
             f"{'agrees' if len(said.speeds) == 1 else 'agree'} with the wheels' speeds: "
         )
         if said.part == ANGLE:
-            return head + (
-                f"{said.by} turns it as the gyro has it, so that the steering angle reads about {1.0 / one.factor:.2f} times what it is, or the "
-                f"wheelbase{self._where} is wrong."
-            )
+            wheelbase = (
+                "" if said.by == SECOND_ANGLES else f", or the wheelbase{self._where} is wrong"
+            )  # which stands in both
+            reads = f"the steering angle reads about {1.0 / one.factor:.2f} times what it is"
+            return f"{head}{said.by} turns it as the gyro has it, so that {reads}{wheelbase}."
         alike = ""
         if self.diameter is not None:
             alike = f"; a wheel diameter that controller and machine file have wrong alike ({self.diameter * one.factor:.3g} m would fit) looks the same"
@@ -272,10 +273,10 @@ def _by_sides(cells: Cells, geometry: Geometry, speeds: Array) -> tuple[Array, s
 
 
 def _by_angles(cells: Cells, geometry: Geometry, v: Array) -> tuple[Array, str] | None:
-    """Yaw rate by speed and steering angles [rad/s], shape (cells,), where these are large; None without two ends."""
-    ends = ends_of(cells.machine)
+    """Yaw rate by speed and steering angles [rad/s], shape (cells,), where these are large; None without two ends that turn the machine."""
+    ends = turning_ends(cells.machine)
     names = [name for end in ends.values() for name in end]
-    if len(ends) != 2 or len({p.axle for p in geometry.wheels.values()} - set(names)) or set(names) == {"fixed"}:
+    if len(ends) != 2 or not set(names) & set(cells.machine.axles):
         return None
     angles = [
         np.mean([np.zeros(cells.size) if n == "fixed" else cells.means(f"steer.{n}.phi") for n in end], axis=0)

@@ -9,7 +9,7 @@ from diagnosis.decision.open_checks import open_words
 from diagnosis.decision.short import main_reason, main_state
 from diagnosis.decision.wording import fault_words, join_words
 from diagnosis.results.assessment import Assessment
-from diagnosis.results.clearing import Checked
+from diagnosis.results.clearing import Check, Checked
 from diagnosis.results.durations import seconds_words
 from diagnosis.results.result import FaultInterval
 from diagnosis.results.vocabulary import Tier
@@ -22,6 +22,7 @@ _SOUND = "No speed sensor fault seen"
 _OPEN = "No speed sensor fault seen, but a check is open"
 _DOUBTED = "A sensor is in doubt"
 _REST, _WITH_STEERING = "drives not judged", "drives and steering not judged"
+_RATES = (Check.RATE, Check.LASTING_RATE, Check.PLANT_RATE)
 _NAMED = 2  # drives; where more are all of the machine, their names say nothing
 #: Titles of such a mission.
 TITLES = tuple(
@@ -74,7 +75,8 @@ def sensors_alone(
     seen = against.words.fill(f"No fault was seen in the {{wheel.sensor}}s over at least {least:.0f} s of {{moving}}")
     if not faults and not checks:
         return f"{_SOUND}, {rest_of_it}", f"{seen}; {unjudged}"
-    if not faults and not any(c.component in axles for c in checks):  # a bump, or slip, may be all of it
+    # a bump, or slip, may be all of it; and a rate per opening is first of all its valve's
+    if not faults and not any(c.component in axles and c.check not in _RATES for c in checks):
         return f"{_OPEN}; {rest_of_it}", f"{seen}, but {open_words(checks)}; {unjudged}"
     doubt = join_words(
         [

@@ -47,6 +47,8 @@ def act_of_wheel(
         return (
             f"drive for a minute and longer with several speeds, turns and stops, and diagnose that log; or log {other}"
         )
+    if lack is Lack.SECOND_OFF:
+        return "check the sensor of the second speed (wheel.{c}.v_true), its channel, unit and scale, and record a mission again"
     if tier is Tier.NONE:
         return _of_silent(sensor, state, lack)
     by_state = {

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.clearing.cells import Array, Cells
+from diagnosis.clearing.second_angles import turned_by
 from replay.machine.geometry import Geometry
 
 _LEAST_S = 10.0
@@ -23,6 +24,7 @@ _AGREES, _AS_ONE = 0.1, 0.15  # ln; of speeds; of turns
 _KEPT, _ROUNDS, _FITS = 0.8, 4, 0.4  # of the cells, and what a share may leave of a turn
 
 GYRO, ANGLE = "gyro", "angle"
+SECOND_ANGLES = "the second measurement of the angles (steer.*.phi_true)"
 
 
 class Meant(NamedTuple):
@@ -68,6 +70,8 @@ def meant(
     command = factor_of(np.abs(cells.means("cmd.v")), np.abs(v), np.abs(v) > _MOVES * usual, cells.dt)
     speeds = (*(("the commanded speed",) if _near(command, 1.0, _AGREES) else ()), *agreeing)
     asked = factor_of(np.abs(cells.means("cmd.omega")), np.abs(expected), turning, cells.dt)
+    if turned_by(cells) is not None:
+        return Meant(speeds, ANGLE, SECOND_ANGLES)
     sides = _by_difference(cells, v, expected)
     if sides is None:
         return Meant(speeds, track=_near(asked, 1.0, _AGREES))

@@ -17,6 +17,7 @@ from diagnosis.direct.inputs import Pair, make_pair
 from diagnosis.direct.low_speed import without_low_speed_habit
 from diagnosis.direct.one_value import with_frozen_readings
 from diagnosis.direct.second_is_off import without_second_speeds_own
+from diagnosis.direct.second_scaled import without_second_speeds_scale
 from diagnosis.direct.small_deviations import without_small_deviations
 from diagnosis.direct.stays import without_stays
 from diagnosis.direct.switching import without_switching
@@ -76,6 +77,7 @@ class DirectEvidence:
             without_low_speed_habit,
             without_shared_moments,
             partial(without_second_speeds_own, openings=_openings(mission)),
+            partial(without_second_speeds_scale, openings=_openings(mission)),
             with_frozen_readings,
         ):
             told = of_sensors(sensors, told)

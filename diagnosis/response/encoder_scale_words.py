@@ -65,6 +65,9 @@ def by_the_gyro(
         The body's speed by its own sensors.
     """
     one = judged[wheel]
+    which = ""
+    if turning is not None and any(w not in turning.sides for w in judged):
+        which = f" of {'an unsteered' if wheel in turning.sides else 'a steered'} {{wheel}}"
     if turning is not None and wheel not in turning.sides:  # a steered one, of which the yaw rate says nothing
         sought, turning = Sought(), None
     if not one.response.answered:
@@ -73,9 +76,9 @@ def by_the_gyro(
         return replace(sensor, hidden=_BY_BODY if seen else _UNTOLD) if untold else sensor
     several = len(judged) > 1
     if (several or one.view is None) and not one.data.unpowered:  # which closes no loop
-        sensor = replace(
-            sensor, hidden=unseen(sought, several=several and not (turning is None and one.yaw is not None))
-        )
+        by_turns = several and not (turning is None and one.yaw is not None)
+        ground = any(b.name != "odometry" for b in bodies)
+        sensor = replace(sensor, hidden=unseen(sought, which, several=by_turns, ground=ground))
     blocks = one.wheel.blocks.start
     width, where = int(blocks[1]) if blocks.size > 1 else 1, np.zeros(one.data.y.size, np.bool_)
     for x in sought.found:
@@ -119,22 +122,28 @@ def _named(wheels: Sequence[str]) -> str:
     return wheels[0] if len(wheels) == 1 else f"the mean of {', '.join(wheels[:-1])} and {wheels[-1]}"
 
 
-def unseen(sought: Sought, *, several: bool) -> str:
+def unseen(sought: Sought, which: str = "", *, several: bool, ground: bool = False) -> str:
     """What does not show of an encoder that closes its drive's loop, a sentence.
 
     Parameters
     ----------
     sought : Sought
         What was looked for.
+    which : str
+        Of which wheels' encoders it is said, to follow *an encoder*; empty for all of a machine.
     several : bool
         Whether there are several drives, whose difference may turn the machine, without a yaw rate that says otherwise.
+    ground : bool
+        Whether a speed over ground is in the log, and does not show it.
     """
-    of = "A factor on an encoder that closes its own drive's speed loop"
+    of = f"A factor on an encoder{which} that closes its own drive's speed loop"
     if np.isfinite(sought.smallest):
         x = sought.smallest
         return (
             f"{of} shows by the gyro alone, on one {{wheel}} from {x:.2f} × (or {1.0 / x:.2f} ×) on where it lasts {LENGTH_S:.0f} s of driving; a smaller "
             "one is not assessed."
         )
-    log = "a yaw rate (imu.yaw_rate) with turns both ways" if several else "a speed over ground (gnss.speed)"
-    return f"{of} would not show in this log, and is not assessed: log {log}."
+    count = "let each {wheel} make ten turns by its encoder, and count them"
+    does = count if ground else "log a speed over ground (gnss.speed)"
+    does = "log a yaw rate (imu.yaw_rate) with turns both ways" if several else does
+    return f"{of} would not show in this log, and is not assessed: {does}."

@@ -63,10 +63,12 @@ def _spans(one: Judged, effort: Array, block_s: float) -> list[tuple[int, int]]:
         return []
     if min(np.mean(effort[known] > 0.0), np.mean(effort[known] < 0.0)) < _BOTH_WAYS:
         return []  # it may have no direction
-    way = float(np.sign(np.sum((effort * b.mean)[known])))
     top = float(np.nanquantile(np.abs(b.mean), 0.99))
     off = b.mean - np.clip(b.mean, b.low, b.high)
-    away = known & (np.abs(off) > np.maximum(_FAR * b.noise, _OFF * top)) & (way * effort * off > 0.0)
+    far = np.abs(off) > np.maximum(_FAR * b.noise, _OFF * top)
+    near = known & ~far  # a wheel whose loop has wound up is braked at many times the usual speed
+    way = float(np.sign(np.sum((effort * b.mean)[near])))
+    away = known & far & (way * effort * off > 0.0)
     out = []
     for start, stop in spans_of(away, _GAP_BLOCKS):
         rest = known.copy()

@@ -86,6 +86,8 @@ class Lack(StrEnum):
     DRIVE = "drive"
     #: Its command is known, and nothing that measures what it measures.
     SECOND = "second"
+    #: A second measurement is off by itself.
+    SECOND_OFF = "second_off"
     #: Neither is.
     BESIDE = "beside"
     #: What is read repeats what is asked for: nothing is measured.

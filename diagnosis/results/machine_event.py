@@ -29,6 +29,9 @@ class MachineEvent:
         What to do before a mission may be judged again.
     model : bool
         Whether the wheel model alone is in doubt: what axles show without it stands.
+    body : bool
+        Whether it is that a sensor of the body, as a gyro, contradicts what wheels or axles read: an axle that does not answer its own command is
+        not explained by it, but may be why.
     spans : tuple[tuple[float, float], ...]
         Begin and end of each time at which it was so [s], by time; empty where it was so throughout.
     """
@@ -38,6 +41,7 @@ class MachineEvent:
     doubt: str
     act: str
     model: bool = False
+    body: bool = False
     spans: tuple[tuple[float, float], ...] = ()
 
     def at(self, spans: Sequence[tuple[float, float]]) -> MachineEvent:
@@ -92,7 +96,7 @@ def other_yaw_rate(text: str) -> MachineEvent:
     """The measured yaw rate alone contradicts the wheels, which follow their commands and each other."""
     doubt = "the gyro contradicts the {wheels}"
     act = "compare the gyro with turns of the machine that you count: its axis, its unit (rad/s or degrees), its plug"
-    return MachineEvent("The gyro contradicts the {wheels}", text, doubt, act)
+    return MachineEvent("The gyro contradicts the {wheels}", text, doubt, act, body=True)
 
 
 def gyro_or_slip(text: str) -> MachineEvent:
@@ -110,7 +114,7 @@ def gyro_or_slip(text: str) -> MachineEvent:
         "look whether the {wheels} slipped there (slope, kerb, wet or loose ground); if not, compare the gyro with turns of the machine that you "
         "count: its axis, its unit (rad/s or degrees), its plug"
     )
-    return MachineEvent("Gyro and {wheels} contradict each other", text, doubt, act)
+    return MachineEvent("Gyro and {wheels} contradict each other", text, doubt, act, body=True)
 
 
 def other_angle(text: str) -> MachineEvent:
@@ -138,9 +142,8 @@ def one_side_otherwise(text: str) -> MachineEvent:
         "mark the {wheels}, let each make ten turns by its encoder and count them, and measure the tyres; a speed over ground (gnss.speed) in the "
         "log would tell slip apart"
     )
-    return MachineEvent(
-        "The gyro contradicts one side's speed", text, "the gyro contradicts the speed of one side", act
-    )
+    doubt = "the gyro contradicts the speed of one side"
+    return MachineEvent("The gyro contradicts one side's speed", text, doubt, act, body=True)
 
 
 def wheels_apart(sentences: Sequence[str]) -> tuple[MachineEvent, ...]:
@@ -160,7 +163,7 @@ def turns_otherwise(text: str) -> MachineEvent:
     """Gyro and odometry turn otherwise, and nothing else measures how the machine turns."""
     doubt = "gyro and odometry contradict each other"
     act = "turn the machine by a counted number of turns and compare both with them, then check the gyro's axis and unit, and the encoders"
-    return MachineEvent("Gyro and odometry contradict each other", text, doubt, act)
+    return MachineEvent("Gyro and odometry contradict each other", text, doubt, act, body=True)
 
 
 def less_than_told(text: str) -> MachineEvent:
@@ -208,7 +211,7 @@ def body_otherwise(text: str) -> MachineEvent:
     act = "look whether all {wheels} slipped there; if not, compare that sensor, and the {wheel} speeds, with a measured way"
     more = ": all {wheels} slip there, or all speeds, or that sensor, are wrong; no part is blamed for it."
     doubt = "{wheels} and the sensor of the machine's speed contradict each other for a time"
-    return MachineEvent("The {wheels} contradict the machine's measured speed", text + more, doubt, act)
+    return MachineEvent("The {wheels} contradict the machine's measured speed", text + more, doubt, act, body=True)
 
 
 def gyro_otherwise(text: str) -> MachineEvent:

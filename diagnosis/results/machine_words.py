@@ -207,9 +207,13 @@ def _drive(machine: Machine, logged: Collection[str]) -> Mover:
         return machine.drive
     if machine.drives:  # what effort a speed takes
         return "motor"
-    if any(_COMMAND.fullmatch(name) for name in logged) or machine.plant.wheels or machine.steering:
+    efforts = any(_EFFORT.fullmatch(name) for name in logged)
+    opened = {name.partition(".")[0] for name in logged if _COMMAND.fullmatch(name)}
+    if efforts and not machine.plant.wheels and "wheel" not in opened and ("steer" in opened or machine.steering):
+        return "drive"  # motors at the wheels, valves at the axles: one word for both
+    if opened or machine.plant.wheels or machine.steering:
         return "valve"
-    return "motor" if any(_EFFORT.fullmatch(name) for name in logged) else "drive"
+    return "motor" if efforts else "drive"
 
 
 def words_of(machine: Worded) -> MachineWords:

@@ -18,6 +18,7 @@ from diagnosis.results.result import Epsilon, Hypothesis
 from diagnosis.results.sentence import About, is_about
 from diagnosis.results.sizes import amount
 from diagnosis.steering.inputs import AxleInputs
+from diagnosis.steering.late_valves import as_late
 from diagnosis.steering.openings import latest, off_command, opens_as_told
 from diagnosis.steering.redundancy import MOST_APART, most_lag
 from diagnosis.steering.side_findings import SideFindings, span_of
@@ -36,6 +37,7 @@ _STEADY, _HARDLY = 0.25, 0.05  # of its mean, and of full opening, by which such
 # of a valve that moves as it is told: correlation of opening and command, and the least standard deviation of both that is a motion
 _FOLLOWS, _MOTION, _FEW = 0.9, 0.01, 12
 _EDGE = 0.15  # of a finding
+_ENDS_S, _UNMOVED = 0.15, 0.2  # of a finding, in which a valve comes to rest; of how its command moves meanwhile
 _LOSES, _IT_IS = 0.1, 0.85  # of its gain, from which it is a loss; probability of what a measured opening shows
 _AS_TOLD = 0.15  # of its command: no further off it, a valve opens as it is told; warm coils give up to 0.16 less
 _SHIFTED = 0.5  # of the loss, from which a zero is no matter of how it changes
@@ -91,7 +93,13 @@ def _of_valve(found: SideFindings, inputs: AxleInputs, min_sat: float) -> SideFi
     off = told(SideFindings(tuple(off_command(found.findings, measured)), ())).findings
     pieces = tuple(sorted([*found.findings, *off], key=lambda f: f.start))
     found = _as_it_opens(found._replace(findings=pieces), (y, x, use), inputs, min_sat)
-    return found._replace(findings=_or_all_off(_explained(found, measured), command, losses=True))
+    open_: list[Finding] = []
+    stands: list[Finding] = []
+    for f in as_late(_explained(found, measured), y, command, use, inputs.timeline.dt):
+        stays = f.mode.total and _stands_while_told(f, y, command, use, inputs.timeline.dt)
+        (stands if stays else open_).append(f)
+    found = found._replace(findings=_or_all_off(open_, command, losses=True))
+    return found._replace(findings=tuple(sorted([*found.findings, *stands], key=lambda f: f.start)))
 
 
 def _explained(found: SideFindings, measured: Measured) -> list[Finding]:
@@ -254,6 +262,17 @@ def _or_off(finding: Finding) -> Finding:
     off = Hypothesis(Side.ACTUATOR.value, FaultMode.OUTSIDE_TABLE.value, 1.0 - sum(h.p for h in named))
     hypotheses = tuple(sorted([*named, off], key=lambda h: -h.p))
     return replace(finding, probability=most, hypotheses=hypotheses, evidence=(*finding.evidence, _CONSTANT))
+
+
+def _stands_while_told(finding: Finding, opening: Array, command: Array, use: Flags, dt: float) -> bool:
+    """Whether a measured opening stands while its command moves, if only at the beginning: one that is off by a constant would move with it.
+
+    Arrays of shape (n,).
+    """
+    edge = round(_ENDS_S / dt)
+    part = slice(finding.start + edge, max(finding.start + edge, finding.stop - edge))
+    y, x = (z[part][use[part]] for z in (opening, command))
+    return bool(x.size >= _FEW and np.std(x) >= _HARDLY and np.std(y) < _UNMOVED * np.std(x))
 
 
 def _rests(command: Array) -> bool:

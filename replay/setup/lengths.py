@@ -18,7 +18,15 @@ from replay.setup.by_the_steering import Lengths, lengths_by_yaw
 from replay.setup.draft_notes import Draft
 from replay.setup.motion import WheelMotion
 from replay.setup.structure import MOTOR, ONE, Structure
-from replay.setup.unit_of_speeds import DIFFERS, WHEEL_SIZES, agreed, by_their_mean, turns_commanded, unit_of_speeds
+from replay.setup.unit_of_speeds import (
+    DIFFERS,
+    WHEEL_SIZES,
+    agreed,
+    by_their_mean,
+    turns_commanded,
+    unit_of_commanded_turns,
+    unit_of_speeds,
+)
 from replay.signals.mapping import map_signals
 from replay.signals.name_words import english, tokens
 from replay.signals.signal import Signal, Signals
@@ -39,6 +47,7 @@ def wheel_radius(
     origins: dict[str, SignalSource], by_body: Measured | None = None,
 ) -> float:  # fmt: skip
     """Wheel radius [m], by the measured speed of the body before the commands. Signals without a unit get the one that fits the command."""
+    unit_of_commanded_turns(draft, structure.wheels, found, origins)
     turning = [n for w in structure.wheels if (n := f"wheel.{w}.v") in origins and is_rotation(origins[n])]
     bare = [n for w in structure.wheels if (n := f"wheel.{w}.v") in origins and not origins[n].unit]
     asked = [n for w in structure.wheels if (n := f"wheel.{w}.v_ref") in origins and is_rotation(origins[n])]

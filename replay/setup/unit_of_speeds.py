@@ -21,6 +21,7 @@ DIFFERS = 0.15  # share, from which a length is another one
 _AGREE = 1.33
 WHEEL_SIZES = (0.04, 1.0)  # m; of a radius that explains a speed without a unit
 _MILLIMETRE = 1e-3
+_TURNS, _LEAST = 0.3, 50  # of the fastest turn, and samples, in which a wheel turns
 
 
 def agreed(values: Sequence[float]) -> float | None:
@@ -130,6 +131,54 @@ def by_their_mean(found: Signals, names: Sequence[str], origins: Mapping[str, Si
     mean = np.mean([np.sign(origins[n].gain) * held(found.items[n], first.stamps) for n in names], axis=0)
     motion = wheel_motion(replace(first, values=mean), asked, None)
     return None if motion is None else motion.gain
+
+
+def unit_of_commanded_turns(
+    draft: Draft, wheels: Sequence[str], found: Signals, origins: dict[str, SignalSource]
+) -> None:
+    """Give commanded speeds of wheels that state no unit that of the measured turns, where they are as large as these, with a question.
+
+    Parameters
+    ----------
+    draft : Draft
+        Takes the question.
+    wheels : Sequence[str]
+        The machine's.
+    found : Signals
+        Of the log, rotations in rad/s, and as recorded what states no unit.
+    origins : dict[str, SignalSource]
+        Of all signals; units are written into it.
+    """
+    bare = {n: v for w in wheels if (n := f"wheel.{w}.v_ref") in origins and (v := f"wheel.{w}.v") in origins}
+    bare = {
+        n: v
+        for n, v in bare.items()
+        if not origins[n].unit and UNITS.get(known_unit(origins[v].unit) or "", ("",))[0] == "rotation"
+    }
+    sizes = {n: size for n, v in bare.items() if (size := _size(found, n, v)) is not None}
+    if not bare or len(sizes) < len(bare):
+        return
+    for unit in ("rad/s", "rpm", "deg/s"):
+        if all(abs(size * UNITS[unit][1] - 1.0) <= DIFFERS for size in sizes.values()):
+            labels = ", ".join(origins[n].label for n in bare)
+            draft.ask(
+                "signals",
+                f"are {labels} in {unit}? None is stated; so they are as large as the measured turns of the wheels.",
+            )
+            for n in bare:
+                origins[n] = replace(origins[n], unit=unit)
+            return
+
+
+def _size(found: Signals, asked: str, measured: str) -> float | None:
+    """Commanded speed by the measured one [1], by how they go together while the wheel turns; None where it hardly does."""
+    if asked not in found.items or measured not in found.items:
+        return None
+    y = found.items[measured]
+    x, v = held(found.items[asked], y.stamps), np.asarray(y.values, np.float64)
+    use = np.isfinite(x) & np.isfinite(v)
+    use &= np.abs(v) > _TURNS * float(np.max(np.abs(v[use]), initial=0.0))
+    return float(np.median(x[use] / v[use])) if np.count_nonzero(use) >= _LEAST else None
 
 
 def turns_commanded(origins: Mapping[str, SignalSource], turning: Sequence[str], measured: float) -> str:

@@ -62,6 +62,15 @@ def test_healthy_missions_and_faults_of_parts_are_not_the_files(seed: int) -> No
         assert mapping_hints(in_cells(simulated(fault, seed=seed), base=True)) == ()
 
 
+@pytest.mark.parametrize(("share", "hints"), [(1.0, 1), (0.8, 0)])
+def test_a_factor_that_is_not_there_all_through_is_no_matter_of_the_file(share: float, hints: int) -> None:
+    mission = simulated()
+    angle = mission.columns["steer.front.phi"].copy()
+    angle[: round(share * angle.size)] *= 0.05
+    edited = replace(mission, columns={**mission.columns, "steer.front.phi": angle})
+    assert len([h for h in mapping_hints(in_cells(edited, base=True)) if "throughout" in h.text]) == hints
+
+
 def test_the_gear_read_into_every_speed_is_told_and_clears_nothing() -> None:
     mission = simulated()
     columns = {n: x / 17.7 if n.startswith("wheel.") and n.endswith(".v") else x for n, x in mission.columns.items()}

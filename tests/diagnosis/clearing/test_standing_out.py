@@ -21,7 +21,7 @@ from diagnosis.clearing.standing_out import (
 from diagnosis.clearing.untold_faults import fault_of_wheel, finding_of
 from diagnosis.results.assessment import CODE, Assessment, Finding
 from diagnosis.results.clearing import Check, Checked
-from diagnosis.results.machine_event import foreign, swinging
+from diagnosis.results.machine_event import foreign, gyro_or_slip, swinging
 from diagnosis.results.machine_words import HYDRAULIC
 from diagnosis.results.vocabulary import Kind, Tier
 from replay.faults import FaultMode, FaultSpec, Side, State
@@ -125,6 +125,11 @@ def test_a_wheel_model_that_does_not_fit_explains_no_axle() -> None:
     assert without_explained(found, (), axles) == found
     assert without_explained(found, (foreign("…"),), axles) == {"front": fault}
     assert without_explained(found, (foreign("…"), swinging("…")), axles) == {}
+
+
+def test_a_gyro_that_contradicts_the_wheels_explains_no_axle() -> None:
+    fault = next(iter(_found(FaultSpec("front", Side.ACTUATOR, FaultMode.NO_SIGNAL, *WHOLE)).values()))
+    assert without_explained({"front": fault, "RR": fault}, (gyro_or_slip("…"),), ("front", "rear")) == {"front": fault}
 
 
 def test_states_of_both_sides_say_the_fault_but_where_nothing_was_known() -> None:

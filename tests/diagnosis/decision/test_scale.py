@@ -141,3 +141,21 @@ def test_turns_on_the_spot_are_no_rests_of_the_gyro(gain: float) -> None:
     cells: Any = SimpleNamespace(machine=machine, means=columns.__getitem__, dt=dt, size=v.size)
     (found,) = _turning(cells, np.column_stack(list(speeds.values())), 1.0, ())
     assert found.factor == pytest.approx(gain, rel=0.02)
+
+
+@pytest.mark.parametrize("gain", [1.0, 0.6])
+def test_the_outer_axles_of_six_wheels_turn_the_machine_beside_fixed_ones_in_the_middle(gain: float) -> None:
+    rng, dt, n = np.random.default_rng(5), 0.1, 1200
+    angle = np.repeat(rng.choice([0.0, 0.2, -0.25, 0.3], n // 40), 40)
+    v, length = np.full(n, 1.5), 3.2
+    yaw = gain * v * 2.0 * np.tan(angle) / length
+    columns = {"steer.front.phi": angle, "steer.rear.phi": -angle, "imu.yaw_rate": yaw}
+    xs = {"front": 1.6, "fixed": 0.0, "rear": -1.6}
+    places = {f"{a}{s}": WheelGeometry(x, s, 0.0, a) for a, x in xs.items() for s in (-0.8, 0.8)}
+    machine = SimpleNamespace(geometry=Geometry(places, 0.4), wheels=tuple(places), axles=("front", "rear"))
+    cells: Any = SimpleNamespace(
+        machine=machine, means=lambda k: columns.get(k, np.full(n, np.nan)), dt=dt, size=n, wheels=None
+    )
+    (found,) = _turning(cells, np.column_stack([v] * 6), 1.0, ())
+    assert found.factor == pytest.approx(gain, rel=0.02)
+    assert found.lengths == "the wheelbase"

@@ -92,3 +92,10 @@ def test_an_open_check_of_a_speed_is_said_with_what_was_seen() -> None:
     title, text = said(checks=[rough])
     assert title == "No speed sensor fault seen, but a check is open; drives not judged"
     assert text.startswith("No fault was seen in the speed sensors over at least 20 s of driving, but ")
+
+
+def test_a_steering_rate_that_is_open_doubts_no_sensor() -> None:
+    rate = Checked(Kind.STEER, "front", Side.SENSOR_OR_ACTUATOR, Check.LASTING_RATE, 0.5, 0.2)
+    assert said(checks=[rate])[0] == "No speed sensor fault seen, but a check is open; drives not judged"
+    angle = Checked(Kind.STEER, "front", Side.SENSOR_OR_ACTUATOR, Check.LASTING_YAW, 0.15, 0.04)
+    assert said(checks=[rate, angle])[0] == "A sensor is in doubt, drives not judged"

@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 
 from diagnosis.response.assess import Judgement, assess_response
+from diagnosis.response.encoder_scale import Sought
+from diagnosis.response.encoder_scale_words import unseen
 from diagnosis.results.assessment import CODE
 from replay.faults import State
 from replay.machine.config import Limits
@@ -107,3 +109,15 @@ def test_a_car_is_held_against_the_yaw_rate_by_the_axle_that_it_does_not_steer()
         assert found.gyro == ()
         assert np.mean(found.parts["FL"][0].states == CODE[State.HEALTHY]) > 0.5
         assert bool(np.mean(found.parts["RL"][0].states == CODE[State.HEALTHY]) < 0.1) is told
+
+
+def test_what_to_do_is_nothing_that_the_log_has_already_and_says_of_which_wheels_it_speaks() -> None:
+    unsteered = unseen(Sought(smallest=1.2), " of an unsteered {wheel}", several=False)
+    steered, without = (
+        unseen(Sought(), " of a steered {wheel}", several=False, ground=ground) for ground in (True, False)
+    )
+    assert "an encoder of an unsteered {wheel}" in unsteered
+    assert "an encoder of a steered {wheel}" in steered
+    assert "gnss" not in steered
+    assert steered.endswith("let each {wheel} make ten turns by its encoder, and count them.")
+    assert "log a speed over ground (gnss.speed)" in without

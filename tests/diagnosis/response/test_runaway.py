@@ -69,3 +69,14 @@ def test_what_several_drives_do_is_another_command() -> None:
 
 def test_an_effort_without_direction_tells_nothing() -> None:
     assert not runaways(robot({"RR": 1.9}, {"RR": 12.0}, unsigned=True))
+
+
+def test_a_wheel_that_is_braked_at_many_times_its_usual_speed_does_not_turn_the_sign_of_its_effort() -> None:
+    """Its encoder was frozen, and its loop has wound up behind it: the way of an effort is that of driving as usual."""
+    data = robot({"RR": -1.2}, {"RR": 12.0})
+    after = slice(SPAN.stop, SPAN.stop + round(1.0 / DT))
+    y, effort = data["RR"].y.copy(), data["RR"].effort
+    assert effort is not None
+    effort = effort.copy()
+    y[after], effort[after] = np.linspace(40.0, 1.0, after.stop - after.start), -50.0
+    assert not runaways({**data, "RR": replace(data["RR"], y=y, effort=effort)})

@@ -24,6 +24,8 @@ _ARM = Machine("arm", "", ("m1", "m2"), None, part="joint", speed_unit="rad/s")
         (_ROBOT, ("wheel.R.v", "wheel.R.u"), "valve"),
         (_ROBOT, ("steer.front.u_applied",), "valve"),
         (_ROBOT, ("wheel.R.pressure_a",), "valve"),
+        (_ROBOT, ("wheel.R.effort", "steer.front.u"), "drive"),  # motors at the wheels, a valve at the axle
+        (_ROBOT, ("wheel.R.effort", "wheel.R.u", "steer.front.u"), "valve"),
         (replace(_ROBOT, drive="motor"), ("wheel.R.u",), "motor"),
         (replace(_ROBOT, drive="valve"), ("wheel.R.effort",), "valve"),
         (haulotte(), (), "drive"),

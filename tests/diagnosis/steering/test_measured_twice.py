@@ -138,3 +138,30 @@ def test_a_sensor_that_stands_still_says_what_the_second_one_shows_meanwhile() -
     assert got.evidence[-1] == (
         "Meanwhile steer.front.phi_true, a second measurement of the angle, moved over 34°, and steer.front.phi over 0°."
     )
+
+
+def _beginning(level: float) -> np.ndarray:
+    """A command that comes to a level in the first fifth of the finding and stays there."""
+    return level * np.clip((np.arange(SIZE) - SPAN[0]) / 80.0, 0.0, 1.0)
+
+
+@pytest.mark.parametrize("at", [0.0, 0.2])
+def test_an_opening_that_stands_while_its_command_still_moves_is_no_constant_that_is_off(at: float) -> None:
+    mode = FaultMode.STUCK if at else FaultMode.NO_SIGNAL
+    (finding,) = told(np.full(SIZE, at), mode, _beginning(0.6)).findings
+    assert (finding.mode, finding.probability) == (mode, 1.0)
+
+
+def test_beside_a_command_that_rests_all_along_a_dead_valve_may_be_off_by_a_constant() -> None:
+    (finding,) = told(np.zeros(SIZE), FaultMode.NO_SIGNAL, np.full(SIZE, 0.3)).findings
+    assert finding.probability == pytest.approx(0.6)
+    assert {h.mode for h in finding.hypotheses} == {"no_signal", "outside_table"}
+
+
+@pytest.mark.parametrize("lag", [0.4, 0.9])
+@pytest.mark.parametrize("mode", [FaultMode.STUCK, FaultMode.NOISY, FaultMode.INEFFICIENT])
+def test_an_opening_that_follows_with_a_lag_is_late_whatever_a_model_calls_it(lag: float, mode: FaultMode) -> None:
+    step = np.where(np.arange(SIZE) < (SPAN[0] + SPAN[1]) // 2, 0.0, 0.5)
+    (finding,) = told(low_passed(step, lag, DT), mode, step, healthy=low_passed(step, lag, DT)).findings
+    assert (finding.side, finding.mode) == (Side.ACTUATOR, FaultMode.OUTSIDE_TABLE)
+    assert "late, and answers" in finding.evidence[0]
