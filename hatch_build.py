@@ -103,7 +103,9 @@ class KernelHook(BuildHookInterface[Any]):
         self._python("-m", "cli.main", "-q", *words, environment=environment)
 
     def _python(self, *words: str, environment: dict[str, str] | None = None) -> subprocess.CompletedProcess[bytes]:
-        """Run Python at the top of the sources."""
+        """Run Python at the top of the sources, which it finds there also where pipx asks for a safe path."""
+        variables = dict(os.environ if environment is None else environment)
+        variables.pop("PYTHONSAFEPATH", None)
         return subprocess.run(
             [sys.executable, *words],
             cwd=self.root,
@@ -111,7 +113,7 @@ class KernelHook(BuildHookInterface[Any]):
             capture_output=True,
             timeout=_LIMIT_S,
             check=True,
-            env=environment,
+            env=variables,
         )
 
 

@@ -27,7 +27,7 @@ if __name__ == "__main__":
         folder = Path(name)
         log, machine = SAMPLES / "three_faults.mcap", SAMPLES / "haulotte.toml"
         run(["diagnose", str(log), "-m", str(machine), "-o", str(folder / "report"), "--fail-on", "never", "-q"])
-        chromium = os.environ.get("CHROMIUM") or shutil.which("chromium")
+        chromium = os.environ.get("CHROMIUM") or shutil.which("chromium") or shutil.which("chromium-headless-shell")
         browser = p.chromium.launch(executable_path=chromium, args=["--no-sandbox"])
         page = browser.new_page(viewport=_SIZE)
         page.goto((folder / "report" / "report.html").as_uri())

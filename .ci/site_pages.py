@@ -1,10 +1,11 @@
-"""What the site has beside `docs/`: the files of the repository's first level that pages link, and pages that may be absent.
+"""What the site has beside `docs/`: files of the repository's first level that pages link, the Python API, and pages that may be absent.
 
 A hook of MkDocs: `mkdocs.yml` names it.
 """
 
 from __future__ import annotations
 
+import ast
 import posixpath
 import re
 from pathlib import Path
@@ -22,6 +23,8 @@ OUTSIDE = {
 }
 #: Pages that stand in the section of the navigation where they are.
 OPTIONAL = {"python.md": "Reference", "foxglove.md": "How to"}
+#: The page of all that `import mfhca` gives, written from the docstrings.
+API = "reference/python-api.md"
 _LINK = re.compile(r"(?<=\]\()(?!\w+:|#|/)([^)#\s]+)")
 
 
@@ -31,6 +34,7 @@ def on_config(config: Any) -> Any:
     for page, section in OPTIONAL.items():
         if (ROOT / "docs" / page).is_file():
             sections[section].append(page)
+    sections["Reference"].append(API)
     sections["Project"] += [page for name, page in OUTSIDE.items() if (ROOT / name).is_file()]
     return config
 
@@ -41,7 +45,25 @@ def on_files(files: Files, *, config: Any) -> Files:
         if (ROOT / name).is_file():
             text = (ROOT / name).read_text(encoding="utf-8")
             files.append(File.generated(config, page, content=_relinked(text, posixpath.dirname(name))))
+    files.append(File.generated(config, API, content=api_page()))
     return files
+
+
+def api_page() -> str:
+    """Every name of `mfhca` as mkdocstrings reads it: functions first, then classes with their members, then errors."""
+    tree = ast.parse((ROOT / "mfhca" / "__init__.py").read_text(encoding="utf-8"))
+    homes = next(
+        ast.literal_eval(node.value)
+        for node in tree.body
+        if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "_HOMES"
+    )
+    places = [(name, home) for home, names in homes.items() for name in names]
+    places.sort(key=lambda place: (place[1] == "replay.errors", not place[0].islower(), place[0]))
+    parts = [f"## mfhca.{name}\n\n::: {home}.{name}\n    options: {{heading_level: 3}}\n" for name, home in places]
+    return (
+        "# Python API\n\nAll that `import mfhca` gives, from its docstrings; [the guide](../python.md) has examples.\n\n"
+        + "\n".join(parts)
+    )
 
 
 def on_page_markdown(markdown: str, *, page: Any, config: Any, files: Files) -> str:

@@ -19,6 +19,7 @@ from typing import Any, NamedTuple
 
 import pytest
 
+import mfhca
 from cli.main import run
 from replay.machine.toml_file import load_machine
 from tests.documented_files import write_documented_files
@@ -224,6 +225,14 @@ def _tool(name: str) -> Any:
 def test_pages_made_from_the_program_are_current(page: str) -> None:
     written = _tool("reference").PAGES[page]()
     assert (ROOT / "docs" / "reference" / page).read_text(encoding="utf-8") == written, "run python .ci/reference.py"
+
+
+def test_the_page_of_the_python_api_names_all_that_is_given() -> None:
+    page = _tool("site_pages").api_page()
+    named = dict(re.findall(r"^## mfhca\.(\w+)\n\n::: ([\w.]+)$", page, re.MULTILINE))
+    assert set(named) == set(mfhca.__all__) - {"__version__"}
+    for name, place in named.items():
+        assert getattr(importlib.import_module(place.rpartition(".")[0]), name) is getattr(mfhca, name)
 
 
 def test_licences_name_every_locked_package() -> None:

@@ -157,3 +157,12 @@ def test_an_installation_without_the_packages_says_so_and_ends_well(
 
     monkeypatch.setattr(subprocess, "run", fails)
     assert _finish(hook_module, ROOT, "editable")[-1] == "not compiled now; the first diagnosis does it"
+
+
+def test_the_sources_are_found_where_pipx_asks_for_a_safe_path(
+    hook_module: ModuleType, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    (tmp_path / "beside.py").write_text("print('found')")
+    monkeypatch.setenv("PYTHONSAFEPATH", "1")
+    hook = hook_module.KernelHook(str(tmp_path), {}, None, None, "", "wheel", _Told())
+    assert hook._python("-m", "beside").stdout.split() == [b"found"]

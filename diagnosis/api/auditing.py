@@ -53,6 +53,11 @@ class Audit:
     unread: bool = False
     machines: tuple[ListedMachine, ...] = ()
 
+    def __repr__(self) -> str:
+        missions, machines = len(self.ends), len(self.machines)
+        counts = f"{missions} mission{'s' * (missions != 1)} of {machines} machine{'s' * (machines != 1)}"
+        return f"<Audit {self.output}: {counts}, {self.failed} failed>"
+
     @property
     def page(self) -> Path:
         """The fleet page, ``fleet.html``."""

@@ -48,6 +48,12 @@ class Evaluation:
     scores: tuple[MissionScores, ...]
     pooled: Mapping[str, Figures]
 
+    def __repr__(self) -> str:
+        found = [fault for one in self.scores for group in one.groups.values() for fault in group.faults]
+        right = sum(fault.outcome == "right" for fault in found)
+        count = len(self.scores)
+        return f"<Evaluation of {count} mission{'s' * (count != 1)}: {right} of {len(found)} injected faults right>"
+
     @cached_property
     def document(self) -> ScoresDocument:
         """Everything, as `mfhca evaluate --json` prints it."""

@@ -43,6 +43,10 @@ class MadeLog:
     truth: MissionTruth
     notes: tuple[str, ...] = ()
 
+    def __repr__(self) -> str:
+        count = len(self.truth.intervals)
+        return f"<MadeLog {self.log} ({self.format}, {self.truth.duration_s:.1f} s): {count} fault{'s' * (count != 1)}>"
+
     @property
     def faults(self) -> pd.DataFrame:
         """The injected faults, shape (faults, 10), one row each in order of their start.

@@ -22,7 +22,7 @@ from tests import fleet_samples as samples
 
 def waiting(path: Path) -> str:
     """Seconds until the page can be used, of a search and of sorting."""
-    chromium = shutil.which("chromium")
+    chromium = shutil.which("chromium") or shutil.which("chromium-headless-shell")
     if not chromium:
         return "no Chromium"
     from playwright.sync_api import sync_playwright

@@ -31,6 +31,7 @@ from tests import report_samples as samples
 from tests.browser.evidence_samples import many_faults
 
 RUNS = 5
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-headless-shell")
 
 Sample = tuple[dict[str, Any], samples.Columns, Closeups | None]
 
@@ -111,7 +112,7 @@ def opened(playwright: Any, path: Path) -> dict[str, float]:
     """Open a page once: seconds, processor time of its main thread [s] and memory [MB], also after 50 interactions."""
     out, others = {"calibration": calibration()}, set(renderers())
     browser = playwright.chromium.launch(
-        executable_path=shutil.which("chromium"), args=["--no-sandbox", "--disable-gpu", "--js-flags=--expose-gc"]
+        executable_path=CHROMIUM, args=["--no-sandbox", "--disable-gpu", "--js-flags=--expose-gc"]
     )
     page = browser.new_page(viewport={"width": 1280, "height": 900})
     session = page.context.new_cdp_session(page)
@@ -151,7 +152,7 @@ def opened(playwright: Any, path: Path) -> dict[str, float]:
 
 def waiting(path: Path) -> str:
     """Medians of five openings, in words."""
-    if not shutil.which("chromium"):
+    if not CHROMIUM:
         return "no Chromium"
     from playwright.sync_api import sync_playwright
 

@@ -11,7 +11,19 @@ from diagnosis.results.result import Closeups
 from replay.arrays.envelope import envelope
 from tests import report_samples as samples
 
+UNSTATED = (60.0, 62.0)
 SPIKES = (32.5, 77.7)
+
+
+def unstated() -> tuple[dict[str, Any], samples.Columns]:
+    """As `decided`, and a valve whose probability passes the limit for two seconds, with its residual at a tenth of the threshold."""
+    report, columns = decided()
+    base, t = "evidence.FL.actuator.", columns["t"]
+    inside = (t >= UNSTATED[0]) & (t < UNSTATED[1])
+    columns[base + "probability"] = np.where(inside, 0.99, 0.01)
+    columns[base + "threshold"] = np.full(len(t), 0.02)
+    columns[base + "residual"] = np.where(inside, 0.002, 0.0)
+    return report, columns
 
 
 def decided() -> tuple[dict[str, Any], samples.Columns]:

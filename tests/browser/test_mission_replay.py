@@ -85,3 +85,10 @@ def test_plots_follow_the_clock_to_where_it_is_led(open_page: OPEN) -> None:
     page.wait_for_function(
         "() => { const [a, b] = document.getElementById('figure').layout.xaxis.range; return Now.t >= a && Now.t <= b; }"
     )
+
+
+def test_a_probability_without_a_fault_says_what_the_residual_does(open_page: OPEN) -> None:
+    page = open_page("unstated")
+    page.locator("#scrub").fill("61")
+    said = page.locator("#events button", has_text=re.compile(r"^60\.\d{3} s · FL drive valve: the probability"))
+    expect(said).to_contain_text("no fault is stated here: the residual does not stay beyond its threshold.")

@@ -21,6 +21,7 @@ def test_a_simulated_log_is_that_of_the_command_line(tmp_path: Path) -> None:
     assert made.log.read_bytes() == (tmp_path / "b.mcap").read_bytes()
     assert made.truth_file.read_bytes() == (tmp_path / "b.truth.json").read_bytes()
     assert made.faults[["component", "mode", "start_s"]].to_numpy().tolist() == [["FR", "stuck", 1.0]]
+    assert repr(made) == f"<MadeLog {made.log} (mcap, 2.0 s): 1 fault>"
     with pytest.raises(mfhca.ConfigError, match="exists already"):
         mfhca.simulate(made.log, duration_s=2)
 
@@ -87,6 +88,7 @@ def test_scores_are_those_of_the_command_line(
     by_path = mfhca.evaluate(str(saved), str(made.truth_file))
     assert json.loads(json.dumps(by_path.document)) == printed
     assert scores.faults["outcome"].tolist() == ["right", "right"]
+    assert repr(scores) == "<Evaluation of 1 mission: 2 of 2 injected faults right>"
     assert scores.events.loc["wheel", "right"] == 2
     assert scores.sides.loc[("wheel", "sensor"), "decided_share"] > 0.9
     assert scores.notes == ()
@@ -113,6 +115,7 @@ def test_an_audit(made: mfhca.MadeLog, result: mfhca.Diagnosis, tmp_path: Path) 
     events: list[str] = []
     fleet = mfhca.audit(logs, tmp_path / "out", jobs=1, events=lambda name, facts: events.append(name))
     row = fleet.missions.loc["one"]
+    assert repr(fleet) == f"<Audit {fleet.output}: 1 mission of 1 machine, 0 failed>"
     assert (row["state"], row["verdict"], row["faults"]) == ("ok", "stop", len(result.faults))
     assert mfhca.read_result(fleet.output / row["report"]).faults.equals(result.faults)
     assert fleet.page.is_file()
