@@ -26,6 +26,7 @@ _USUAL, _BEYOND = 0.9, 1.8  # quantile of the windows, and times it
 _BEYOND_OTHERS = 1.6  # times what the others are off meanwhile
 _EITHER = 0.3  # probability of a share beside a constant
 _HARDLY, _LOST = 0.08, 0.25  # of the command, root mean square; of ε: less than a loss that counts by default
+_EXPECTED = 0.03  # of the span: what a valve's advice calls as expected
 _VALVES = 3  # fewer show no habit
 
 
@@ -41,8 +42,11 @@ def without_small_deviations(
     assessments : Mapping[str, Assessment]
         What was found of them.
     """
-    if len(found) < _VALVES or not any(a.findings for a in assessments.values()):
+    if not any(a.findings for a in assessments.values()):
         return dict(assessments)
+    assessments = {w: left_open(a, _exact(a, found[w]), State.HEALTHY) for w, a in assessments.items()}
+    if len(found) < _VALVES:
+        return assessments
     usual = {w: _usual(one) for w, one in found.items()}
     out = {}
     for w, a in assessments.items():
@@ -56,6 +60,12 @@ def without_small_deviations(
         built = [f for f in small if _hardly_off(f, found[w])]
         out[w] = left_open(left_open(a, built, State.HEALTHY), [f for f in small if not any(f is b for b in built)])
     return out
+
+
+def _exact(a: Assessment, one: IdentifiedPair) -> list[Finding]:
+    """Noise, or what is in no row, of a position that is as near to its command as one may expect of a healthy valve."""
+    steady = [f for f in a.findings if f.mode in (FaultMode.NOISY, FaultMode.OUTSIDE_TABLE) and _hardly_off(f, one)]
+    return [f for f in steady if (off := _off(f, one)[0]) is not None and off < _EXPECTED * one.pair.span]
 
 
 def _hardly_off(finding: Finding, one: IdentifiedPair) -> bool:

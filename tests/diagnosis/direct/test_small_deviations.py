@@ -89,3 +89,20 @@ def test_what_is_hardly_off_its_command_is_healthy(gain: float, state: State) ->
 @pytest.mark.parametrize(("gains", "stays"), [((0.9, 0.93, 0.92, 0.93), False), ((0.9, 1.0, 0.99, 1.0), True)])
 def test_a_constant_beside_others_that_are_off_as_well_is_left_open(gains: tuple[float, ...], stays: bool) -> None:
     assert bool(told(gains, FaultMode.OUTSIDE_TABLE).findings) is stays
+
+
+@pytest.mark.parametrize(
+    ("gain", "mode", "stays"),
+    [
+        (0.96, FaultMode.NOISY, False),
+        (0.96, FaultMode.OUTSIDE_TABLE, False),
+        (0.96, FaultMode.INEFFICIENT, True),
+        (0.9, FaultMode.NOISY, True),
+    ],
+)
+def test_what_is_within_what_a_healthy_valve_may_be_off_by_is_no_noise(
+    gain: float, mode: FaultMode, *, stays: bool
+) -> None:
+    after = told((gain, 1.0, 1.0, 1.0), mode)
+    assert bool(after.findings) is stays
+    assert stays or (after.states[slice(*SPAN)] == CODE[State.HEALTHY]).all()
