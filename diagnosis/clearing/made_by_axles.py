@@ -6,6 +6,7 @@ from collections.abc import Collection, Mapping, Sequence
 
 from diagnosis.results.assessment import Assessment, Finding
 from diagnosis.results.machine_event import MachineEvent
+from replay.arrays.runs import united
 
 _MOSTLY = 0.8  # of the time of an event
 _AFTER_S = 3.0  # that an axle takes, once it is free, to be where it is told
@@ -49,17 +50,6 @@ def _total(f: Finding) -> bool:
 def _within(event: MachineEvent, dead: Collection[tuple[float, float]]) -> bool:
     """Whether an event lasts for a while, and for most of it a fault, both in s."""
     return bool(event.spans) and all(
-        sum(max(0.0, min(b, stop) - max(a, start)) for start, stop in _united(dead)) >= _MOSTLY * (b - a)
+        sum(max(0.0, min(b, stop) - max(a, start)) for start, stop in united(dead)) >= _MOSTLY * (b - a)
         for a, b in event.spans
     )
-
-
-def _united(spans: Collection[tuple[float, float]]) -> list[tuple[float, float]]:
-    """Spans that overlap as one [s]."""
-    out: list[tuple[float, float]] = []
-    for a, b in sorted(spans):
-        if out and a <= out[-1][1]:
-            out[-1] = out[-1][0], max(b, out[-1][1])
-        else:
-            out.append((a, b))
-    return out

@@ -6,7 +6,8 @@ import re
 from collections.abc import Iterable
 
 _OF_SIGNAL = re.compile(r"((?:cmd|wheel|steer|imu|gnss|odom)\.[\w.]+): (.*)", re.DOTALL)
-_NUMBER = re.compile(r"once|\d+(?:\.\d+)?(?: times)?")
+# a number by itself, and none of a name as *v1* or *aWheel[1]*
+_NUMBER = re.compile(r"(?<![\w.\[])(?:once|\d+(?:\.\d+)?(?: times)?)(?![\w\]]|\.\w)")
 _MANY, _NAMED = 4, 3  # signals of which one thing is told together, and named of them
 
 

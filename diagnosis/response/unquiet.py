@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from diagnosis.response.disputed import unproved
 from diagnosis.results.assessment import CODE, Assessment
 from diagnosis.results.vocabulary import Tier
+from replay.arrays.blocks import release
 from replay.arrays.sliding import median_within
 from replay.faults import State
 
@@ -55,7 +56,10 @@ def left_open(
     if len(speeds) < 2 or not judged:
         return dict(found)
     width = max(1, round(_BLOCK_S / dt))
-    by_wheel = {w: roughness(y, fresh, width) for w, (y, fresh) in speeds.items()}
+    by_wheel = {}
+    for w, (y, fresh) in speeds.items():
+        by_wheel[w] = roughness(y, fresh, width)
+        release(y, fresh)
     out = dict(found)
     for w in judged:
         if w not in by_wheel or _coarse(*speeds[w]):

@@ -10,6 +10,7 @@ from diagnosis.steering.filter_state import SteeringPath
 from diagnosis.steering.inputs import AxleInputs
 from diagnosis.steering.path import AxleFilter
 from diagnosis.steering.side_findings import SideFindings
+from replay.arrays.runs import united
 from replay.faults import Side
 from replay.machine.quantities import OPENING
 
@@ -44,7 +45,7 @@ def size_words(side: Side, found: SideFindings, inputs: AxleInputs, axle: AxleFi
     if side is Side.ACTUATOR and not measured:
         return ""
     off, limit = _off(side, axle, path, measured=measured)
-    spans = [(a, b) for a, b in _joined(found.unexplained) if (b - a) * dt >= _LONG_S]
+    spans = [(a, b) for a, b in united(found.unexplained) if (b - a) * dt >= _LONG_S]
     peaks = [(_peak(off[a:b], limit[a:b]), a, b) for a, b in spans]
     told = sorted((p for p in peaks if p[0] != 0.0), key=lambda p: -abs(p[0]))
     if not told:
@@ -74,14 +75,3 @@ def _peak(off: Array, limit: Array) -> float:
     """The value that is furthest off, beyond its limit; 0 where none is."""
     beyond = np.where(np.abs(np.nan_to_num(off)) > limit, np.nan_to_num(off), 0.0)
     return float(beyond[np.argmax(np.abs(beyond))]) if beyond.size else 0.0
-
-
-def _joined(spans: tuple[tuple[int, int], ...]) -> list[tuple[int, int]]:
-    """Spans in their order, those that touch joined."""
-    out: list[tuple[int, int]] = []
-    for a, b in sorted(spans):
-        if out and a <= out[-1][1]:
-            out[-1] = out[-1][0], max(b, out[-1][1])
-        else:
-            out.append((a, b))
-    return out

@@ -29,3 +29,8 @@ def test_few_signals_and_notes_that_differ_in_words_stay() -> None:
 def test_numbers_that_are_alike_keep_their_form() -> None:
     notes = [f"wheel.W{k}.v: its clock ticks every 0.10 ms only" for k in range(5)]
     assert alike_notes(notes)[0].endswith("its clock ticks every 0.10 ms only")
+
+
+def test_a_number_in_a_name_is_no_number() -> None:
+    notes = [f"wheel.W{k}.v: GVL.aWheel[{k}].fSpeed and v{k} stop at {k}.5 s" for k in range(1, 6)]
+    assert alike_notes(notes) == notes

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from replay.arrays.runs import runs_of
+from replay.arrays.runs import runs_of, united
 
 
 @pytest.mark.parametrize(
@@ -29,3 +29,8 @@ def test_runs_hold_every_flag_once() -> None:
         assert not again[max(0, start - 1) : stop + 1].any()
         again[start:stop] = True
     assert np.array_equal(again, flags)
+
+
+def test_spans_that_touch_or_overlap_are_one() -> None:
+    assert united([(5.0, 6.0), (1.0, 2.0), (1.5, 3.0), (3.0, 4.0)]) == [(1.0, 4.0), (5.0, 6.0)]
+    assert united(iter([(0, 9), (2, 3)])) == [(0, 9)]
