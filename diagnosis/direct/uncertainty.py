@@ -39,6 +39,7 @@ _PLAY, _PLAY_S = (
     0.35,
     0.5,
 )  # of the play: what is not known of the side on which a valve stands; for how long it stands there
+_JITTER = 3.0  # times its noise: what a valve's command may be off what it was of late, and the valve need not answer
 _COUNTED = 1.0 / 6.0  # variance of a time between two ticks, of its step squared
 _SOUND = 0.4  # quantile of windows that stands for healthy ones
 
@@ -161,6 +162,7 @@ def uncertainty_of(
         dt=period,
         mismatch_s=_PLAY_S if relation.play else MISMATCH_S,
         own_cost=-0.5 * math.log(1.0 - _explained(pair, paired, noise, period)),
+        jitter=_JITTER * noise if pair.side is Side.ACTUATOR else 0.0,
         side=pair.side,
     )
     return Uncertainty(

@@ -3,7 +3,8 @@
 Every row of the two tables is a model of a measured y against a reference x (v against v_true by L4, u_applied against
 u_a by L8):
 
-healthy      y = x + n, or y = x + b + n with a small passing mismatch b of the two instruments
+healthy      y = x + n, or y = x + b + n with a small passing mismatch b of the two instruments; of a valve, x as it was of late
+             where it only jitters
 stuck        y = c, a constant c
 no_signal    y = 0
 inefficient  y = δ·x + n, δ constant
@@ -50,6 +51,7 @@ MODELS = ROW_OF_MODEL.size
 
 _OUTLIER = -18.0
 MISMATCH_S = 0.05  # correlation time of a passing mismatch of two healthy instruments
+_STEADY_S = 0.2  # over which x is taken to see whether it is steady
 _DRIFT_COST = 0.04  # what the noisy row must gain per sample to be preferred
 
 
@@ -76,6 +78,10 @@ class FilterBank(NamedTuple):
         What is left of b after a step [1].
     drift_cost : float
         What the noisy row must gain per sample.
+    jitter : float
+        Of x at most, which a healthy channel need not join in.
+    recent : float
+        What is left after a step of what x was [1].
     admitted : NDArray[np.bool_], shape (models,)
         Models of rows that the table of the channel's side has.
     """
@@ -91,6 +97,8 @@ class FilterBank(NamedTuple):
     floor: float
     decay: float
     drift_cost: float
+    jitter: float
+    recent: float
     admitted: NDArray[np.bool_]
 
 
@@ -118,6 +126,8 @@ class ModeModel:
         What the noisy row must gain per sample to be preferred.
     own_cost : float
         What the noisy row gains per sample at most by explaining x's own noise away, which says nothing about y.
+    jitter : float
+        Of x at most, which a healthy channel need not join in: beside a steady command a healthy valve stands, too.
     side : Side
         `SENSOR` or `ACTUATOR`: whose table's rows the channel may follow.
     """
@@ -131,6 +141,7 @@ class ModeModel:
     mismatch_s: float = MISMATCH_S
     drift_cost: float = _DRIFT_COST
     own_cost: float = 0.0
+    jitter: float = 0.0
     side: Side = Side.SENSOR
 
     def admitted(self) -> NDArray[np.bool_]:
@@ -152,5 +163,7 @@ class ModeModel:
             floor=_OUTLIER - float(np.log(self.span)),
             decay=float(np.exp(-self.dt / self.mismatch_s)),
             drift_cost=float(self.drift_cost + self.own_cost),
+            jitter=float(self.jitter),
+            recent=float(np.exp(-self.dt / _STEADY_S)),
             admitted=self.admitted(),
         )

@@ -45,7 +45,7 @@ class FilterState(NamedTuple):
     score : Array, shape (models,)
         Log-probability of the best path to each model, or its log-evidence.
     mean : Array, shape (models, 2)
-        Mean of the unknowns [δ or c, δ̄].
+        Mean of the unknowns [δ or c, δ̄]; beside a stuck channel's c what x was of late.
     cov : Array, shape (models, 3)
         Their covariance (P11, P12, P22).
     """
@@ -167,6 +167,15 @@ def _blind(y, x, bank, mean, cov, out):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
+def _stands_beside(y, x, white, bank, mean, out):  # type: ignore[no-untyped-def]
+    """Healthy is as well who does not join in the jitter of a steady x: `mean[CONSTANT, 1]` is what x was of late."""
+    late = mean[CONSTANT, 1]
+    if abs(x - late) < bank.jitter:
+        r = bank.r * white
+        out[EXACT] = max(out[EXACT], -0.5 * ((y - late) ** 2 / r + np.log(2 * np.pi * r)))
+
+
+@njit(cache=True)
 def likelihoods(k, samples, bank, mean, cov, out):  # type: ignore[no-untyped-def]
     """Log-likelihood of sample k under every model; where nothing moves, a zero reading speaks for no fault."""
     y, x, status, quiet = samples.y[k], samples.x[k], samples.status[k], samples.quiet[k]
@@ -177,7 +186,9 @@ def likelihoods(k, samples, bank, mean, cov, out):  # type: ignore[no-untyped-de
     if status == BLIND:
         _blind(y, x, bank, mean, cov, out)
         return
+    mean[CONSTANT, 1] = x + (mean[CONSTANT, 1] - x) * bank.recent if cov[CONSTANT, 0] < bank.span**2 / 2 else x
     _update(y, x, samples.white[k], samples.passing[k], samples.constant[k], bank, mean, cov, out)
+    _stands_beside(y, x, samples.white[k], bank, mean, out)
     for m in range(out.size):
         out[m] = max(out[m], bank.floor)
         if ROW_OF_MODEL[m] == NOISY:

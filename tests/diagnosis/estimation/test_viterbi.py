@@ -7,13 +7,15 @@ import pytest
 
 from diagnosis.channels.sample_status import PAIR
 from diagnosis.estimation import fault_models
-from diagnosis.estimation.fault_models import HEALTHY, NO_SIGNAL, NOISY, ModeModel
+from diagnosis.estimation.fault_models import HEALTHY, NO_SIGNAL, NOISY, ROW_OF_MODEL, STUCK, ModeModel
 from diagnosis.estimation.filter_kernel import segment_evidence
 from diagnosis.estimation.row_probability import row_probabilities
 from diagnosis.estimation.samples import Samples
 from diagnosis.estimation.viterbi import ModePath, most_probable
 from diagnosis.results.fault_rows import codes_of
 from replay.faults import Side
+
+Array = np.ndarray
 
 
 def causal(healthy: str) -> ModePath:
@@ -82,3 +84,35 @@ def test_rows_that_the_side_lacks_are_never_entered(monkeypatch: pytest.MonkeyPa
     assert evidence[NOISY] == -np.inf
     assert np.isfinite(evidence[table]).all()
     assert row_probabilities(evidence, Side.ACTUATOR)[NOISY] == 0.0
+
+
+def valve(jitter: float) -> ModeModel:
+    """A valve with a noise of half a percent of full opening, recorded at 50 Hz."""
+    return ModeModel(0.005, 0.005, 0.005, span=1.0, switch_cost=11.0, dt=0.02, side=Side.ACTUATOR, jitter=jitter)
+
+
+def stands(command: Array, seed: int) -> Array:
+    """Readings of a valve that stands at 0.05 of full opening."""
+    return 0.05 + 0.005 * np.random.default_rng(seed).normal(size=command.size)
+
+
+def stuck_share(y: Array, command: Array, jitter: float) -> float:
+    """Share of the samples in which the path calls the valve stuck."""
+    whole = Samples.even(y, command, np.full(y.size, PAIR, np.int8), np.zeros(y.size, np.bool_))
+    return float(np.mean(ROW_OF_MODEL[most_probable(whole, valve(jitter)).model] == STUCK))
+
+
+def test_a_valve_that_does_not_join_in_its_commands_jitter_is_not_stuck() -> None:
+    """Beside a steady command a healthy valve stands too; a command that moves shows which of both it is."""
+    command = 0.05 + 0.004 * np.random.default_rng(5).normal(size=1500)
+    y = stands(command, 6)
+    assert stuck_share(y, command, jitter=0.0) > 0.9
+    assert stuck_share(y, command, jitter=0.015) == 0.0
+    moved = command + np.where(np.arange(1500) < 750, 0.0, 0.03 * np.sin(np.arange(1500) / 50))
+    assert stuck_share(y, moved, jitter=0.015) > 0.45
+
+
+def test_a_stuck_valve_stays_stuck_while_its_command_passes_by() -> None:
+    command = 0.05 + 0.3 * np.sin(np.arange(3000) / 100)
+    command[1000:1250] = 0.05  # steady at the very value, for five seconds
+    assert stuck_share(stands(command, 7), command, jitter=0.015) > 0.97
