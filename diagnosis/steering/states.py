@@ -53,17 +53,19 @@ def reasons_of(side: Side, axle: AxleFilter, *, judged: bool) -> dict[State, str
     return {**_REASONS[side], State.NOT_ASSESSED: f"{_NO_COMMAND}, or {why}" if unseen else why}
 
 
-def vouched(healthy: NDArray[np.bool_], shown: NDArray[np.bool_], dt: float, *, seen: bool) -> NDArray[np.bool_]:
+def vouched(
+    healthy: NDArray[np.bool_], shown: NDArray[np.bool_], dt: float, *, seen: bool, shortest: float = np.inf
+) -> NDArray[np.bool_]:
     """Healthy blocks for which a movement nearby speaks.
 
     Between two movements that were obeyed a fault would have had to come and go, which is not believed within some
     seconds; before the first and after the last one health is believed for fewer. Both for longer where the valve's
-    opening is `seen`. Shape (m,).
+    opening is `seen`, but for no longer than the `shortest` fault [s] that did come and go in this mission. Shape (m,).
     """
     out = shown & healthy
     idle = healthy & ~shown
-    alone = round((_SEEN_ALONE_S if seen else _ALONE_S) / dt)
-    between = _SEEN_BETWEEN_S if seen else _BETWEEN_S
+    alone = round(min(_SEEN_ALONE_S if seen else _ALONE_S, shortest) / dt)
+    between = min(_SEEN_BETWEEN_S if seen else _BETWEEN_S, shortest)
     for a, b in runs_of(idle):
         left, right = a > 0 and out[a - 1], b < idle.size and healthy[b] and shown[b]
         if left and right and (b - a) * dt <= between:
@@ -127,7 +129,8 @@ def _of_blocks(side: Side, axle: AxleFilter, path: SteeringPath, found: SideFind
     shown = exercised(axle)
     if side is Side.SENSOR and axle.model.noise.resolved:
         shown[:] = True
-    healthy = vouched(fine, shown, blocks.dt, seen=axle.model.opening_measured)
+    shortest = min(((f.stop - f.start) / blocks.length * blocks.dt for f in found.findings), default=np.inf)
+    healthy = vouched(fine, shown, blocks.dt, seen=axle.model.opening_measured, shortest=shortest)
     states = np.where(healthy, CODE[State.HEALTHY], CODE[State.NOT_EXCITED]).astype(np.int8)
     states[~fine & shown] = CODE[
         State.NOT_ASSESSED
