@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from diagnosis.clearing.axle_rates import Rates, one_joint, rates_of
 from diagnosis.clearing.cells import Array, Cells
-from diagnosis.clearing.measure import alone, compared, lasts, off_commands, times, worst
+from diagnosis.clearing.measure import alone, compared, lasts, times, worst
 from diagnosis.clearing.responses import largest
 from diagnosis.clearing.seconds import slope_off
 from diagnosis.clearing.still import (
@@ -20,15 +20,15 @@ from diagnosis.clearing.still import (
     still_frame,
 )
 from diagnosis.clearing.turned_as_read import turned_as_read
+from diagnosis.clearing.valves import valve_checks
 from diagnosis.results.clearing import Check, Checked
 from diagnosis.results.vocabulary import Kind
 from replay.faults import Side
 
 Flags = NDArray[np.bool_]
 
-FLOOR_RAD, OPENING = 0.06, 0.03  # deviations are shares of at least this angle and opening
+FLOOR_RAD = 0.06  # deviations are shares of at least this angle
 _SMALL = 0.1  # of that angle: an axle that is steered by less, root mean square, shows nothing
-VALVE = 1.4  # dead band and hysteresis of a healthy valve: its limit, likewise
 #: Limits of the rate in windows and over the mission, as multiples of the loss that counts, by whether angle and opening are measured twice.
 RATE = {False: (2.0, 0.6), True: (1.6, 1.0)}
 #: Of the loss that counts, and times the other axle's: a change of one axle alone. Dead bands that are not known hide half of one.
@@ -51,7 +51,7 @@ def axle_checks(cells: Cells, clear_at: float) -> Iterator[Checked]:
     rates = rates_of(cells, rate, used)
     apart = np.column_stack([cells.apart(axle) for axle in cells.machine.axles]) if cells.machine.axles else True
     angle, second, opening = (np.where(apart, x, np.nan) for x in (angle, second, opening))
-    behind = off_commands(cells, opening, command, OPENING)
+    yield from valve_checks(cells, Kind.STEER, clear_at)
     place = np.minimum(np.arange(cells.frame.starts.size), len(rates.off) - 1)
     limit = answered(cells)
     joint = len(cells.machine.axles) > 1 and one_joint(cells, 0, 1)
@@ -74,10 +74,6 @@ def axle_checks(cells: Cells, clear_at: float) -> Iterator[Checked]:
             continue
         if np.isfinite(second[:, j]).any():
             yield _beside_second(cells, axle, angle[:, j], second[:, j], clear_at)
-        if np.isfinite(opening[:, j]).any() and np.isfinite(command[:, j]).any():
-            yield worst(
-                cells, (*about, Side.ACTUATOR, Check.SECOND_MEASUREMENT), behind[:, j], VALVE * clear_at, apart=True
-            )
         if not np.isfinite(np.column_stack([second[:, j], used[:, j], cells.means("imu.yaw_rate")])).any():
             yield Checked(*about, Side.SENSOR, Check.ANGLE_SCALE, None, clear_at)
         if np.isfinite(command[:, j]).any():

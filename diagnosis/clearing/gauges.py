@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnosis.clearing import axles, wheels, yaw
+from diagnosis.clearing import axles, valves, wheels, yaw
 from diagnosis.clearing import responses as resp
 from diagnosis.clearing.alone import Rough, Still, Straight
 from diagnosis.clearing.axle_rates import rates_of
@@ -17,6 +17,7 @@ from diagnosis.clearing.limits import measured_twice, response_limits
 from diagnosis.clearing.measure import as_followed, compared, late
 from diagnosis.clearing.openings import openings_tell
 from diagnosis.clearing.placements import Overlap, Placements, Ratio, Reference
+from diagnosis.clearing.seconds import alone_apart, off_second
 from diagnosis.clearing.still import answered, rate_of, still_frame
 from diagnosis.results.detectability import Deviation
 from diagnosis.results.vocabulary import Kind
@@ -136,13 +137,15 @@ def _wheels(cells: Cells) -> Iterator[Gauges]:
     speed, command, opening, second = (cells.wheels(leaf) for leaf in ("v", "u", "u_applied", "v_true"))
     clear_at, top = cells.machine.limits.clear_at, cells.machine.max_speed
     used = np.where(np.isfinite(opening), opening, command)
-    followed = as_followed(cells, opening, command, wheels.OPENING)
+    followed = as_followed(cells, opening, command, valves.OPENING)
     responses = resp.responses_of(cells, speed, used, cells.reference, beyond_dead=True)
     limits = response_limits(
         responses, measured_twice(cells), clear_at, cells.carried_shares, cells.ahead, driven=len(cells.driven)
     )
     tells = openings_tell(cells, responses)
     delays, rough = late(speed, cells.reference, cells.dt), wheels.roughness_of(cells, speed)
+    least = valves.beside_commands(cells, Kind.WHEEL).limits
+    most_apart = [float(z) for z in resp.largest(off_second(cells, speed, second, wheels.FLOOR * top))]
     for i, name in enumerate(cells.machine.wheels):
         v, u, a, x = (z[:, i] for z in (speed, command, opening, second))
         if not _known(v):
@@ -164,7 +167,8 @@ def _wheels(cells: Cells) -> Iterator[Gauges]:
                 lasting = _lasting(limit.lasting_below + usual.least, lasting_above - usual.most)
         delay = delays[i]
         late_by = {} if delay is None else {Deviation.DELAY: wheels.LATE_S + delay + cells.dt}
-        second_one = _reference(cells, name, (v, x, wheels.FLOOR * top), clear_at) if measured else None
+        most = alone_apart(most_apart, i, clear_at)
+        second_one = _reference(cells, name, (v, x, wheels.FLOOR * top), most) if measured else None
         own = Rough(cells.frame, rough.quick[:, i], rough.size[:, i], rough.limit[:, i], cells.width)
         about = (Kind.WHEEL, name)
         yield Gauges(
@@ -180,7 +184,7 @@ def _wheels(cells: Cells) -> Iterator[Gauges]:
             unpowered=name in cells.machine.unpowered,
         )
         if twice:
-            asked = _reference(cells, name, (a, followed[:, i], wheels.OPENING), wheels.VALVE * clear_at)
+            asked = _reference(cells, name, (a, followed[:, i], valves.OPENING), least[i])
             yield Gauges(*about, Side.ACTUATOR, "1", moving, a, None, asked)
         elif _known(u):
             yield Gauges(*about, Side.ACTUATOR, "1", moving, v, ratio, None, lasting=lasting)
@@ -190,13 +194,14 @@ def _axles(cells: Cells) -> Iterator[Gauges]:
     angle, second, command, opening = (cells.axles(leaf) for leaf in ("phi", "phi_true", "u", "u_applied"))
     clear_at, frame = cells.machine.limits.clear_at, still_frame(cells)
     used, share = np.where(np.isfinite(opening), opening, command), -np.log1p(-clear_at)
-    followed = as_followed(cells, opening, command, axles.OPENING)
+    followed = as_followed(cells, opening, command, valves.OPENING)
     rates, limit = rates_of(cells, rate_of(angle, cells.dt), used), answered(cells)
     path = yaw.off_straight(cells)
     straight = None if path is None else Straight(cells.frame, path, yaw.OFF / yaw.ANSWERED)
     turned = (
         {} if path is None else {Deviation.OFFSET: (yaw.LASTING_OFF + abs(float(np.nanmedian(path)))) / yaw.ANSWERED}
     )
+    least = valves.beside_commands(cells, Kind.STEER).limits
     for j, name in enumerate(cells.machine.axles):
         phi, x, u, a = (z[:, j] for z in (angle, second, command, opening))
         if not _known(phi):
@@ -229,7 +234,7 @@ def _axles(cells: Cells) -> Iterator[Gauges]:
             *about, Side.SENSOR, "rad", moving, phi, ratio, second_one, None, still, straight, {**lasting, **turned}
         )
         if twice:
-            asked = _reference(cells, name, (a, followed[:, j], axles.OPENING), axles.VALVE * clear_at)
+            asked = _reference(cells, name, (a, followed[:, j], valves.OPENING), least[j])
             yield Gauges(*about, Side.ACTUATOR, "1", moving, a, None, asked, still=still)
         elif _known(u):
             yield Gauges(*about, Side.ACTUATOR, "1", moving, phi, ratio, None, still=still, lasting=lasting)

@@ -6,6 +6,7 @@ makes of any wheel. Over ten seconds those pass, and what one wheel alone does s
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -17,11 +18,14 @@ LONG_S = 10.0
 _KNOWN = 0.6  # of its windows
 
 
-def longer(cells: Cells, windows: Array) -> Array:
-    """Means of windows over ten seconds in whose middle each stands, beside stated faults, shape (windows, wheels) as `windows`; else NaN."""
+def longer(cells: Cells, windows: Array, names: Sequence[str]) -> Array:
+    """Means of windows over ten seconds in whose middle each stands, beside stated faults, shape (windows, parts) as `windows`; else NaN.
+
+    `names`: the parts' wheels or axles.
+    """
     x = windows.copy()
-    for i, wheel in enumerate(cells.machine.wheels):
-        x[cells.explained(wheel), i] = np.nan
+    for i, name in enumerate(names):
+        x[cells.explained(name), i] = np.nan
     n = round((LONG_S - WINDOW_S) / (cells.frame.hop * cells.dt)) + 1
     out = np.full(x.shape, np.nan)
     if len(x) < n:

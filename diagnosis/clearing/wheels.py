@@ -12,14 +12,15 @@ from diagnosis.channels.echo import repeats_its_command
 from diagnosis.clearing.cells import Array, Cells
 from diagnosis.clearing.limits import Limits, long_limit, measured_twice, response_limits
 from diagnosis.clearing.longer import around, longer
-from diagnosis.clearing.measure import alone, compared, lasts, late, off_commands, times, worst
+from diagnosis.clearing.measure import alone, compared, lasts, late, times, worst
 from diagnosis.clearing.opening_offsets import opening_offsets
 from diagnosis.clearing.openings import openings_tell
 from diagnosis.clearing.pairs import FALLS, pairs_fall
 from diagnosis.clearing.plant_response import LIMIT, beside_plant
 from diagnosis.clearing.responses import OTHERS, USUAL_TOP, largest, others_at, responses_of
 from diagnosis.clearing.same_side import beside_its_side
-from diagnosis.clearing.seconds import less_at_starts, off_second
+from diagnosis.clearing.seconds import alone_apart, less_at_starts, off_second
+from diagnosis.clearing.valves import valve_checks
 from diagnosis.clearing.wild import wild_readings
 from diagnosis.results.clearing import Check, Checked
 from diagnosis.results.vocabulary import Kind
@@ -34,7 +35,6 @@ CREEPING, _CREEPS_ALIKE = (
 #: Where a wheel hardly drives, its speed per opening counts beyond so much of the loss that counts, where it does not from less on
 #: elsewhere [ln]: dead bands differ. Healthy wheels of seven machines with valves, a tuning mission each, had 0.14 at most.
 _CREEPING_RESPONSE = 0.75
-OPENING = 0.03  # of full opening: likewise
 _ANSWER_S = 0.5  # within which a drive jumps as its command did
 ROUGH, _ROUGHER = 0.15, 5.0  # quick changes: share of the speed, times those of the other wheels
 _LEAST_ROUGH, _ROUGH_ALONE = (
@@ -46,12 +46,11 @@ LATE_S = 0.2
 #: least that is told from what healthy ones do [ln]. A loss of 0.3 showed 1.4 times as much on a machine whose controller asked for little.
 _ASKED_MORE, _LEAST_TOLD = 1.3, 0.06
 _TRACKING, _TRACKING_ALONE = 0.35, 0.12  # at most, and at least where the other wheels follow much better
-_VALVE_ALONE, _SLOWER = 2.2, 3.0  # times the deviation of the others' valves, and speeds
+_SLOWER = 3.0  # times the deviation of the others' speeds
 #: Of full opening, by which a wheel may differ from the others at one speed, and times what the next one does. Healthy wheels of 14 machines
 #: (28 tuning missions) had 0.07 where no other had 0.032, and else 1.6 times the next.
 LEAST_OFFSET, _OFF_ALONE = 0.08, 2.2
 _STANDS_BEHIND, _FOLLOWS = 0.5, (0.7, 1.3)  # of its command: a wheel that hardly answers beside one that does
-VALVE = 1.4  # dead band and hysteresis of a healthy valve: the limit as a multiple of the loss that counts
 
 
 def wheel_checks(cells: Cells, clear_at: float) -> Iterator[Checked]:
@@ -62,15 +61,13 @@ def wheel_checks(cells: Cells, clear_at: float) -> Iterator[Checked]:
     used = np.where(np.isfinite(opening), opening, command)
     apart = np.column_stack([cells.apart(wheel) for wheel in cells.machine.wheels])
     speed, second, opening = (np.where(apart, x, np.nan) for x in (speed, second, opening))
-    behind = off_commands(cells, opening, command, OPENING)
-    slowest = [float(x) for x in largest(behind)]
     responses = responses_of(cells, speed, used, reference, beyond_dead=True)
     tells = openings_tell(cells, responses)
     windows, lasting = responses.windows, responses.usual
     slow = responses_of(cells, speed, used, reference, CREEPING * USUAL_TOP, over_time=False, beyond_dead=True).windows
     slow[np.isfinite(windows)] = np.nan
     limits = response_limits(responses, twice, clear_at, cells.carried_shares, cells.ahead, driven=len(cells.driven))
-    long = longer(cells, -windows)
+    long = longer(cells, -windows, cells.machine.wheels)
     long_most = [float(x) for x in largest(long)]
     tracking, rough = _tracking(cells, speed, reference), _rough_beside_others(roughness_of(cells, speed, reference))
     rough = np.fmax(rough, wild_readings(cells, speed, FLOOR * cells.machine.max_speed))
@@ -86,6 +83,8 @@ def wheel_checks(cells: Cells, clear_at: float) -> Iterator[Checked]:
     creeping = less_at_starts(np.column_stack(slow_off))
     slowly = [float(x) for x in largest(creeping)]
     apart_from_second = off_second(cells, speed, second, FLOOR * top)
+    most_apart = [float(x) for x in largest(apart_from_second)]
+    yield from valve_checks(cells, Kind.WHEEL, clear_at)
     for i, wheel in enumerate(cells.machine.wheels):
         about = (Kind.WHEEL, wheel)
         either = Side.SENSOR if wheel in cells.machine.unpowered else Side.SENSOR_OR_ACTUATOR
@@ -93,12 +92,10 @@ def wheel_checks(cells: Cells, clear_at: float) -> Iterator[Checked]:
             continue
         if twice[i][1]:
             about_sensor = (*about, Side.SENSOR, Check.SECOND_MEASUREMENT)
-            driven = worst(cells, about_sensor, apart_from_second[:, i], clear_at, apart=True)
+            most = alone_apart(most_apart, i, clear_at)
+            driven = worst(cells, about_sensor, apart_from_second[:, i], most, apart=True)
             creeps = worst(cells, about_sensor, creeping[:, i], most_creeping(slowly, i, clear_at), apart=True)
             yield max(driven, creeps, key=times)
-        if twice[i][0]:
-            limit = alone(slowest, i, VALVE * clear_at, clear_at, _VALVE_ALONE)
-            yield worst(cells, (*about, Side.ACTUATOR, Check.SECOND_MEASUREMENT), behind[:, i], limit, apart=True)
         if wheel in cells.carried and not twice[i][0] and _known(command[:, i]):
             most = max(cells.carried[wheel], cells.may_carry)
             limits[i] = beside_ground(limits[i], most, clear_at)
@@ -146,7 +143,7 @@ def wheel_checks(cells: Cells, clear_at: float) -> Iterator[Checked]:
             yield Checked(*about, either, Check.BEHIND, None, limits[i].below)
         if _known(reference[:, i]):
             if (
-                _known(used[:, i]) or twice[i][1]
+                _known(used[:, i]) or twice[i][1] or wheel in cells.machine.unpowered
             ):  # a drive with a command alone is judged by how it answers it, not by its lag
                 limit = alone(worst_tracking, i, _TRACKING, _TRACKING_ALONE, _SLOWER)
                 yield worst(cells, (*about, either, Check.TRACKING), tracking[:, i], limit, apart=True)

@@ -38,7 +38,7 @@ def act_of(check: Checked, twice: Collection[str]) -> str:
             "run `mfhca fit` on healthy missions, and diagnose with the file that it writes (-m), or log "
             f"steer.{check.component}.phi_true and .u_applied (second measurements)"
         )
-    if check.check is Check.SECOND_MEASUREMENT and check.worst is not None:
+    if check.check in (Check.SECOND_MEASUREMENT, Check.JITTER) and check.worst is not None:
         return _third_one(check, words)
     if check.check in _STEERED or check.kind == Kind.STEER:
         return STEER

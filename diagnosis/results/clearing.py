@@ -17,6 +17,7 @@ class Check(StrEnum):
     """What is asked of a part; `CHECK_WORDS` has what a value beyond the limit means."""
 
     SECOND_MEASUREMENT = "second_measurement"
+    JITTER = "jitter"
     RESPONSE = "response"
     LASTING_RESPONSE = "lasting_response"
     CHANGE = "change"
@@ -46,6 +47,10 @@ CHECK_WORDS: dict[Check, tuple[str, str]] = {
     Check.SECOND_MEASUREMENT: (
         "against its second measurement",
         "the {part} is off its second measurement by {value} of what it should show",
+    ),
+    Check.JITTER: (
+        "noise of its position beside that of its command",
+        "the {part} jitters by {value} of full {unit_command} (standard deviation) more than its command",
     ),
     Check.RESPONSE: (
         "speed per {unit_command} below the other {wheels}', for 3 s",
@@ -199,7 +204,7 @@ class Checked:
         words = self.words.part_words(self.kind, self.component, self.side)
         if self.worst is None and self.check not in (Check.BEHIND, Check.ANGLE_SCALE):
             return f"{words}: this mission leaves the check “{self.asked}” open"
-        two = self.check is Check.SECOND_MEASUREMENT
+        two = self.check in (Check.SECOND_MEASUREMENT, Check.JITTER)
         value = "" if self.worst is None else self._value
         changes = self.check is Check.RATE and self.start_s is None
         said = self.words.fill(_RATE_CHANGES if changes else CHECK_WORDS[self.check][1])

@@ -11,7 +11,7 @@ import pytest
 from diagnosis.clearing.cells import Frame
 from diagnosis.clearing.measure import as_followed, compared, lowest_passed
 from diagnosis.clearing.openings import speeds_follow_openings
-from diagnosis.clearing.wheels import OPENING
+from diagnosis.clearing.valves import OPENING
 
 DT, SIZE = 0.1, 900
 T = np.arange(SIZE) * DT

@@ -150,7 +150,7 @@ def test_what_one_wheel_loses_for_ten_seconds_stands_out_where_three_do_not_show
         machine=SimpleNamespace(wheels=("FR", "FL", "RR", "RL")),
         explained=lambda wheel: explained.get(wheel, np.zeros(140, np.bool_)),
     )
-    long = longer(of, windows)
+    long = longer(of, windows, of.machine.wheels)
     assert long.shape == windows.shape
     assert int(np.nanargmax(long[:, 1])) == pytest.approx(52, abs=6)  # in its middle
     assert long[52, 1] == pytest.approx(windows[45:60, 1].mean())
@@ -158,9 +158,9 @@ def test_what_one_wheel_loses_for_ten_seconds_stands_out_where_three_do_not_show
     assert most[1] > long_limit(most, 1, 0.288) == pytest.approx(max(0.06, 3.0 * max(most[0], *most[2:])))
     assert most[0] < long_limit(most, 0, 0.288)
     explained["FL"][38:66] = True  # stated
-    assert np.nanmax(longer(of, windows)[:, 1]) < 0.06
+    assert np.nanmax(longer(of, windows, of.machine.wheels)[:, 1]) < 0.06
     explained = {wheel: np.zeros(8, np.bool_) for wheel in of.machine.wheels}
-    assert np.isnan(longer(of, windows[:8])).all()  # shorter than that
+    assert np.isnan(longer(of, windows[:8], of.machine.wheels)).all()  # shorter than that
 
 
 def test_a_value_over_ten_seconds_is_told_with_all_of_them() -> None:
