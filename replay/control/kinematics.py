@@ -257,3 +257,23 @@ def speed_ratios(axle_angle: NDArray[np.float64], geometry: Geometry) -> NDArray
         rolling = k_x if w.axle == "fixed" else np.sign(k_x) * np.hypot(k_x, k_y)
         out[:, i] = rolling - curvature * w.offset
     return out
+
+
+def commands_by_angles(
+    phi_ref: NDArray[np.float64], phi: NDArray[np.float64], v: NDArray[np.float64], geometry: Geometry
+) -> NDArray[np.float64]:
+    """Commanded wheel speeds of a machine for which no yaw rate is commanded [m/s], shape (n, wheels): `speed_ratios` times the body's.
+
+    NaN where no shared axle is steered, but for wheels on the middle line, which go as the body does.
+
+    Parameters
+    ----------
+    phi_ref, phi : NDArray[np.float64], shape (n, axles)
+        Commanded angles, taken where they are known, and measured ones [rad].
+    v : NDArray[np.float64], shape (n,)
+        Commanded speed of the body [m/s].
+    """
+    if not set(geometry.axles) & {"front", "rear"}:
+        middle = np.array([w.axle == "fixed" and w.y == 0.0 for w in geometry.wheels.values()])
+        return np.where(middle, v[:, np.newaxis], np.nan)
+    return v[:, np.newaxis] * speed_ratios(np.where(np.isfinite(phi_ref), phi_ref, phi), geometry)

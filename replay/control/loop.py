@@ -13,7 +13,7 @@ from replay.arrays.column_store import ColumnStore
 from replay.arrays.envelope import envelope, in_buckets, rows_of
 from replay.arrays.processors import each
 from replay.control import mfhca
-from replay.control.kinematics import CommandState, wheel_angles, wheel_commands
+from replay.control.kinematics import CommandState, commands_by_angles, wheel_angles, wheel_commands
 from replay.control.law_choice import Reading, choose_law
 from replay.control.law_fit import LawFit
 from replay.control.local_fit import PiFit
@@ -172,9 +172,16 @@ def _commands(timeline: Timeline, machine: Machine, phi: Array, readings: list[R
     speed, omega = timeline.get("cmd.v"), timeline.get("cmd.omega")
     geometry = machine.geometry
     mapped = geometry is not None and speed is not None
-    _say_commands(machine, bool(logged_v.all()), mapped, readings)
+    _say_commands(machine, bool(logged_v.all()), mapped, readings, turning=omega is not None)
     if geometry is None or speed is None or (logged_v.all() and logged_phi.all()):
         return v_ref, phi_ref
+
+    if omega is None:
+
+        def turned(v_ref: Array, phi_ref: Array, phi: Array, speed: Array) -> Array:
+            return np.where(logged_v, v_ref, commands_by_angles(phi_ref, phi, speed, geometry))
+
+        return timeline.map(turned, v_ref, phi_ref, phi, speed), phi_ref
 
     def completed(
         state: CommandState, v_ref: Array, phi_ref: Array, phi: Array, speed: Array, omega: Array
@@ -192,14 +199,20 @@ def _commands(timeline: Timeline, machine: Machine, phi: Array, readings: list[R
         )
         return (np.where(logged_v, v_ref, found.speed), np.where(logged_phi, phi_ref, found.axle_angle)), state
 
-    turning = np.broadcast_to(0.0, speed.shape) if omega is None else omega
-    (v_all, phi_all), _ = timeline.scan(completed, CommandState(), v_ref, phi_ref, phi, speed, turning)
+    (v_all, phi_all), _ = timeline.scan(completed, CommandState(), v_ref, phi_ref, phi, speed, omega)
     return v_all, phi_all
 
 
-def _say_commands(machine: Machine, logged: bool, mapped: bool, readings: list[Reading]) -> None:
+def _say_commands(machine: Machine, logged: bool, mapped: bool, readings: list[Reading], *, turning: bool) -> None:
     if logged:
         readings.append(Reading(f"commanded {machine.part} speed v_c,i", "as recorded"))
+    elif mapped and not turning:
+        by = "from v_c and the steering angles: no ω_c is logged"
+        readings.append(
+            Reading(
+                f"commanded {machine.part} speed v_c,i", by, "unknown beside the middle line where no axle is steered"
+            )
+        )
     elif mapped:
         assert machine.geometry is not None
         offsets = sorted({abs(w.offset) for w in machine.geometry.wheels.values()})

@@ -16,6 +16,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from replay.control.kinematics import (
     WheelCommands,
     _scan_low_pass,
+    commands_by_angles,
     low_pass,
     steering_angle,
     wheel_angles,
@@ -241,3 +242,20 @@ def test_a_car_turns_about_its_unsteered_axle(middle: float) -> None:
     assert_allclose(np.tan(found.angle[:, 1]), base / (base / np.tan(delta) - track / 2))
     assert_allclose(found.speed[:, 1], np.hypot(v - omega * track / 2, omega * base))
     assert_allclose(found.speed[:, 3], v - omega * track / 2)
+
+
+def test_without_a_commanded_yaw_rate_the_angles_say_how_the_wheels_turn() -> None:
+    """Held angles ask for the yaw rate that would have been commanded; measured ones stand in where none are."""
+    v, omega, geometry = np.full(400, 0.5), np.linspace(-0.3, 0.3, 400), four()
+    asked = commands(v, omega, geometry, phi_dot="zero")
+    measured = np.zeros_like(asked.axle_angle)
+    assert_allclose(commands_by_angles(asked.axle_angle, measured, v, geometry), asked.speed, atol=1e-9)
+    unlogged = np.full_like(measured, np.nan)
+    assert_allclose(commands_by_angles(unlogged, asked.axle_angle, v, geometry), asked.speed, atol=1e-9)
+
+
+def test_without_a_commanded_yaw_rate_and_a_steered_axle_only_the_middle_line_is_known() -> None:
+    geometry = Geometry({"L": WheelGeometry(0.0, 0.3, 0.0, "fixed"), "D": WheelGeometry(0.0, 0.0, 0.0, "fixed")}, 0.7)
+    found = commands_by_angles(np.zeros((3, 0)), np.zeros((3, 0)), np.array([0.1, 0.2, 0.3]), geometry)
+    assert np.isnan(found[:, 0]).all()
+    assert_allclose(found[:, 1], [0.1, 0.2, 0.3])

@@ -135,6 +135,16 @@ def test_without_recorded_valve_command_the_law_is_taken_as_printed(mission: Sim
     assert_allclose(replay.u, np.clip(-replay.e, -1, 1), atol=1e-12)
 
 
+def test_without_a_commanded_yaw_rate_wheels_turn_with_the_steering(mission: SimulatedMission) -> None:
+    replay = replay_loop(without(mission, ".v_ref", "cmd.omega"), PAPER)
+    full = replay_loop(timeline(dict(mission.columns)), PAPER)
+    assert "steering angles" in reading(replay, "commanded wheel speed v_c,i")
+    turning = np.abs(mission.columns["cmd.omega"]) > 0.05
+    straight = np.abs(np.broadcast_to(mission.columns["cmd.v"][:, np.newaxis], full.v_ref.shape) - full.v_ref)
+    by_angles = np.abs(replay.v_ref - full.v_ref)
+    assert np.median(by_angles[turning]) < 0.2 * np.median(straight[turning])
+
+
 def test_another_controller_has_no_law(mission: SimulatedMission) -> None:
     replay = replay_loop(timeline(dict(mission.columns)), with_control(law="none"))
     for x in (replay.u, replay.psi, replay.psi_printed, replay.implied_squared, replay.forcing, replay.u_difference):
