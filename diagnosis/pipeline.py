@@ -279,6 +279,7 @@ def _with_what_stands_out(judged: Judged) -> Judged:
         return judged
     machine = judged.machine
     seen = less_sure_beside_wrong_angles(with_findings(found.assessments, more), machine.wheels, machine.axles)
+    seen = less_sure_beside_dead_sensors(seen, machine.wheels, found.words)
     events = without_made_by_axles(found.events, seen, machine.axles, judged.mission.timeline.dt)
     told = replace(found, assessments=seen, events=events)
     open_ = tuple(c for c in judged.checks if c.component in more and not c.passed)

@@ -14,7 +14,7 @@ from diagnosis.results.assessment import Assessment, Finding
 from diagnosis.results.limited import limited
 from diagnosis.results.machine_words import MachineWords
 from diagnosis.results.vocabulary import Tier
-from replay.faults import Side, State
+from replay.faults import FaultMode, Side, State
 
 #: A component and its side.
 Part = tuple[str, str]
@@ -50,7 +50,7 @@ def less_sure_beside_wrong_angles(
 
     def doubtful(f: Finding) -> bool:
         return (
-            f.tier is Tier.MODEL and not f.mode.total and not f.mode.varying
+            f.tier in (Tier.MODEL, Tier.RESPONSE) and not f.mode.total and not f.mode.varying
         )  # nothing dies or shakes by a wrong angle
 
     return _less_sure(assessments, _sides(wheels), lambda part: wrong, doubtful, _ANGLE)
@@ -84,7 +84,7 @@ def less_sure_beside_dead_valves(
 def less_sure_beside_dead_sensors(
     assessments: Mapping[Part, Assessment], wheels: Sequence[str], words: MachineWords
 ) -> dict[Part, Assessment]:
-    """Assessments in which partial faults of wheels that only a model shows are less sure while another wheel's sensor is dead or stuck.
+    """Assessments in which partial faults of wheels that only a model shows are less sure while another wheel's sensor is dead or stuck, or leaps about.
 
     Parameters
     ----------
@@ -96,7 +96,7 @@ def less_sure_beside_dead_sensors(
         How to speak of the machine.
     """
     sensors = {w: _findings(assessments, (w, Side.SENSOR.value)) for w in wheels}
-    dead = {w: [f for f in found if f.side is Side.SENSOR and f.mode.total] for w, found in sensors.items()}
+    dead = {w: [f for f in found if f.side is Side.SENSOR and _gives_no_speed(f)] for w, found in sensors.items()}
 
     def others(part: Part) -> list[Finding]:
         return [f for wheel, found in dead.items() if wheel != part[0] for f in found]
@@ -142,6 +142,11 @@ def _limited(f: Finding, why: str, any_fault: float | None) -> Finding:
     faulty = sum(h.p for h in f.hypotheses if h.mode != State.HEALTHY.value)
     fewer = replace(f, evidence=tuple(text for text in f.evidence if text != why))
     return limited(fewer, f.probability * min(1.0, any_fault / faulty), why) if faulty > any_fault else f
+
+
+def _gives_no_speed(f: Finding) -> bool:
+    """Whether a controller has no speed to hold: a sensor is dead or stuck, or what it reads leaps about by itself."""
+    return f.mode.total or (f.mode is FaultMode.NOISY and f.probability >= _SURE)
 
 
 def _within(f: Finding, causes: Sequence[Finding]) -> bool:

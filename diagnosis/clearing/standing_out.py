@@ -16,6 +16,7 @@ import numpy as np
 
 from diagnosis.clearing.backwards import without_findings
 from diagnosis.clearing.cells import Cells
+from diagnosis.clearing.drop_outs import fault_of_drop_outs
 from diagnosis.clearing.jumps import fault_of_jumps
 from diagnosis.clearing.limits import Limits, measured_twice, usual_limits
 from diagnosis.clearing.openings import speeds_follow_openings
@@ -76,7 +77,8 @@ def what_stands_out(checks: Sequence[Checked], cells: Cells, words: MachineWords
     found |= {check.component: fault_of_angle(check, cells) for check in checks if _off_second_angle(check)}
     found |= {c: f for c, f in scaled_angles(checks, cells).items() if not cells.stated.get(c)}
     rough = {c.component for c in checks if c.check is Check.ROUGHNESS and not c.passed}
-    found |= {wheel: fault for wheel in rough if (fault := fault_of_spikes(wheel, cells)) is not None}
+    for leaps in (fault_of_spikes, fault_of_drop_outs):
+        found |= {wheel: fault for wheel in rough if (fault := leaps(wheel, cells)) is not None}
     axles = {c.component: fault_of_axle(c, cells) for c in checks if _does_not_answer(c, cells)}
     still = {component: fault for component, fault in axles.items() if fault is not None}
     found |= _less_sure_together(still, cells)
