@@ -40,6 +40,9 @@ _ONE_AXLE = 0.75  # of the loss that counts: a change of the only axle, whose oi
 #: Of the loss that counts, and times the other axle's: a deviation of one axle alone in windows. Of 36 healthy tuning missions of nine machines
 #: the axles' largest ones were alike within a factor of 2.6.
 _BRIEF, _BRIEF_ALONE = 0.9, 3.0
+#: Axles of which the others' median is a measure; of the loss that counts, and times the others': what one alone is off it by in windows. Of five
+#: healthy tuning missions of four steered wheels they were alike within a factor of 1.4.
+_SEVERAL, _APART, _APART_ALONE = 3, 0.75, 1.5
 
 
 def axle_checks(cells: Cells, clear_at: float) -> Iterator[Checked]:
@@ -52,6 +55,7 @@ def axle_checks(cells: Cells, clear_at: float) -> Iterator[Checked]:
     apart = np.column_stack([cells.apart(axle) for axle in cells.machine.axles]) if cells.machine.axles else True
     angle, second, opening = (np.where(apart, x, np.nan) for x in (angle, second, opening))
     yield from valve_checks(cells, Kind.STEER, clear_at)
+    beside = beside_others(rates.off)
     place = np.minimum(np.arange(cells.frame.starts.size), len(rates.off) - 1)
     limit = answered(cells)
     joint = len(cells.machine.axles) > 1 and one_joint(cells, 0, 1)
@@ -82,12 +86,13 @@ def axle_checks(cells: Cells, clear_at: float) -> Iterator[Checked]:
             off = _alone(rates.off, j) if steady[j] else np.abs(rates.off[:, j])
             most = brief_limit(rates, j, share, twice=steady[j])
             deviates = worst(cells, (*about, either, Check.RATE), off[place], most)
+            alone_off = worst(cells, (*about, either, Check.RATE), beside[place, j], alone_limit(beside, j, share))
             changed = lasts(cells, (*about, either, Check.RATE), rates.changes[j], changes[j])
             between = (
                 1.0 if steady[j] else _CHANGED if len(cells.machine.axles) > 1 and not joint else _ONE_AXLE
             ) * share
             parted = lasts(cells, (*about, either, Check.RATE), None if told else rates.parted[j], between)
-            yield max([deviates, *(c for c in (changed, parted) if c.worst is not None)], key=times)
+            yield max([deviates, alone_off, *(c for c in (changed, parted) if c.worst is not None)], key=times)
             if len(cells.machine.axles) > 1 and not joint:
                 yield lasts(cells, (*about, either, Check.LASTING_RATE), rates.apart[j], RATE[twice][1] * share)
             elif not twice:  # both sides of which are measured twice needs nothing to compare with
@@ -112,6 +117,21 @@ def _alone(off: Array, j: int) -> Array:
     beside = np.abs(np.where(np.isfinite(off), own - off, own))
     beside[:, j] = np.abs(own[:, 0])
     return np.asarray(beside.min(axis=1))
+
+
+def beside_others(off: Array) -> Array:
+    """How far axles are off the others' median in windows, of three or more [ln]; NaN of fewer. Both of shape (windows, axles)."""
+    out = np.full(off.shape, np.nan)
+    for j in range(off.shape[1]):
+        others = np.delete(off, j, axis=1)
+        known = np.isfinite(others).sum(axis=1) >= _SEVERAL - 1
+        out[known, j] = np.abs(off[known, j] - np.nanmedian(others[known], axis=1))
+    return out
+
+
+def alone_limit(beside: Array, j: int, share: float) -> float:
+    """From which on axle `j` counts by `beside_others` [ln]; `share` is the loss that counts [ln]."""
+    return alone([float(x) for x in largest(beside)], j, np.inf, _APART * share, _APART_ALONE)
 
 
 def brief_limit(rates: Rates, j: int, share: float, *, twice: bool) -> float:
