@@ -34,6 +34,7 @@ from diagnosis.wheels.models import (
     WheelConstants,
 )
 from replay.arrays.compiling import njit
+from replay.arrays.known_shape import trailing
 
 Array = NDArray[np.float64]
 
@@ -46,6 +47,7 @@ RESTS, RESTLESS = 1, 2
 _RESTS = 0.05  # of the noise: what is left of it
 _RESTLESS_GAIN = 2.0  # what such a block says for noise
 _NO_LOSS = 0.9  # a gain above this is none
+_states, _covariances = trailing(4), trailing(4, 4)
 
 
 class WheelInput(NamedTuple):
@@ -141,6 +143,7 @@ def predict(m: int, q: WheelInput, k: WheelConstants, z: Array, P: Array) -> flo
 
     `z` of shape (models, 4), `P` of shape (models, 4, 4); speeds in m/s.
     """
+    z, P = _states(z), _covariances(P)
     drive, share = _fed(m, q, k, z)
     drive *= k.K
     a, b, add, s = _tyre(m, q, k, z)
@@ -208,6 +211,7 @@ def correct(m: int, q: WheelInput, share: float, k: WheelConstants, z: Array, P:
 
     `z` of shape (models, 4), `P` of shape (models, 4, 4).
     """
+    z, P = _states(z), _covariances(P)
     h0, h3, white, steps = _readout(m, q, k, z)
     r = white / max(q.samples, 1.0) + 1e-12
     if h0 > 0.0:
