@@ -11,7 +11,7 @@ from math import exp
 import numpy as np
 
 from diagnosis.steering.filter_constants import AxleConstants
-from diagnosis.steering.filter_state import Array, Block, FilterBank
+from diagnosis.steering.filter_state import Array, Block, FilterBank, known, known_covariances, known_states
 from diagnosis.steering.model_bank import (
     ACTUATOR,
     COLOURED,
@@ -85,6 +85,7 @@ def predict(m: int, block: Block, axle: AxleConstants, coloured_decay: float, ba
 
     Angles in rad, openings in fractions; `coloured_decay` is the factor per block of coloured noise [1].
     """
+    bank = known(bank)
     z, P = bank.mean, bank.cov
     dt, fade, lift = axle.dt, axle.rate_decay, axle.rate_limit
     f, by_a, by_b = _drive(m, block, axle, bank)
@@ -147,6 +148,7 @@ def _drift(m: int, spread: float, axle: AxleConstants, coloured_decay: float, z:
 @njit(cache=True, error_model="numpy")
 def _relax(m: int, i: int, f: float, q: float, z: Array, P: Array) -> None:
     """One step of x_i' = f·x_i + noise of variance q."""
+    z, P = known_states(z), known_covariances(P)
     z[m, i] *= f
     for k in range(STATES):
         P[m, i, k] *= f
