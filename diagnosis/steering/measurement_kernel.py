@@ -119,10 +119,10 @@ def most_likely(m: int, block: Block, axle: AxleConstants, sensor: SensorConstan
     """
     nu, likelihood, r, _, _ = _white(m, block, sensor, bank)
     likelihood -= 0.5 * log(2 * pi * (r + bank.cov[m, 5, 5]))
-    return max(likelihood, _least_likelihood(nu, block.power, axle.stop, sensor.constant))
+    return float(max(likelihood, _least_likelihood(nu, block.power, axle.stop, sensor.constant)))
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", inline="always")
 def update(m: int, block: Block, least: float, axle: AxleConstants, sensor: SensorConstants, bank: FilterBank) -> float:
     """Kalman update with a block's mean, and the evidence of mean and white power; returns the log-likelihood.
 
@@ -190,7 +190,7 @@ def _forget(m: int, i: int, std: float, z: Array, P: Array) -> None:
     P[m, i, i] = std * std
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", inline="always")
 def measure_redundant(m: int, seen: RedundantBlock, g: float, rate_limit: float, bank: FilterBank) -> float:
     """Update with the second angle, the valve's opening and its share of the command; returns the log-likelihood."""
     bank = known(bank)

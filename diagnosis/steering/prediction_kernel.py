@@ -79,7 +79,7 @@ def _turn(m: int, move: float, driven: float, axle: AxleConstants, bank: FilterB
     return followed / move if move != 0.0 else (1.0 if abs(after) >= h else 0.0)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", inline="always")
 def predict(m: int, block: Block, axle: AxleConstants, coloured_decay: float, bank: FilterBank) -> None:
     """x = f(x, u), P = F P Fᵀ + Q over one block.
 
@@ -145,7 +145,7 @@ def _drift(m: int, spread: float, axle: AxleConstants, coloured_decay: float, z:
         _relax(m, np.int64(5), f_c, (1 - f_c * f_c) * (0.1 * axle.stop) ** 2, z, P)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", inline="always")
 def _relax(m: int, i: int, f: float, q: float, z: Array, P: Array) -> None:
     """One step of x_i' = f·x_i + noise of variance q."""
     z, P = known_states(z), known_covariances(P)

@@ -64,7 +64,7 @@ class Look(NamedTuple):
 @njit(cache=True, error_model="numpy", inline="always")
 def _next(k: int, x: NDArray[np.float32], forest: Forest, after: NDArray[np.int32]) -> int:
     """Node or leaf behind node k for one frame, x (features,)."""
-    return after[k, int(x[forest.feature[k]] <= forest.threshold[k])]
+    return int(after[k, int(x[forest.feature[k]] <= forest.threshold[k])])
 
 
 @njit(cache=True, error_model="numpy", nogil=True)

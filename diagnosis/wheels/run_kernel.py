@@ -23,7 +23,7 @@ from diagnosis.wheels.joint_types import (
 )
 from diagnosis.wheels.models import HEALTHY, MODELS, JointModel, WheelConstants
 from diagnosis.wheels.runs import Runs
-from diagnosis.wheels.step_kernel import WheelInput, advance, correct, predict
+from diagnosis.wheels.step_kernel import WheelInput, advance, correct, least_steps, predict
 from replay.arrays.compiling import njit
 from replay.arrays.copying import put, put_rows
 from replay.arrays.numeric import uncounted
@@ -157,7 +157,7 @@ def _scan_runs(
                 if ahead:
                     out.expected[n], out.spread[n] = z[HEALTHY, 0], P[HEALTHY, 0, 0]
                 if status == PAIR:
-                    correct(own, block, share, k, z, P)
+                    correct(own, block, share, k, z, P, np.log(least_steps(block, k)))
             alike = own == HEALTHY and within
             if alike:  # a fault leaves the expectation alone
                 put(free_z[0], z[HEALTHY])
