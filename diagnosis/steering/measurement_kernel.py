@@ -113,7 +113,7 @@ def _least_likelihood(nu: float, power: float, stop: float, constant: float) -> 
 
 @njit(cache=True, error_model="numpy")
 def most_likely(m: int, block: Block, axle: AxleConstants, sensor: SensorConstants, bank: FilterBank) -> float:
-    """The most that `update` may give a block whose model's sensor row has just been entered: as if the angle were as expected.
+    """The most that `update` may give a block whose model's sensor row has just been entered: as if the angle were as expected [log-likelihood].
 
     What the row frees is tied to nothing yet, so that its offset's variance is part of the angle's, whatever else is.
     """

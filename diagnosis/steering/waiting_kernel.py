@@ -77,7 +77,7 @@ def still_due(
 ) -> bool:
     """Whether some models that wait have to be followed over the block after all; if not, their scores become what they are at most.
 
-    `score`, `waits` and `due` of shape (models,); `top` is the best score of those that have been followed. Marks the models as due,
+    `score` [log-likelihood], `waits` and `due` of shape (models,); `top` is the best score of those that have been followed. Marks the models as due,
     and no longer waiting.
     """
     lead, more = 0, False
