@@ -7,8 +7,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnosis.steering.model_bank import ACTUATOR, SENSOR
+from diagnosis.steering.model_bank import ACTUATOR, SENSOR, STATES
 from replay.arrays.compiling import njit
+from replay.arrays.known_shape import trailing
 
 Array = NDArray[np.float64]
 
@@ -138,6 +139,19 @@ class FilterBank(NamedTuple):
     noise: Array
     gap: Array
     room: Array
+
+
+_pairs = trailing(2)
+#: Arrays of shape (models, 6) and (models, 6, 6) as kernels know them.
+known_states, known_covariances = trailing(STATES), trailing(STATES, STATES)
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def known(bank: FilterBank) -> FilterBank:
+    """The same states, whose sizes the compiler knows; an argument of the caller keeps them alive."""
+    return FilterBank(
+        known_states(bank.mean), known_covariances(bank.cov), _pairs(bank.noise), _pairs(bank.gap), bank.room
+    )
 
 
 class SteeringPath(NamedTuple):

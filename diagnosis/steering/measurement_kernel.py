@@ -10,7 +10,15 @@ from math import lgamma, log, pi
 import numpy as np
 
 from diagnosis.steering.filter_constants import AxleConstants, SensorConstants
-from diagnosis.steering.filter_state import Array, Block, FilterBank, RedundantBlock
+from diagnosis.steering.filter_state import (
+    Array,
+    Block,
+    FilterBank,
+    RedundantBlock,
+    known,
+    known_covariances,
+    known_states,
+)
 from diagnosis.steering.model_bank import (
     ACTUATOR,
     HEALTHY,
@@ -65,6 +73,8 @@ def _learn(m: int, gain: Array, total: float, innovation: float, z: Array, P: Ar
     """x += K·innovation, P −= K·gainᵀ with K = gain/total; what a model does not free has no gain and stays."""
     g0, g1, g2, g3, g4, g5 = gain[0], gain[1], gain[2], gain[3], gain[4], gain[5]
     for i in range(STATES):
+        if gain[i] == 0.0:
+            continue
         share = gain[i] / total
         z[m, i] += share * innovation
         P[m, i, 0] -= share * g0
@@ -75,7 +85,44 @@ def _learn(m: int, gain: Array, total: float, innovation: float, z: Array, P: Ar
         P[m, i, 5] -= share * g5
 
 
+@njit(cache=True, error_model="numpy", inline="always")
+def _white(m: int, block: Block, sensor: SensorConstants, bank: FilterBank) -> tuple[float, float, float, float, float]:
+    """Degrees of freedom of a block's white power, its log-likelihood, the variance of the mean, and α and β behind it."""
+    s, nu = SENSOR[m], sensor.white_dof * block.samples
+    nu = nu / (1 + 0.5 * nu * sensor.white_spread)
+    alpha, beta = bank.noise[m, 0], bank.noise[m, 1]
+    after, scaled = alpha + 0.5 * nu, beta + 0.5 * nu * block.power
+    if s >= NOISY:
+        likelihood = _learned_noise(alpha, beta, nu, block.power)
+        return (
+            nu,
+            likelihood,
+            max(scaled / after, sensor.constant) / block.samples + sensor.mean_rounding,
+            after,
+            scaled,
+        )
+    likelihood, r = _known_noise(s, bank.mean[m, 4], sensor, nu, block.power, block.samples)
+    return nu, likelihood, r, after, scaled
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def _least_likelihood(nu: float, power: float, stop: float, constant: float) -> float:
+    """Log-likelihood that a block is given which the model cannot explain."""
+    return _OUTLIER - log(stop) - 0.5 * nu * (1 + log(max(power, constant)))
+
+
 @njit(cache=True, error_model="numpy")
+def most_likely(m: int, block: Block, axle: AxleConstants, sensor: SensorConstants, bank: FilterBank) -> float:
+    """The most that `update` may give a block whose model's sensor row has just been entered: as if the angle were as expected [log-likelihood].
+
+    What the row frees is tied to nothing yet, so that its offset's variance is part of the angle's, whatever else is.
+    """
+    nu, likelihood, r, _, _ = _white(m, block, sensor, bank)
+    likelihood -= 0.5 * log(2 * pi * (r + bank.cov[m, 5, 5]))
+    return float(max(likelihood, _least_likelihood(nu, block.power, axle.stop, sensor.constant)))
+
+
+@njit(cache=True, error_model="numpy", inline="always")
 def update(m: int, block: Block, least: float, axle: AxleConstants, sensor: SensorConstants, bank: FilterBank) -> float:
     """Kalman update with a block's mean, and the evidence of mean and white power; returns the log-likelihood.
 
@@ -84,17 +131,10 @@ def update(m: int, block: Block, least: float, axle: AxleConstants, sensor: Sens
     that the angle is given in the likelihood.
     """
     stop = axle.stop
+    bank = known(bank)
     z, P, noise, gain = bank.mean, bank.cov, bank.noise, bank.room
     s, power = SENSOR[m], block.power
-    nu = sensor.white_dof * block.samples
-    nu = nu / (1 + 0.5 * nu * sensor.white_spread)
-    alpha, beta = noise[m, 0], noise[m, 1]
-    after, scaled = alpha + 0.5 * nu, beta + 0.5 * nu * power
-    if s >= NOISY:
-        likelihood = _learned_noise(alpha, beta, nu, power)
-        r = max(scaled / after, sensor.constant) / block.samples + sensor.mean_rounding
-    else:
-        likelihood, r = _known_noise(s, z[m, 4], sensor, nu, power, block.samples)
+    nu, likelihood, r, after, scaled = _white(m, block, sensor, bank)
     d, phi = z[m, 4], z[m, 0]
     # S = H P Hᵀ + R with H = [d, 0, 0, 0, φ, 1]
     total = r
@@ -104,7 +144,7 @@ def update(m: int, block: Block, least: float, axle: AxleConstants, sensor: Sens
     innovation = block.mean - d * phi - z[m, 5]
     doubt = max(total, least + r) if least > 0.0 else total
     likelihood -= 0.5 * (innovation * innovation / doubt + log(2 * pi * doubt))
-    floor = _OUTLIER - log(stop) - 0.5 * nu * (1 + log(max(power, sensor.constant)))
+    floor = _least_likelihood(nu, power, stop, sensor.constant)
     if likelihood < floor:
         if s == STUCK:
             _forget(m, np.int64(5), stop, z, P)
@@ -128,6 +168,7 @@ def _learn_sensor_gain(
     """Kalman update of the sensor's gain d: it scales the noise too, so that √((power − rounding)/σ²) measures d."""
     if not sensor.resolved:
         return
+    z, P = known_states(z), known_covariances(P)
     seen = (max(power - sensor.rounding, 0.0) / max(sensor.white - sensor.rounding, 1e-30)) ** 0.5
     var = (0.5 / nu + 0.25 * sensor.white_spread) * (seen * seen + 0.05)
     for i in range(STATES):
@@ -143,14 +184,16 @@ def _learn_sensor_gain(
 @njit(cache=True, error_model="numpy")
 def _forget(m: int, i: int, std: float, z: Array, P: Array) -> None:
     """Give the constant x_i its prior again: it was learned from a block that a fault entered halfway."""
+    z, P = known_states(z), known_covariances(P)
     for j in range(STATES):
         P[m, i, j] = P[m, j, i] = 0.0
     P[m, i, i] = std * std
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", inline="always")
 def measure_redundant(m: int, seen: RedundantBlock, g: float, rate_limit: float, bank: FilterBank) -> float:
     """Update with the second angle, the valve's opening and its share of the command; returns the log-likelihood."""
+    bank = known(bank)
     z, P = bank.mean, bank.cov
     a = ACTUATOR[m]
     likelihood = 0.0
@@ -190,6 +233,7 @@ def _linear(
     if h0 == 0.0 and h2 == 0.0 and h3 == 0.0:
         likelihood = -0.5 * (innovation * innovation / r)
         return _OUTLIER if likelihood < _OUTLIER else likelihood
+    z, P = known_states(z), known_covariances(P)
     total = r
     for i in range(STATES):
         gain[i] = P[m, i, 0] * h0 + P[m, i, 2] * h2 + P[m, i, 3] * h3

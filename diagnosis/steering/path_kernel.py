@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from math import isnan
+
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnosis.channels.sample_status import SKIP
+from diagnosis.channels.sample_status import PAIR, SKIP
 from diagnosis.steering.filter_constants import FilterConstants
 from diagnosis.steering.filter_state import (
     Array,
@@ -16,46 +18,12 @@ from diagnosis.steering.filter_state import (
     RedundantBlock,
     SteeringPath,
 )
-from diagnosis.steering.model_bank import (
-    ACTUATOR,
-    HEALTHY,
-    HEALTHY_MODEL,
-    MODELS,
-    NO_SIGNAL,
-    NO_SIGNAL_MODEL,
-    NOISY,
-    SENSOR,
-    STATES,
-    STUCK,
-)
+from diagnosis.steering.model_bank import MODELS, STATES
 from diagnosis.steering.step_kernel import advance, enter
+from diagnosis.steering.waiting_kernel import learning_cost, may_wait, still_due, switch_cost
 from replay.arrays.compiling import njit
 from replay.arrays.copying import put, put_rows
 from replay.arrays.numeric import uncounted
-
-_LEARNING_COST = 8.0  # what a model whose states are yet to be learnt must gain to be entered [log-likelihood]
-_CHANGE_COST = 12.0
-_NOISE_COST = 3.0  # of one kind of noise after the other [log-likelihood]
-
-
-@njit(cache=True, error_model="numpy", inline="always")
-def _change(row: int, old: int) -> float:
-    """Minus the log-probability that a part goes from one row to another without being healthy between them."""
-    return _CHANGE_COST if row != HEALTHY and old != HEALTHY else 0.0
-
-
-@njit(cache=True, error_model="numpy")
-def switch_cost(m: int, old: int, constants: FilterConstants) -> float:
-    """Minus the log-probability of going from model `old` to m within one block."""
-    s, s0 = SENSOR[m], SENSOR[old]
-    cost = constants.switch_cost
-    out = 0.0
-    if s != s0:
-        out += _NOISE_COST if s >= NOISY and s0 >= NOISY else cost + _change(s, s0)
-    if ACTUATOR[m] != ACTUATOR[old]:
-        hidden = s in (STUCK, NO_SIGNAL) and not constants.redundant
-        out += 0.0 if hidden else cost + _change(ACTUATOR[m], ACTUATOR[old])
-    return out
 
 
 @njit(cache=True, error_model="numpy", inline="always")
@@ -96,7 +64,12 @@ def scan(
     states: FilterBank,
     back: NDArray[np.uint8],
 ) -> None:
-    """Viterbi over the models; changes `score` and `states`, writes back-pointers (n, models)."""
+    """Viterbi over the models; changes `score` and `states`, writes back-pointers (n, models).
+
+    Most models of a sensor that shows nothing, or noise, are entered anew in every block: what they make of it is told from the best
+    model's by far. Such a one is not followed where it is sure that the next block enters it again (`diagnosis.steering.waiting_kernel`);
+    until then its score is what it has at most. Nothing that is written differs.
+    """
     bank = FilterBank(
         uncounted(states.mean),
         uncounted(states.cov),
@@ -104,6 +77,7 @@ def scan(
         uncounted(states.gap),
         uncounted(states.room),
     )
+    waits, due = np.zeros(MODELS, dtype=np.bool_), np.zeros(MODELS, dtype=np.bool_)
     for k in range(series.mean.size):
         best = int(np.int64(0))  # a literal 0 would compile what it is passed to once more
         for m in range(1, MODELS):
@@ -115,17 +89,24 @@ def scan(
                 if m == best or not allowed[m]:
                     continue
                 cost = switch_cost(m, best, constants)
-                learning = 0.0 if m in (HEALTHY_MODEL, NO_SIGNAL_MODEL) else _LEARNING_COST
-                if top - cost - learning > score[m]:
+                if top - cost - learning_cost(m) > score[m]:
                     score[m] = top - cost
                     back[k, m] = best
                     enter(m, best, constants, bank)
         top = -1e300
         block, seen = _block(k, series), _redundant_block(k, series.redundancy)
+        entered_next = k + 1 < series.mean.size and series.status[k + 1] != SKIP
+        some = block.status == PAIR and entered_next and not isnan(block.driven)
         for m in range(MODELS):
-            if allowed[m]:
-                score[m] += advance(m, block, seen, constants, bank)
-                top = max(top, score[m])
+            waits[m] = some and may_wait(m, best) and back[k, m] == best
+            due[m] = allowed[m] and not waits[m]
+        more = True
+        while more:
+            for m in range(MODELS):
+                if due[m]:
+                    score[m] += advance(m, block, seen, constants, bank)
+                    top, due[m] = max(top, score[m]), False
+            more = some and still_due(score, top, block, constants, bank, waits, due)
         for m in range(MODELS):
             score[m] -= top
 

@@ -11,7 +11,7 @@ from math import exp
 import numpy as np
 
 from diagnosis.steering.filter_constants import AxleConstants
-from diagnosis.steering.filter_state import Array, Block, FilterBank
+from diagnosis.steering.filter_state import Array, Block, FilterBank, known, known_covariances, known_states
 from diagnosis.steering.model_bank import (
     ACTUATOR,
     COLOURED,
@@ -79,12 +79,13 @@ def _turn(m: int, move: float, driven: float, axle: AxleConstants, bank: FilterB
     return followed / move if move != 0.0 else (1.0 if abs(after) >= h else 0.0)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", inline="always")
 def predict(m: int, block: Block, axle: AxleConstants, coloured_decay: float, bank: FilterBank) -> None:
     """x = f(x, u), P = F P Fᵀ + Q over one block.
 
     Angles in rad, openings in fractions; `coloured_decay` is the factor per block of coloured noise [1].
     """
+    bank = known(bank)
     z, P = bank.mean, bank.cov
     dt, fade, lift = axle.dt, axle.rate_decay, axle.rate_limit
     f, by_a, by_b = _drive(m, block, axle, bank)
@@ -144,9 +145,10 @@ def _drift(m: int, spread: float, axle: AxleConstants, coloured_decay: float, z:
         _relax(m, np.int64(5), f_c, (1 - f_c * f_c) * (0.1 * axle.stop) ** 2, z, P)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", inline="always")
 def _relax(m: int, i: int, f: float, q: float, z: Array, P: Array) -> None:
     """One step of x_i' = f·x_i + noise of variance q."""
+    z, P = known_states(z), known_covariances(P)
     z[m, i] *= f
     for k in range(STATES):
         P[m, i, k] *= f

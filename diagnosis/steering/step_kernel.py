@@ -17,7 +17,16 @@ from math import isnan
 
 from diagnosis.channels.sample_status import PAIR, SILENT
 from diagnosis.steering.filter_constants import FilterConstants
-from diagnosis.steering.filter_state import Array, Block, FilterBank, RedundantBlock, resting
+from diagnosis.steering.filter_state import (
+    Array,
+    Block,
+    FilterBank,
+    RedundantBlock,
+    known,
+    known_covariances,
+    known_states,
+    resting,
+)
 from diagnosis.steering.measurement_kernel import measure_redundant, update
 from diagnosis.steering.model_bank import (
     ACTUATOR,
@@ -39,6 +48,7 @@ _SILENT_COST = -6.0
 @njit(cache=True, error_model="numpy")
 def enter(m: int, old: int, constants: FilterConstants, bank: FilterBank) -> None:
     """Start model m from model `old`: the axle is carried over, a side that changes gets its prior."""
+    bank = known(bank)
     z, P = bank.mean, bank.cov
     if m != old:
         for i in range(STATES):
@@ -68,6 +78,7 @@ def enter(m: int, old: int, constants: FilterConstants, bank: FilterBank) -> Non
 @njit(cache=True, error_model="numpy")
 def _enter_actuator(m: int, constants: FilterConstants, z: Array, P: Array) -> None:
     """Prior of a valve's gain a and rate b: 0.5 ± 0.25 of an inefficient one, 0.6 ± 0.15 of a disturbed one."""
+    z, P = known_states(z), known_covariances(P)
     a, rate_limit, rate_error = ACTUATOR[m], constants.axle.rate_limit, constants.axle.rate_error
     z[m, 2] = 1.0
     P[m, 3, 3] = rate_error * rate_error
@@ -84,6 +95,7 @@ def _enter_actuator(m: int, constants: FilterConstants, z: Array, P: Array) -> N
 @njit(cache=True, error_model="numpy")
 def _enter_sensor(m: int, constants: FilterConstants, bank: FilterBank) -> None:
     """Prior of a sensor's gain d, offset c and noise: d is 0.5 ± 0.25 if inefficient, 0.65 ± 0.15 if noisy."""
+    bank = known(bank)
     z, P, noise = bank.mean, bank.cov, bank.noise
     s, stop, white = SENSOR[m], constants.axle.stop, constants.sensor.white
     z[m, 4] = 1.0

@@ -14,6 +14,9 @@ Array = NDArray[np.float64]
 
 _ROOT_2 = sqrt(2.0)
 _ROOT_2PI = sqrt(2.0 * pi)
+# Standard deviations beyond which the normal distribution's tail is lost in rounding, and beyond which its density is 0 in a double:
+# what is left out there changes no bit.
+_SURE, _NEVER = 9.0, 39.0
 
 
 class ValveMap(NamedTuple):
@@ -75,7 +78,11 @@ def rates_at(u: Array, valve: ValveMap) -> Array:
 def _beyond(u: float, std: float, edge: float) -> tuple[float, float]:
     """Mean of max(x − edge, 0) and probability of x > edge, for x normal with mean u."""
     z = (u - edge) / std
-    above = 0.5 * (1.0 + erf(z / _ROOT_2))
+    if z > _SURE:
+        return u - edge, 1.0
+    if z < -_NEVER:
+        return 0.0, 0.0
+    above = 0.5 * (1.0 + erf(z / _ROOT_2)) if z > -_SURE else 0.0
     return (u - edge) * above + std * exp(-0.5 * z * z) / _ROOT_2PI, above
 
 

@@ -125,14 +125,14 @@ def _path(
     for mine in segments.values():
         if mine:
             between, places = runs_between(mine, n)
-            found = evidence_of_runs(blocks, model, done, i, between)
+            found = evidence_of_runs(blocks, model, done, i, between, places)
             weighed += [
                 Weighed(s, found.evidence[r], found.mean[r], found.cov[r]) for s, r in zip(mine, places, strict=True)
             ]
             expected = found
     if all(segments.values()):  # what a healthy wheel would do is not to be learned from faults of either side
         either, _ = runs_between(_united([*segments[Side.SENSOR], *segments[Side.ACTUATOR]]), n)
-        expected = evidence_of_runs(blocks, model, done, i, either)
+        expected = evidence_of_runs(blocks, model, done, i, either, ())
     return WheelPath(
         y=data.y[:, i],
         reference=data.reference[:, i],

@@ -24,8 +24,12 @@ from diagnosis.wheels.models import (
     WheelConstants,
 )
 from replay.arrays.compiling import njit
+from replay.arrays.known_shape import trailing
 
 Array = NDArray[np.float64]
+
+#: States of shape (models, 4) and covariances of shape (models, 4, 4) as kernels know them.
+known_states, known_covariances = trailing(4), trailing(4, 4)
 
 
 @njit(cache=True, error_model="numpy")
@@ -34,12 +38,13 @@ def is_scaled(m: int) -> bool:
     return m >= S_GAIN and m <= S_OU_LARGE
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", inline="always")
 def enter(m: int, old: int, k: WheelConstants, z: Array, P: Array) -> None:
     """Start model m from the state of model `old`: speed and load are carried over, the unknowns get their priors.
 
     States `z` of shape (models, 4) and covariances `P` of shape (models, 4, 4).
     """
+    z, P = known_states(z), known_covariances(P)
     v, var = z[old, 0], P[old, 0, 0]
     x, x_var = z[old, 2], min(P[old, 2, 2], 1.0)
     if is_scaled(old):
@@ -54,8 +59,10 @@ def enter(m: int, old: int, k: WheelConstants, z: Array, P: Array) -> None:
         x /= ODD_LOAD
     elif old > ODD:
         x_var = max(x_var, 0.5)
-    z[m, :] = 0.0
-    P[m, :, :] = 0.0
+    for i in range(4):
+        z[m, i] = 0.0
+        for j in range(4):
+            P[m, i, j] = 0.0
     z[m, 0], z[m, 1], z[m, 2] = v, 1.0, x
     P[m, 0, 0], P[m, 2, 2] = var, x_var
     if m == S_STUCK:

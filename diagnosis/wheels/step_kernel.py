@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.channels.sample_status import PAIR, SILENT
-from diagnosis.wheels.entry_kernel import is_scaled
+from diagnosis.wheels.entry_kernel import is_scaled, known_covariances, known_states
 from diagnosis.wheels.models import (
     A_BIAS,
     A_GAIN,
@@ -69,7 +69,7 @@ class WheelInput(NamedTuple):
     unseen: float  # by how much faster its valve may drive it than anyone has seen [m/s]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", inline="always")
 def _fed(m: int, q: WheelInput, k: WheelConstants, z: Array) -> tuple[float, float]:
     """Opening as the pump feeds it, and the share that it feeds, while model m takes its part of the flow."""
     if m == A_GAIN or m == A_BIAS:
@@ -85,7 +85,7 @@ def _fed(m: int, q: WheelInput, k: WheelConstants, z: Array) -> tuple[float, flo
     return q.drive, share
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", inline="always")
 def _tyre(m: int, q: WheelInput, k: WheelConstants, z: Array) -> tuple[float, float, float, float]:
     """Of ν' = a·ν + b·(drive + add + s·x): a, b, add and s, by whether the wheel runs free or its tyre holds or slides."""
     a = k.fade
@@ -116,7 +116,7 @@ def _tyre(m: int, q: WheelInput, k: WheelConstants, z: Array) -> tuple[float, fl
     return a, b, add, s
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", inline="always")
 def _walk(m: int, k: WheelConstants) -> tuple[float, float]:
     """Share of c that is left after one block, and variance of what comes to it."""
     keep, noise = 1.0, 0.0
@@ -133,7 +133,7 @@ def _walk(m: int, k: WheelConstants) -> tuple[float, float]:
     return keep, noise
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", inline="always")
 def predict(m: int, q: WheelInput, k: WheelConstants, z: Array, P: Array) -> float:
     """z = F z + G, P = F P Fᵀ + Q of model m over one block; the share of a demand that the pump feeds.
 
@@ -141,6 +141,7 @@ def predict(m: int, q: WheelInput, k: WheelConstants, z: Array, P: Array) -> flo
 
     `z` of shape (models, 4), `P` of shape (models, 4, 4); speeds in m/s.
     """
+    z, P = known_states(z), known_covariances(P)
     drive, share = _fed(m, q, k, z)
     drive *= k.K
     a, b, add, s = _tyre(m, q, k, z)
@@ -172,7 +173,7 @@ def predict(m: int, q: WheelInput, k: WheelConstants, z: Array, P: Array) -> flo
     return float(share)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", inline="always")
 def _readout(m: int, q: WheelInput, k: WheelConstants, z: Array) -> tuple[float, float, float, float]:
     """Row H = [h0, 0, 0, h3] of model m, variance of one sample's noise, and of its steps from sample to sample."""
     own = k.noise**2 * q.white
@@ -199,15 +200,22 @@ def _readout(m: int, q: WheelInput, k: WheelConstants, z: Array) -> tuple[float,
     return 1.0, 0.0, own, own
 
 
-@njit(cache=True, error_model="numpy")
-def correct(m: int, q: WheelInput, share: float, k: WheelConstants, z: Array, P: Array) -> float:
+@njit(cache=True, error_model="numpy", inline="always")
+def least_steps(q: WheelInput, k: WheelConstants) -> float:
+    """Variance of the steps from sample to sample [m²/s²] by which a block speaks for a model as well as it can."""
+    return max(0.5 * q.jitter, k.constant_noise**2)
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def correct(m: int, q: WheelInput, share: float, k: WheelConstants, z: Array, P: Array, by_least: float) -> float:
     """Kalman update of model m with the block's mean; log-likelihood of mean and steps.
 
     The steps from sample to sample tell noise, and constancy, without any model of the wheel: their mean square is
     distributed as χ² with two thirds of a degree of freedom each.
 
-    `z` of shape (models, 4), `P` of shape (models, 4, 4).
+    `z` of shape (models, 4), `P` of shape (models, 4, 4); `by_least` is the logarithm of `least_steps`, which all models share.
     """
+    z, P = known_states(z), known_covariances(P)
     h0, h3, white, steps = _readout(m, q, k, z)
     r = white / max(q.samples, 1.0) + 1e-12
     if h0 > 0.0:
@@ -240,10 +248,10 @@ def correct(m: int, q: WheelInput, share: float, k: WheelConstants, z: Array, P:
     if q.samples <= 1.5:
         return float(-0.5 * by_mean)
     freedom = 2.0 * q.samples / 3.0
-    least = max(0.5 * q.jitter, k.constant_noise**2)
+    least = least_steps(q, k)
     # −½·freedom·(jitter/2/steps + log steps), but not below what noise of just this power gives, less 25
     spoken = freedom * (0.5 * q.jitter / steps + np.log(steps / least))
-    return float(-0.5 * (by_mean + freedom * np.log(least) + min(spoken, freedom + 50.0)))
+    return float(-0.5 * (by_mean + freedom * by_least + min(spoken, freedom + 50.0)))
 
 
 @njit(cache=True, error_model="numpy")
@@ -254,14 +262,14 @@ def advance(
 
     `z` of shape (models, 4), `P` of shape (models, 4, 4), `gain` of shape (models,).
     """
-    top = -1e300
+    top, by_least = -1e300, np.log(least_steps(q, k))
     for m in range(models):
         share = predict(m, q, k, z, P)
         gain[m] = 0.0
         if status == SILENT:
             gain[m] = 0.0 if m == S_NONE else _SILENT
         elif status == PAIR:
-            gain[m] = correct(m, q, share, k, z, P)
+            gain[m] = correct(m, q, share, k, z, P, by_least)
         top = max(top, gain[m])
     if status != PAIR:
         return

@@ -188,6 +188,29 @@ def test_evidence_is_what_a_loop_sums_up(ended: bool) -> None:
     assert_allclose(got.spread, spread, rtol=1e-9)
 
 
+@pytest.mark.parametrize("weighed", [(), (1,), (0, 2, 3), (4,)], ids=str)
+def test_runs_that_are_not_weighed_change_nothing_of_the_others(weighed: tuple[int, ...]) -> None:
+    u = openings(4000)
+    y = noisy(rolled(u))
+    y[1000:1600, 0] *= 0.5
+    y[2500:3000, 0] = 0.1
+    status = np.full((4000, 4), PAIR, dtype=np.int8)
+    status[300:340], status[2700:2750] = SKIP, SILENT
+    cut, model = blocks(y, u, status), machine()
+    done = forward(cut, model)
+    edges = np.array([0, 100, 160, 250, 300, 400])
+    kinds, entry = np.array([HEALTHY, S_GAIN, HEALTHY, S_STUCK, HEALTHY]), np.array([0, 104, 160, 251, 310])
+    runs = Runs(edges[:-1], edges[1:], kinds, entry)
+    every = evidence_of_runs(cut, model, done, 0, runs)
+    some = evidence_of_runs(cut, model, done, 0, runs, weighed)
+    assert_array_equal(some.expected, every.expected)
+    assert_array_equal(some.spread, every.spread)
+    chosen = list(weighed)
+    for name in ("evidence", "mean", "cov"):
+        assert_array_equal(getattr(some, name)[chosen], getattr(every, name)[chosen], err_msg=name)
+        assert not np.delete(getattr(some, name), chosen, axis=0).any()
+
+
 def test_expectation_goes_on_through_a_fault() -> None:
     u = openings(2400)
     v = rolled(u)

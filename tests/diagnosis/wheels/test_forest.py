@@ -43,7 +43,7 @@ def random_forest(seed: int, trees: int = 12) -> Forest:
     )
 
 
-@pytest.mark.parametrize(("seed", "frames"), [(0, 40), (1, 64), (2, 150), (3, 0)])
+@pytest.mark.parametrize(("seed", "frames"), [(0, 40), (1, 64), (2, 150), (3, 0), (4, 1), (5, 33), (6, 67)])
 def test_scores_are_those_of_a_walk(seed: int, frames: int) -> None:
     forest = random_forest(seed)
     x = np.random.default_rng(seed).normal(size=(frames, FEATURES)).astype(np.float32)

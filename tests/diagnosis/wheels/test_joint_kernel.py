@@ -57,6 +57,7 @@ from diagnosis.wheels.step_kernel import (
     WheelInput,
     advance,
     correct,
+    least_steps,
     predict,
 )
 from replay.machine.config import WheelPlant
@@ -281,7 +282,7 @@ def advanced(q: WheelInput, status: int, quiet: bool = False, speed: float = 0.2
     for m in range(MODELS):
         share = predict(m, q, k, other, cov)
         if status == PAIR:
-            plain[m] = correct(m, q, share, k, other, cov)
+            plain[m] = correct(m, q, share, k, other, cov, np.log(least_steps(q, k)))
     assert_array_equal(z, other)
     assert_array_equal(P, cov)
     return gain, plain, z

@@ -36,7 +36,7 @@ from diagnosis.wheels.models import (
     WheelConstants,
     WheelFilterModel,
 )
-from diagnosis.wheels.step_kernel import WheelInput, correct, predict
+from diagnosis.wheels.step_kernel import WheelInput, correct, least_steps, predict
 from replay.faults import FaultMode, Side
 
 MODEL = WheelFilterModel(
@@ -207,7 +207,9 @@ def test_every_model_is_filterpys(m: int, regime: str) -> None:
         share = predict(m, q, k, z, P)
         assert_allclose(share, oracle.share, rtol=1e-12)
         if n % 7 != 3 and not 20 <= n < 30:  # the others have no new sample
-            assert_allclose(correct(m, q, share, k, z, P), oracle.correct(q), rtol=1e-9, atol=1e-9)
+            assert_allclose(
+                correct(m, q, share, k, z, P, np.log(least_steps(q, k))), oracle.correct(q), rtol=1e-9, atol=1e-9
+            )
         assert_allclose(z[m], oracle.kf.x[:, 0], rtol=1e-9, atol=1e-11)
         assert_allclose(P[m], oracle.kf.P, rtol=1e-9, atol=1e-13)
 
@@ -237,7 +239,7 @@ def test_steps_speak_by_their_distribution(m: int) -> None:
         steps = oracle.white()[2]
         mean = oracle.correct(q)
         density = gamma.logpdf(0.5 * q.jitter, freedom / 2, scale=2 * steps / freedom)
-        return correct(model, q, 0.0, k, z, P) - mean, float(density)
+        return correct(model, q, 0.0, k, z, P, np.log(least_steps(q, k))) - mean, float(density)
 
     (got, density), (healthy, reference) = spoken(m), spoken(HEALTHY)
     most = -0.5 * freedom * (1 + np.log(0.5 * q.jitter))
@@ -249,7 +251,7 @@ def test_steps_of_a_single_sample_say_nothing() -> None:
         z, P, k = entered(0, 0.0)
         oracle = Oracle(0, z[0], P[0], 0.0)
         q = block(3, np.nan)._replace(jitter=jitter, chatter=0.0)
-        assert correct(0, q, 1.0, k, z, P) == pytest.approx(oracle.correct(q), abs=1e-9)
+        assert correct(0, q, 1.0, k, z, P, np.log(least_steps(q, k))) == pytest.approx(oracle.correct(q), abs=1e-9)
 
 
 def test_steps_of_a_constant_channel_are_no_surer_than_its_rounding() -> None:
@@ -259,7 +261,7 @@ def test_steps_of_a_constant_channel_are_no_surer_than_its_rounding() -> None:
         z, P, k = entered(m, 0.0)
         oracle = Oracle(m, z[m], P[m], 0.0)
         q = block(3, np.nan, 10.0)._replace(jitter=0.0, chatter=0.0)
-        got[m] = correct(m, q, 1.0, k, z, P) - oracle.correct(q)
+        got[m] = correct(m, q, 1.0, k, z, P, np.log(least_steps(q, k))) - oracle.correct(q)
     most = -0.5 * (20 / 3) * (1 + np.log(MODEL.constant_noise**2))
     assert got[S_STUCK] == pytest.approx(-0.5 * (20 / 3) * np.log(MODEL.constant_noise**2))
     assert got[HEALTHY] == pytest.approx(max(-0.5 * (20 / 3) * np.log(MODEL.noise**2), most - 25.0))
