@@ -85,6 +85,6 @@ def cost_of_missing(name: str, words: MachineWords, items: Container[str] = (), 
     stem, _, leaf = name.rpartition(".")
     if name.startswith("steer.") and leaf == "u" and f"{stem}.u_applied" in items:
         return words.fill(_POSITION_ALONE)
-    if name.startswith("steer.") and leaf == "u_applied" and items and f"{stem}.u" not in items:
+    if name.startswith("steer.") and leaf == "u_applied" and f"{stem}.u" not in items:
         return words.fill(_NEITHER)
     return words.fill(_COSTS[signal_of(name).kind])

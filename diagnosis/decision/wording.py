@@ -69,7 +69,9 @@ def _action(
     worst = faults[0]
     found = _course(faults, words)
     if all(f.id in causes for f in faults):
-        found += f"; it lies in the time of {cause_words(causes[worst.id], words)}, and may be no more than its consequence"
+        found += (
+            f"; it lies in the time of {cause_words(causes[worst.id], words)}, and may be no more than its consequence"
+        )
     lead = f"{_order(faults, stop=stop)} the {words.part_words(worst.kind, worst.component, worst.side)}"
     return {
         "n": n,

@@ -17,8 +17,8 @@ from diagnosis.results.consequences import Stated, causes_of
 from diagnosis.results.document import IntervalRow, PhaseRow, ReportDocument
 from diagnosis.results.fault_rows import state_label
 from diagnosis.results.machine_words import MachineWords, words_of
-from diagnosis.results.vocabulary import Kind, Severity, Tier
-from replay.faults import FAULT_STATES, FaultMode, Side, State
+from diagnosis.results.vocabulary import Kind, Severity
+from replay.faults import FAULT_STATES, Side, State
 
 _BUCKETS = 2000
 _TOUCHING = 1e-6  # percent of a lane: one bar ends where the next begins

@@ -44,7 +44,13 @@ def causes_of(faults: Sequence[Stated]) -> dict[str, str]:
                 shared = min(f.stop_s, g.stop_s) - max(f.start_s, g.start_s)
                 if shared > 0.5 * (f.stop_s - f.start_s):
                     out[f.id] = g.id
-            elif not own and f.severity == Severity.LOW and g.severity == Severity.HIGH and f.id not in out:
-                if share_covered(f.start_s, f.stop_s, (g.start_s, g.stop_s)) >= _WITHIN:
-                    out[f.id] = g.id
+            elif not own and f.id not in out and _follows(f, g):
+                out[f.id] = g.id
     return out
+
+
+def _follows(f: Stated, g: Stated) -> bool:
+    """Whether a fault may follow from one of another component."""
+    if f.severity != Severity.LOW or g.severity != Severity.HIGH:
+        return False
+    return share_covered(f.start_s, f.stop_s, (g.start_s, g.stop_s)) >= _WITHIN
