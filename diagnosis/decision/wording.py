@@ -14,7 +14,7 @@ from diagnosis.results.fault_rows import mode_words
 from diagnosis.results.machine_words import MachineWords
 from diagnosis.results.result import FaultInterval
 from diagnosis.results.sizes import gain_words, loss_known
-from diagnosis.results.vocabulary import Kind, Severity
+from diagnosis.results.vocabulary import Kind, Severity, Tier
 from replay.faults import FaultMode, Side
 from replay.machine.quantities import OPENING
 
@@ -22,6 +22,7 @@ from replay.machine.quantities import OPENING
 MORE = "; more below"
 _NAMED = 3  # parts in the verdict's sentence
 _PLACES, _WIDE = 2, 0.1  # at which a drive is stuck, and width of the bounds of one [of full opening], to be named
+_WIDE_LOSS = 0.4  # between bounds of a loss that need a word
 _SPELLS = 6  # of one part, of which each is named with its time
 _KINDS = 2  # of faults of one part in it: more stand in the part's action
 
@@ -192,12 +193,19 @@ def _lost(faults: Sequence[FaultInterval]) -> str:
     low, high = (f"{100 * x:.0f}" for x in (min(e.low for e in known), max(e.high for e in known)))
     course = ", from fault to fault" if len(span) > 1 else ""
     bounds = (
-        f", 95 % bounds {low} to {high} %" if (low, high) != (span[0], span[-1]) else ""
+        f", 95 % bounds {low} to {high} %{_why_wide(faults)}" if (low, high) != (span[0], span[-1]) else ""
     )  # which the rounding holds
     size = f"{' to '.join(span)} %"
     if all(f.side is Side.SENSOR for f in faults):
         return f" (reads {size} too little{course}{bounds})"
     return f" ({size} lost{course}{bounds})"
+
+
+def _why_wide(faults: Sequence[FaultInterval]) -> str:
+    """Why the bounds of a loss are wide, beside them, where that is what its wheel's own model leaves open; else empty."""
+    wide = any(f.epsilon is not None and f.epsilon.high - f.epsilon.low >= _WIDE_LOSS for f in faults)
+    modelled = all(f.tier is Tier.MODEL and f.kind is Kind.WHEEL for f in faults)
+    return ", for so far may the model of its wheel itself be off" if wide and modelled else ""
 
 
 def _held(faults: Sequence[FaultInterval], words: MachineWords) -> str:

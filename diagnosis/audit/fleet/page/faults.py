@@ -73,7 +73,7 @@ def fault_context(f: FleetFaultRow, document: ShownDocument, directions: Mapping
     elif f["repaired_ns"] is not None:
         notes.append(f"found again since the repair on {labels.utc_moment(f['repaired_ns'])}")
     if f["open"] and f["since"]:
-        none = ", for none of the missions since would have shown it"
+        none = ", for no mission since that was read whole would have shown it"
         notes.append(f"open{open_words(True, f['clean'], f['needed']) or none}")
     elif f["since"]:
         last_ones = f"last {count(f['since'], 'mission')}" if f["since"] > 1 else "last mission"
