@@ -139,9 +139,7 @@ def judged_means(report: ReportDocument) -> str:
     return (
         f"Judged: decided, healthy or faulty, for at least {report['limits']['min_assessed']:g} s and four fifths of the part’s {moving}. "
         "Cleared: judged, without a fault, every check of the all-clear passed, and named in nothing that is open. "
-        "Open, or not assessed: this mission does not tell whether it is healthy. "
-        "Verdicts, worst first: stop and repair, for a fault of high severity; faults to watch, for less severe ones; not assessed, or not "
-        "cleared, where no fault was found and yet something is open; ready."
+        "Open, or not assessed: this mission does not tell whether it is healthy."
     )
 
 

@@ -114,6 +114,7 @@ def context(report: ReportDocument, duration: float) -> Context:
         "assumed": report["machine"]["assumed"],
         "machine_file": "" if report["machine"]["source"] == PAPER_DEFAULTS else report["machine"]["source"],
         "law_doubt": law_doubt(report),
+        "positions": positions_fact(report),
         "min_percent": f"{100 * limits['min_probability']:g} %",
         "judged": any(judged_sides(report).values()),
     }
@@ -286,10 +287,8 @@ def _facts(report: ReportDocument, duration: float) -> list[tuple[str, str]]:
     faulty = {(f["component"], f["side"]) for f in report["intervals"] if f["severity"] != Severity.INFO}
     if faulty:
         spells = sum(f["severity"] != Severity.INFO for f in report["intervals"])
-        more = f", in {spells} spells (F1 to F{spells})" if spells != len(faulty) else ""
+        more = f", {spells} spells" if spells != len(faulty) else ""
         facts.append(("Faulty", f"{len(faulty)} part{'s' if len(faulty) > 1 else ''}{more}"))
-    if (measured := positions_fact(report)) is not None:
-        facts.append(measured)
     parts = judged(report)
     facts.append(("Judged and cleared", parts) if parts else (words_of(machine).parts.capitalize(), _count(machine)))
     return facts

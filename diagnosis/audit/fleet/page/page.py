@@ -58,7 +58,7 @@ _DEFINITIONS = (
     "Past: not found in the last three missions that judged the part. Faults of severity “info” are left out.",
     "A fault of high severity that no longer shows may be a loose contact. It stays open until the repair of its part is recorded "
     "(mfhca audit --repaired), or until ten missions do not find it that would have shown it: the part was judged, and by its report the "
-    "mission would have shown such a fault of ten seconds more often than not. Repaired: not found since the repair.",
+    "mission would have shown such a fault of ten seconds more often than not; a damaged log counts for none. Repaired: not found since the repair.",
     "Missions with a report count. A copy of a log, a log that was not read and one that is not audited yet are missions that "
     "do not count in machines, faults and trends.",
     "A mission judged a part, or judged it long enough: decided, healthy or faulty, for the seconds that the verdict “ready” takes and for four fifths of its driving; one that found a fault of it counts as one that judged it. Check before it goes out: the missions do not tell that the machine is sound.",

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
+from diagnosis.audit.fleet.fleet_types import FleetDocument
 from diagnosis.audit.fleet.leave import lists_of
 from diagnosis.audit.fleet_files import fleet_json, load_fleet
 from tests import fleet_samples as samples
 from tests.fleet_samples import Fault, Sample
 
 
-def document(tmp_path: Path, *missions: Sample) -> dict[str, Any]:
+def document(tmp_path: Path, *missions: Sample) -> FleetDocument:
     return fleet_json(load_fleet(samples.write_store(tmp_path / "fleet.sqlite", missions)))
 
 
@@ -27,5 +27,5 @@ def test_a_damaged_log_does_not_count_as_clean(tmp_path: Path) -> None:
 def test_the_missions_that_may_be_later_are_named(tmp_path: Path) -> None:
     stuck = Sample("a", verdict="stop", faults=[Fault(mode="stuck", severity="high")])
     d = document(tmp_path, stuck, Sample("later", day=1.0, verdict="not_assessed"))
-    (left,) = lists_of(d)  # type: ignore[arg-type]
+    (left,) = lists_of(d)
     assert "1 mission that may be later (later) was not judged" in left.reason
