@@ -57,10 +57,10 @@ def sentences(isolated: Isolated, found: IdentifiedPair, mode: FaultMode, epsilo
 
 def _deviation_words(size: float, threshold: float, unit: str) -> str:
     """How large the residual is beside the threshold of single readings, which it need not pass for its probability to pass its limit."""
-    words = f"Residual, loss and noise together, {amount(size, unit)} root mean square; threshold of a single reading {amount(threshold, unit, 2)}"
+    words = f"Residual, loss and noise together, {amount(size, unit)} root mean square; threshold of single readings about {amount(threshold, unit, 2)}"
     if size > threshold:
         return f"{words}."
-    return f"{words}: what passed its limit is not a single reading, but the probability of all of them together."
+    return f"{words}, which it need not pass: what passed its limit is the probability of all readings together."
 
 
 def alike_sentence(found: IdentifiedPair) -> Sentence:
