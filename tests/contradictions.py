@@ -15,7 +15,6 @@ from diagnosis.decision.short import AS_WELL_HEALTHY
 from diagnosis.pages.labels import fault_title
 from diagnosis.results.candidates import candidates_of, label_of
 from diagnosis.results.machine_words import HYDRAULIC
-from diagnosis.results.recurring import Seen, counted
 from diagnosis.results.vocabulary import Severity
 from replay.machine.quantities import OPENING
 from tests.clearing_contradictions import of_checks, of_coverage, of_remedies
@@ -84,15 +83,17 @@ def _verdict(report: Mapping[str, Any]) -> Iterator[str]:
     if verdict["status"] == "not_assessed" and len(re.findall(r"[.](?= [A-Z]|$)", verdict["text"])) > 2:
         yield f"more than two sentences: {verdict['text']!r}"
     parts = {(f["component"], f["side"]) for f in faults if f["severity"] != "info"}
-    on = re.search(r", on (\d+) parts?$", verdict["title"])
-    told = counted([[_seen(f) for f in faults if f["severity"] in of] for of in (("high",), ("medium", "low"))])
-    if _counted_on(on, sum(told)) != len(parts) and verdict["status"] in ("stop", "watch"):
-        yield f"title {verdict['title']!r}, and faults on {len(parts)} parts"
+    repair = {(f["component"], f["side"]) for f in faults if f["severity"] == "high"}
+    told = [len(repair), len(parts - repair)]
+    spells = re.search(r", in (\d+) spells$", verdict["title"])
+    stated = sum(f["severity"] != "info" for f in faults)
+    if (int(spells.group(1)) if spells else len(parts)) != stated and verdict["status"] in ("stop", "watch"):
+        yield f"title {verdict['title']!r}, and {stated} spells"
     if len(verdict["actions"]) != len(parts):
         yield f"{len(verdict['actions'])} things to do for {len(parts)} parts"
     counts = [
         int(n)
-        for n in re.findall(r"(\d+) faults? to repair|(\d+) (?:faults? )?to watch", verdict["title"])
+        for n in re.findall(r"(\d+) parts? to repair|(\d+) (?:parts? )?to (?:watch|check)", verdict["title"])
         for n in n
         if n
     ]
@@ -101,15 +102,6 @@ def _verdict(report: Mapping[str, Any]) -> Iterator[str]:
     open_checks = [c for c in report.get("clearing", []) if not c["passed"]]
     if verdict["cleared"] and open_checks:
         yield f"cleared with {len(open_checks)} open checks"
-
-
-def _seen(f: Mapping[str, Any]) -> Seen:
-    return Seen(f["component"], f["side"], f["mode"], tuple((h["mode"], h["p"]) for h in f["hypotheses"]))
-
-
-def _counted_on(on: re.Match[str] | None, faults: int) -> int:
-    """Parts that a title counts; as many as faults where it does not say."""
-    return int(on.group(1)) if on else faults
 
 
 def _actions(report: Mapping[str, Any]) -> Iterator[str]:

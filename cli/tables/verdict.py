@@ -21,12 +21,12 @@ from diagnosis.results.comparison_document import FaultChangeRow, PreviousRow
 from diagnosis.results.document import PAPER_DEFAULTS, ActionRow, IntervalRow, MachineRow, ReportDocument
 from diagnosis.results.fault_rows import mode_words
 from diagnosis.results.machine_words import MachineWords, words_of
-from diagnosis.results.recurring import OFTEN
 from diagnosis.results.size_rows import EpsilonRow, SatRow
 from diagnosis.results.vocabulary import Severity
 from replay.machine.quantities import OPENING
 
 _SHOWN, _FAULTS_NAMED, _ENDLESS = 40, 6, 10_000
+_OFTEN = 3  # spells of one part and row that stand on one line
 _WORDS, _SATURATION = (1, 2), 5  # columns of words, which may wrap between them, and the one that is needed least
 
 
@@ -163,7 +163,7 @@ def _lines(intervals: Sequence[IntervalRow], most: int | None = _SHOWN) -> list[
     kinds: dict[tuple[str, ...], list[IntervalRow]] = {}
     for i in intervals:
         kinds.setdefault((i["component"], i["side"], i["mode"], i["severity"]), []).append(i)
-    often = {id(i): same for same in kinds.values() if len(same) >= OFTEN for i in same}
+    often = {id(i): same for same in kinds.values() if len(same) >= _OFTEN for i in same}
     out = [often.get(id(i), [i]) for i in intervals if id(i) not in often or often[id(i)][0] is i]
     return out[:most]
 

@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from diagnosis.decision.behind import behind_drives
+from diagnosis.decision.behind_events import with_faults_behind
 from diagnosis.decision.caveats import (
     Reservations,
     by_model,
@@ -130,7 +131,7 @@ def decide(
         unexplained=tuple(p for p in against.unexplained if p[0] not in axles or p not in twice),
         open=tuple(c for c in checks if not c.passed),
         scope=tuple(scope),
-        events=tuple(events),
+        events=with_faults_behind(events, intervals, words),
         hints=(*(misplaced_words(m) for m in misplaced), *hints),
         misplaced=tuple(misplaced),
         open_state=open_state or {},
@@ -244,7 +245,7 @@ def _with_faults(
         doubt = doubt_of(watch, against)
         return Decision(
             Verdict.WATCH,
-            count_faults((), watch),
+            count_faults((), watch, cleared=not doubt),
             first + sentence_of(intervals, against.words, endings),
             cleared=not doubt,
             not_cleared=doubt,

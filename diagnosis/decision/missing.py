@@ -22,7 +22,7 @@ _COSTS = {
     "steer.phi_ref": "φ_c is computed from v_c and ω_c by the kinematics; without those the steering loop is not replayed",
     "steer.phi": "the {steer.sensor} is not assessed, and the {wheels}' own angles are unknown",
     "steer.phi_true": "the steering sensor is judged by the model of its axle alone, which holds while the axle is steered",
-    "steer.u": "the {steer.actuator} is not judged, and its replayed command cannot be compared with a recorded one",
+    "steer.u": "the {steer.actuator} is judged by what the replayed control law would have commanded, and where the angle does not fit that, not at all",
     "steer.u_applied": "the {steer.actuator} is judged by how the angle follows its command; a constant angle gives no evidence on it",
     "cmd.v": "without recorded v_c,i no {wheel} has a command: no tracking error, and driving time by measured speeds",
     "cmd.omega": "commands of the {wheels} are computed as if driving straight ahead, unless v_c,i is recorded",
@@ -37,6 +37,9 @@ _COSTS = {
     "odom.yaw": "a gyro is not held against the turns of odometry, which matters where no {wheel} speeds are logged",
 }
 
+# Of a steering of which not both are logged: a position says nothing of what it was told.
+_POSITION_ALONE = "the {steer.actuator} is not judged: its position is logged, but not what it was told"
+_NEITHER = "as for the command: neither what the {steer.actuator} was told nor what it did is logged"
 _OF_WHEELS = "little: the commanded speed of every {wheel} is recorded"
 
 
@@ -79,4 +82,9 @@ def cost_of_missing(name: str, words: MachineWords, items: Container[str] = (), 
     """
     if name in ("cmd.v", "cmd.omega") and wheels and all(f"wheel.{w}.v_ref" in items for w in wheels):
         return words.fill(_OF_WHEELS)
+    stem, _, leaf = name.rpartition(".")
+    if name.startswith("steer.") and leaf == "u" and f"{stem}.u_applied" in items:
+        return words.fill(_POSITION_ALONE)
+    if name.startswith("steer.") and leaf == "u_applied" and f"{stem}.u" not in items:
+        return words.fill(_NEITHER)
     return words.fill(_COSTS[signal_of(name).kind])

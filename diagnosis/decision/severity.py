@@ -19,6 +19,7 @@ from dataclasses import replace
 from diagnosis.results.assessment import Finding
 from diagnosis.results.machine_words import MachineWords
 from diagnosis.results.result import Epsilon, FaultInterval
+from diagnosis.results.sizes import loss_known
 from diagnosis.results.vocabulary import Kind, Severity, Tier, Verdict
 from replay.faults import TOTAL, FaultMode, Side
 from replay.machine.config import Limits
@@ -43,6 +44,10 @@ HELD = (
 #: The same of one that is dead briefly again and again, and how often, and for how long in all, that is: a contact is loose.
 AGAIN = "Each time it is tolerable (the paper’s Assumption 1), so often it is not: check plug and cable before the machine goes out again."
 _OFTEN, _OFTEN_S = 5, 3.0
+_BEFORE, _WITH = (
+    "check it before the machine goes out again.",
+    "check it with the repair, and compare with the next mission.",
+)
 _PARTIAL = (FaultMode.INEFFICIENT, FaultMode.OUTSIDE_TABLE)  # rows of which ε̂ says how much is left
 
 
@@ -72,7 +77,7 @@ def severity_of(
             )
             return Severity.MEDIUM, words.fill(f"{what}: check it before the machine goes out again.")
         if halved:
-            return Severity.LOW, f"Probable, not certain; but it {halved}: check it before the machine goes out again."
+            return Severity.LOW, f"Probable, not certain; but it {halved}: {_BEFORE}"
         return Severity.LOW, "Probable, not certain: check it at the next service, and compare with the next mission."
     if total:
         return _severity_of_total(finding, seconds, limits, words, kind)
@@ -89,7 +94,7 @@ def severity_of(
         )
     severity = Severity.MEDIUM if marked else Severity.LOW
     if halved:
-        return severity, f"It {halved}: check it before the machine goes out again."
+        return severity, f"It {halved}: {_BEFORE}"
     return severity, _ALONE
 
 
@@ -132,7 +137,17 @@ def _severity_of_total(
 
 
 def advised(intervals: Sequence[FaultInterval], status: Verdict, *, cleared: bool) -> tuple[FaultInterval, ...]:
-    """Faults with the advice that fits their mission's verdict: what alone is no reason to stop is looked at where the mission gives no leave."""
+    """Faults with the advice that fits their mission's verdict: what alone is no reason to stop is looked at where the mission gives no leave.
+
+    Beside a fault that the machine is stopped for, one of low severity waits for that repair.
+    """
+    if status is Verdict.STOP:
+        return tuple(
+            replace(f, advice=f.advice.removesuffix(_BEFORE) + _WITH)
+            if f.severity is Severity.LOW and f.advice.endswith(_BEFORE)
+            else f
+            for f in intervals
+        )
     if status is not Verdict.WATCH or cleared:
         return tuple(intervals)
     again = [f for same in often_dead(intervals) for f in same]
@@ -161,7 +176,11 @@ def halved_words(side: Side, mode: FaultMode, epsilon: Epsilon | None) -> str:
         return ""
     if mode.varying:
         return "may give more noise than signal" if side is Side.SENSOR else "may follow noise more than its command"
-    return f"may have lost up to {round(100 * epsilon.high)} %" if mode.scaled else ""
+    if not mode.scaled:
+        return ""
+    if not loss_known(epsilon.low, epsilon.high):
+        return "may have lost anything from nothing to all"
+    return f"may have lost up to {round(100 * epsilon.high)} %"
 
 
 def unbounded_words(fault: FaultInterval) -> str:

@@ -103,7 +103,7 @@ def short_parts(
         act = (
             act_of_wheel(part, assessments[part], driven.get(part), limits, words, state)
             if kind is Kind.WHEEL
-            else act_of_axle(part[1], state, lack_of(assessments[part], state))
+            else act_of_axle(part[1], state, lack_of(assessments[part], state), words)
         )
         alike.setdefault((reason, act, decided_s.get(part, 0.0) < SAID_S), []).append(part)
     out = []
@@ -144,7 +144,7 @@ def unjudged_axles(axles: Sequence[Part], assessments: Mapping[Part, Assessment]
     reason = main_reason(first, state)
     lack = lack_of(first, state)
     act = (
-        act_of_axle(axles[0][1], state, lack).replace("{c}", _components(axles))
+        act_of_axle(axles[0][1], state, lack, words).replace("{c}", _components(axles))
         if lack is Lack.OPENING_UNIT
         else f"log {steering_signals(lack, words)}, and steer from stop to stop twice while driving"
         if lack in (Lack.SIGNALS, Lack.COMMAND)

@@ -92,12 +92,16 @@ def act_of_wheel(
     return f"log {other}; without it, drive straight at three steady speeds for 10 s each"
 
 
-def act_of_axle(side: str, state: State | None, lack: Lack | None) -> str:
+def act_of_axle(side: str, state: State | None, lack: Lack | None, words: MachineWords) -> str:
     """What somebody does to have a part of an axle judged."""
     if state is State.MASKED:
         return "repair the steering sensor first, then record a mission again"
     if lack is Lack.OPENING_UNIT:
         return _OPENING_UNIT.format(kind="steer")
+    if lack is Lack.COMMAND:
+        return words.fill(
+            "log steer.{c}.u (the command of its {valve}), and steer from stop to stop several times while driving"
+        )
     if lack is Lack.SECOND:
         second = (
             "phi_true (a second angle)" if side == Side.SENSOR else "u_applied (the second measurement of its command)"

@@ -33,13 +33,14 @@ def size_note(finding: Finding, epsilon: Epsilon | None, kind: Kind) -> str:
     if not (low or high):
         return ""
     open_ = (
-        "Neither bound of ε̂ says anything, so that from nothing to all may be lost"
+        "Neither bound of ε̂ says anything: the size may be anything, whatever the probability that something is wrong"
         if low and high
-        else "The lower bound of ε̂ is open, so that nothing may be lost"
+        else "The lower bound of ε̂ is open, which speaks of the size alone: that something is wrong is as sure as its probability says"
         if low
         else "The upper bound of ε̂ is open, so that all may be lost"
     )
-    return f"{open_}: {_why(finding, kind)}."
+    why = _why(finding, kind)
+    return f"{open_}. {why[:1].upper()}{why[1:]}."
 
 
 def _missing(mode: FaultMode) -> str:

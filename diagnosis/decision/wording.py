@@ -6,15 +6,15 @@ from collections.abc import Mapping, Sequence
 
 from diagnosis.decision.severity import AGAIN, HELD, halved_words, unanswered
 from diagnosis.results.candidates import UNCLEAR, candidates, unclear_words
+from diagnosis.results.consequences import Stated, causes_of
 from diagnosis.results.document import ActionRow
 from diagnosis.results.durations import seconds_words
 from diagnosis.results.ending import Ending
 from diagnosis.results.fault_rows import mode_words
 from diagnosis.results.machine_words import MachineWords
-from diagnosis.results.recurring import OFTEN, Seen, counted
 from diagnosis.results.result import FaultInterval
 from diagnosis.results.sizes import gain_words, loss_known
-from diagnosis.results.vocabulary import Kind, Severity
+from diagnosis.results.vocabulary import Kind, Severity, Tier
 from replay.faults import FaultMode, Side
 from replay.machine.quantities import OPENING
 
@@ -22,36 +22,36 @@ from replay.machine.quantities import OPENING
 MORE = "; more below"
 _NAMED = 3  # parts in the verdict's sentence
 _PLACES, _WIDE = 2, 0.1  # at which a drive is stuck, and width of the bounds of one [of full opening], to be named
+_WIDE_LOSS = 0.4  # between bounds of a loss that need a word
+_SPELLS = 6  # of one part, of which each is named with its time
 _KINDS = 2  # of faults of one part in it: more stand in the part's action
 
 
 def actions_of(intervals: Sequence[FaultInterval], words: MachineWords) -> tuple[ActionRow, ...]:
     """One action per component and side: drives to stop at once for, then other stops, then the rest, worst first."""
-    return tuple(_action(n, faults, words) for n, faults in enumerate(_by_part(intervals), 1))
+    stop = any(f.severity is Severity.HIGH for f in intervals)
+    named = {f.id: f for f in intervals}
+    causes = {f: named[g] for f, g in consequences(intervals).items()}
+    return tuple(_action(n, faults, words, causes, stop=stop) for n, faults in enumerate(_by_part(intervals), 1))
 
 
-def count_faults(stop: Sequence[FaultInterval], watch: Sequence[FaultInterval]) -> str:
-    """How many faults there are, and on how many parts where that is another number: ``6 faults to repair, 2 to watch, on 5 parts``.
+def consequences(intervals: Sequence[FaultInterval]) -> dict[str, str]:
+    """Faults that may be no more than a consequence, each with the one that may be its cause, by their names."""
+    return causes_of([Stated(*(getattr(f, key) for key in Stated._fields)) for f in intervals])
 
-    What comes again and again is one fault, as severe as the worst of it: ``1 fault to watch, seen 175 times``.
+
+def count_faults(stop: Sequence[FaultInterval], watch: Sequence[FaultInterval], *, cleared: bool = False) -> str:
+    """How many parts are faulty, each counted once by its worst fault, and in how many spells where that is another number.
+
+    ``1 part to repair, 2 to check, in 5 spells``; of a machine that may go out all the same (`cleared`), ``2 parts to watch``.
     """
-    lists = [(faults, what) for faults, what in ((stop, "to repair"), (watch, "to watch")) if faults]
-    counts = [
-        (n, what)
-        for n, (_, what) in zip(counted([[_seen(f) for f in own] for own, _ in lists]), lists, strict=True)
-        if n
-    ]
-    (n, what), *more = counts
-    words = ", ".join([f"{count_words(n, 'fault')} {what}", *(f"{n} {what}" for n, what in more)])
-    every, parts = n + sum(n for n, _ in more), len({(f.component, f.side) for f in (*stop, *watch)})
-    times = len(stop) + len(watch)
-    if every == 1 < times:
-        return f"{words}, seen {times} times"
-    return words if parts == every else f"{words}, on {count_words(parts, 'part')}"
-
-
-def _seen(f: FaultInterval) -> Seen:
-    return Seen(f.component, f.side.value, f.mode.value, tuple((h.mode, h.p) for h in f.hypotheses))
+    repair = {(f.component, f.side) for f in stop}
+    others = {(f.component, f.side) for f in watch} - repair
+    counts = [(len(repair), "to repair"), (len(others), "to watch" if cleared else "to check")]
+    (n, what), *more = [(n, what) for n, what in counts if n]
+    words = ", ".join([f"{count_words(n, 'part')} {what}", *(f"{n} {what}" for n, what in more)])
+    spells = len(stop) + len(watch)
+    return words if spells == len(repair) + len(others) else f"{words}, in {spells} spells"
 
 
 def _by_part(intervals: Sequence[FaultInterval]) -> list[list[FaultInterval]]:
@@ -63,11 +63,17 @@ def _by_part(intervals: Sequence[FaultInterval]) -> list[list[FaultInterval]]:
     return sorted(parts.values(), key=lambda faults: _urgency(faults[0]))
 
 
-def _action(n: int, faults: Sequence[FaultInterval], words: MachineWords) -> ActionRow:
-    """What to do about one part, with its faults worst first."""
+def _action(
+    n: int, faults: Sequence[FaultInterval], words: MachineWords, causes: Mapping[str, FaultInterval], *, stop: bool
+) -> ActionRow:
+    """What to do about one part, with its faults worst first; `stop`: some fault of the mission stops the machine."""
     worst = faults[0]
     found = _course(faults, words)
-    lead = f"{_order(faults)} the {words.part_words(worst.kind, worst.component, worst.side)}"
+    if all(f.id in causes for f in faults):
+        found += (
+            f"; it lies in the time of {cause_words(causes[worst.id], words)}, and may be no more than its consequence"
+        )
+    lead = f"{_order(faults, stop=stop)} the {words.part_words(worst.kind, worst.component, worst.side)}"
     return {
         "n": n,
         "text": f"{lead}: {found}.",
@@ -78,11 +84,21 @@ def _action(n: int, faults: Sequence[FaultInterval], words: MachineWords) -> Act
     }
 
 
-def _order(faults: Sequence[FaultInterval]) -> str:
-    """What to do with a part, by its worst fault; before it goes out where one of them alone keeps it from being cleared."""
+def cause_words(fault: FaultInterval, words: MachineWords) -> str:
+    """A fault as the cause of something else: ``F1 (FR drive valve stuck)``."""
+    return f"{fault.id} ({words.part_words(fault.kind, fault.component, fault.side)} {fault_words(fault)})"
+
+
+def _order(faults: Sequence[FaultInterval], *, stop: bool) -> str:
+    """What to do with a part, by its worst fault; before it goes out where one of them alone keeps it from being cleared.
+
+    Where another part stops the machine, one of low severity comes after that.
+    """
     worst = faults[0]
     if worst.severity is Severity.HIGH:
         return "Stop at once and repair" if worst.side is Side.ACTUATOR else "Stop and repair"
+    if stop and worst.severity is Severity.LOW:
+        return "Then check"
     if (
         unanswered(worst)
         or any(f.advice in (AGAIN, HELD) for f in faults)
@@ -129,7 +145,7 @@ def _summary(faults: Sequence[FaultInterval], words: MachineWords) -> str:
     if len(_kinds(faults)) <= _KINDS:
         return _course(faults, words)
     total = seconds_words(sum(f.stop_s - f.start_s for f in faults))
-    return f"faulty for {total} in {len(faults)} faults"
+    return f"faulty for {total} in {len(faults)} spells"
 
 
 def _kinds(faults: Sequence[FaultInterval]) -> dict[str, list[FaultInterval]]:
@@ -151,13 +167,14 @@ def _how_long(kind: str, faults: Sequence[FaultInterval], words: MachineWords) -
 
 
 def _times(faults: Sequence[FaultInterval]) -> str:
-    """How many faults of one kind there are, with the course of what comes again and again; empty of one alone."""
-    if len(faults) < OFTEN:
-        return "" if len(faults) == 1 else f" in {len(faults)} faults"
+    """In how many spells faults of one kind come, each with its time where they are few; empty of one alone."""
+    if len(faults) == 1:
+        return ""
     what = "gaps" if all(f.mode is FaultMode.NO_SIGNAL and f.side is Side.SENSOR for f in faults) else "spells"
-    return (
-        f" in {len(faults)} {what} from {min(f.start_s for f in faults):.1f} to {max(f.stop_s for f in faults):.1f} s"
-    )
+    spells = sorted((f.start_s, f.stop_s) for f in faults)
+    if len(spells) > _SPELLS:
+        return f" in {len(faults)} {what} from {spells[0][0]:.1f} to {max(b for _, b in spells):.1f} s"
+    return f" in {len(faults)} {what} (at {join_words([f'{a:.1f}–{b:.1f}' for a, b in spells])} s)"
 
 
 def _lost(faults: Sequence[FaultInterval]) -> str:
@@ -176,12 +193,19 @@ def _lost(faults: Sequence[FaultInterval]) -> str:
     low, high = (f"{100 * x:.0f}" for x in (min(e.low for e in known), max(e.high for e in known)))
     course = ", from fault to fault" if len(span) > 1 else ""
     bounds = (
-        f", 95 % bounds {low} to {high} %" if (low, high) != (span[0], span[-1]) else ""
+        f", 95 % bounds {low} to {high} %{_why_wide(faults)}" if (low, high) != (span[0], span[-1]) else ""
     )  # which the rounding holds
     size = f"{' to '.join(span)} %"
     if all(f.side is Side.SENSOR for f in faults):
         return f" (reads {size} too little{course}{bounds})"
     return f" ({size} lost{course}{bounds})"
+
+
+def _why_wide(faults: Sequence[FaultInterval]) -> str:
+    """Why the bounds of a loss are wide, beside them, where that is what its wheel's own model leaves open; else empty."""
+    wide = any(f.epsilon is not None and f.epsilon.high - f.epsilon.low >= _WIDE_LOSS for f in faults)
+    modelled = all(f.tier is Tier.MODEL and f.kind is Kind.WHEEL for f in faults)
+    return ", for so far may the model of its wheel itself be off" if wide and modelled else ""
 
 
 def _held(faults: Sequence[FaultInterval], words: MachineWords) -> str:

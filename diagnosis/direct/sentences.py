@@ -48,12 +48,19 @@ def sentences(isolated: Isolated, found: IdentifiedPair, mode: FaultMode, epsilo
             names = pair.y_name, pair.x_name
             out += [s for s in [shape_sentence(seen.y[seen.use], seen.x[seen.use], pair.dt, names, pair.unit)] if s]
         out += _values(isolated, found, epsilon, seconds)
-        words = f"Residual, loss and noise together, {amount(seen.deviation, pair.unit)} root mean square; threshold {amount(3 * seen.noise, pair.unit, 2)}."
-        out.append(Sentence(About.DEVIATION, words))
+        out.append(Sentence(About.DEVIATION, _deviation_words(seen.deviation, 3 * seen.noise, pair.unit)))
     if mode is FaultMode.OUTSIDE_TABLE:
         out.append("The gain is outside 0…1, which no row of the tables describes.")
     out.append(Sentence(About.TIMES, f"{pair.y_name} is {probable_words(isolated.gain)}."))
     return tuple(out)
+
+
+def _deviation_words(size: float, threshold: float, unit: str) -> str:
+    """How large the residual is beside the threshold of single readings, which it need not pass for its probability to pass its limit."""
+    words = f"Residual, loss and noise together, {amount(size, unit)} root mean square; threshold of single readings about {amount(threshold, unit, 2)}"
+    if size > threshold:
+        return f"{words}."
+    return f"{words}, which it need not pass: what passed its limit is the probability of all readings together."
 
 
 def alike_sentence(found: IdentifiedPair) -> Sentence:

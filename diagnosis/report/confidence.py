@@ -14,7 +14,7 @@ from diagnosis.results.fault_rows import state_label
 from diagnosis.results.limited import MOST_CLAIMED
 from diagnosis.results.machine_words import words_of
 from diagnosis.results.vocabulary import NOT_CLEARED, Kind, Leave, Severity, Tier, Verdict
-from replay.faults import Side, State
+from replay.faults import SCALED, Side, State
 
 _WORDS = ((0.99, "Practically certain"), (0.9, "Very likely"), (0.7, "Likely"))
 _OPEN, _TIE = 0.9, 1e-3
@@ -230,7 +230,14 @@ def going_out(report: ReportDocument) -> tuple[str, str]:
     if not may_go_out(report["verdict"]):
         why = report["verdict"]["not_cleared"]
         return "No", f", it must be checked first{': ' if why else ''}{why}"
-    return "Yes", "; the faults to watch are no reason to keep it in" if status is Verdict.WATCH else ""
+    return "Yes", _why_watched(report) if status is Verdict.WATCH else ""
+
+
+def _why_watched(report: ReportDocument) -> str:
+    """Why faults to watch keep no machine in: the bounds of what is lost decide, not the likely loss."""
+    highs = [f["epsilon"]["high"] for f in report["intervals"] if f["mode"] in SCALED and f["epsilon"]]
+    most = f": by its bounds no part lost more than {100 * max(highs):.0f} %, where half is the limit" if highs else ""
+    return f"; the faults to watch are no reason to keep it in{most}"
 
 
 def may_go_out(verdict: VerdictRow) -> bool:

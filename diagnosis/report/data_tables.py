@@ -138,6 +138,16 @@ _LIMIT_UNITS = {
     "min_sat": "{speed}{angles}, of commands as a share",
 }
 _SHARES = ("min_probability", "clear_at")
+#: What each limit says, before the name that the machine file has for it.
+_LIMIT_WORDS = {
+    "brief": "a dead sensor is tolerable for",
+    "min_probability": "a fault is stated from a probability of",
+    "min_epsilon": "smallest loss that is a fault",
+    "min_sat": "smallest saturation term that is one",
+    "min_assessed": "judged for, at least, to be cleared",
+    "driving_speed": "drives from",
+    "clear_at": "loss that must have shown to clear a part",
+}
 
 
 def limit_rows(report: ReportDocument, words: MachineWords) -> list[tuple[str, str]]:
@@ -148,9 +158,8 @@ def limit_rows(report: ReportDocument, words: MachineWords) -> list[tuple[str, s
     for key, value in report["limits"].items():
         unit = _LIMIT_UNITS.get(key, "").replace("{speed}", words.speed_unit).replace("{angles}", angles)
         size = value if isinstance(value, float) else float("nan")
-        out.append(
-            (key.replace("_", " "), f"{100 * size:g} %" if key in _SHARES else f"{number(value)} {unit}".rstrip())
-        )
+        said = f"{100 * size:g} %" if key in _SHARES else f"{number(value)} {unit}".rstrip()
+        out.append((f"{words_} ({key})" if (words_ := _LIMIT_WORDS.get(key)) else key.replace("_", " "), said))
     return out
 
 

@@ -33,6 +33,7 @@ from diagnosis.report.data_tables import (
 from diagnosis.report.edges import time_words
 from diagnosis.report.fault_times import times_words
 from diagnosis.report.judged_parts import judged_sides
+from diagnosis.report.near_the_top import law_doubt, other_side_words, positions_fact
 from diagnosis.report.second_measurements import JOINT, by_position, second_of
 from diagnosis.results.candidates import UNCLEAR, candidates_of, label_of, symbol_of
 from diagnosis.results.document import (
@@ -112,6 +113,8 @@ def context(report: ReportDocument, duration: float) -> Context:
         "open_loop": log["open_loop"],
         "assumed": report["machine"]["assumed"],
         "machine_file": "" if report["machine"]["source"] == PAPER_DEFAULTS else report["machine"]["source"],
+        "law_doubt": law_doubt(report),
+        "positions": positions_fact(report),
         "min_percent": f"{100 * limits['min_probability']:g} %",
         "judged": any(judged_sides(report).values()),
     }
@@ -252,6 +255,7 @@ def _action(action: ActionRow, intervals: Mapping[str, IntervalRow], report: Rep
         "sure": sure_of_action([intervals[f] for f in faults], report) if first else "",
         "of": f" of {first['id']}" if first and len(faults) > 1 else "",
         "when": times_words([intervals[f] for f in faults], report),
+        "other": other_side_words([intervals[f] for f in faults], report) if first else "",
     }
 
 
@@ -282,7 +286,9 @@ def _facts(report: ReportDocument, duration: float) -> list[tuple[str, str]]:
     facts.append(("Sample rate", f"{number(log['rate_hz'])} Hz"))
     faulty = {(f["component"], f["side"]) for f in report["intervals"] if f["severity"] != Severity.INFO}
     if faulty:
-        facts.append(("Faulty", f"{len(faulty)} part{'s' if len(faulty) > 1 else ''}"))
+        spells = sum(f["severity"] != Severity.INFO for f in report["intervals"])
+        more = f", {spells} spells" if spells != len(faulty) else ""
+        facts.append(("Faulty", f"{len(faulty)} part{'s' if len(faulty) > 1 else ''}{more}"))
     parts = judged(report)
     facts.append(("Judged and cleared", parts) if parts else (words_of(machine).parts.capitalize(), _count(machine)))
     return facts

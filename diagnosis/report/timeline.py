@@ -13,11 +13,12 @@ from diagnosis.pages.labels import clock, fault_title, span
 from diagnosis.report.judged_parts import kind_of, sides_of_parts
 from diagnosis.report.standing import Standing, standings_of
 from diagnosis.results.candidates import label_of, symbol_of
+from diagnosis.results.consequences import Stated, causes_of
 from diagnosis.results.document import IntervalRow, PhaseRow, ReportDocument
 from diagnosis.results.fault_rows import state_label
 from diagnosis.results.machine_words import MachineWords, words_of
-from diagnosis.results.vocabulary import Kind, Severity, Tier
-from replay.faults import FAULT_STATES, FaultMode, Side, State
+from diagnosis.results.vocabulary import Kind, Severity
+from replay.faults import FAULT_STATES, Side, State
 
 _BUCKETS = 2000
 _TOUCHING = 1e-6  # percent of a lane: one bar ends where the next begins
@@ -124,25 +125,8 @@ def _lines(spans: Sequence[Span], side: str, duration: float) -> tuple[Line, ...
 
 
 def causes(faults: Sequence[IntervalRow]) -> dict[str, str]:
-    """Faults that may be no more than a consequence, each with the fault that may be its cause.
-
-    A stuck or silent part misleads what is inferred of its component's other side: a fault there that a model found,
-    without a second measurement, and most of which lies within the other's time, may follow from it.
-    """
-    total: dict[tuple[str, str], list[IntervalRow]] = {}
-    for f in faults:
-        if FaultMode(f["mode"]).total:
-            total.setdefault((f["component"], f["kind"]), []).append(f)
-    out = {}
-    for f in faults:
-        if f["tier"] == Tier.DIRECT or FaultMode(f["mode"]).total or f["side"] == Side.SENSOR_OR_ACTUATOR:
-            continue
-        length = f["stop_s"] - f["start_s"]
-        for g in total.get((f["component"], f["kind"]), ()):
-            shared = min(f["stop_s"], g["stop_s"]) - max(f["start_s"], g["start_s"])
-            if g["side"] not in (f["side"], Side.SENSOR_OR_ACTUATOR) and shared > 0.5 * length:
-                out[f["id"]] = g["id"]
-    return out
+    """Faults that may be no more than a consequence, each with the fault that may be its cause; see `causes_of`."""
+    return causes_of([Stated(*(f[key] for key in Stated._fields)) for f in faults])  # type: ignore[literal-required]
 
 
 def _bar(fault: IntervalRow, duration: float, words: MachineWords, cause: str = "") -> Bar:

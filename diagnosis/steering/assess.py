@@ -23,7 +23,7 @@ from diagnosis.steering.evidence import evidence_columns, path_angle
 from diagnosis.steering.filter_state import SteeringPath
 from diagnosis.steering.findings import apart, findings_of
 from diagnosis.steering.followed import assessed, stays
-from diagnosis.steering.inputs import AxleInputs, Counts, axle_inputs
+from diagnosis.steering.inputs import REPLAYED, AxleInputs, Counts, axle_inputs
 from diagnosis.steering.measured_twice import of_one_cause
 from diagnosis.steering.model_error import ModelError, model_error
 from diagnosis.steering.models import model_of
@@ -50,6 +50,7 @@ Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 _SIDES = (Side.SENSOR, Side.ACTUATOR)
+_INSTEAD = " (what the replayed loop commands, for what the {valve} was told is not in the log)"
 _OTHERWISE = (
     "No model of the axles fits their motion closely enough to accuse a part of them, as on many sound machines (valves creep, axles push each "
     "other, oil warms): only faults that a measurement of the same quantity shows are stated. The verdict does not rest on the model there: what "
@@ -237,8 +238,8 @@ def _judged(inputs: AxleInputs, told: _Found, *, otherwise: bool) -> _Judged:
         unexplained = sum((b - a) * length for a, b in found[side].unexplained)
         sides[side] = Assessment(
             states=states_of(side, inputs, axle, path, found[side], masked, judged=judged),
-            reasons=reasons_of(side, axle, judged=judged),
-            lacks={} if twice[side] else {State.NOT_ASSESSED: Lack.SECOND},
+            reasons=reasons_of(side, axle, judged=judged, missing=inputs.channel("u") if inputs.uncommanded else ""),
+            lacks={} if twice[side] else {State.NOT_ASSESSED: _lack(side, inputs)},
             findings=found[side].findings,
             columns=columns[side].columns,
             closeups=columns[side].closeups,
@@ -250,11 +251,17 @@ def _judged(inputs: AxleInputs, told: _Found, *, otherwise: bool) -> _Judged:
     return _Judged(sides, path_angle(axle, path, inputs.timeline))
 
 
+def _lack(side: Side, inputs: AxleInputs) -> Lack:
+    """What would have a side judged of which nothing is measured twice."""
+    return Lack.COMMAND if side is Side.ACTUATOR and inputs.uncommanded else Lack.SECOND
+
+
 def _note(axle: AxleFilter) -> str:
     """The figures that the judgement used."""
     plant, noise = axle.model.plant, axle.model.noise
+    instead = _INSTEAD if axle.names[1].startswith(REPLAYED) else ""
     return (
-        f"{axle.names[0]} by the steering model with {axle.names[1]}: {amount(plant.gain, 'rad')}/s at 100{{percent}}, at most "
+        f"{axle.names[0]} by the steering model with {axle.names[1]}{instead}: {amount(plant.gain, 'rad')}/s at 100{{percent}}, at most "
         f"{amount(plant.rate, 'rad')}/s, lag {plant.lag:.2g} s, noise {amount(noise.std, 'rad', 2)}, rounding step "
         f"{amount(noise.lsb, 'rad', 2)}, error of the rate {amount(axle.model.rate_error, 'rad', 2)}/s."
     )

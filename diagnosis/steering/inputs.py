@@ -19,6 +19,9 @@ from replay.signals.timeline import Timeline
 Array = NDArray[np.float64]
 Counts = Mapping[str, NDArray[np.int16]]
 
+#: Beginning of the names of what the replayed loop gives.
+REPLAYED = "replay."
+
 _LEAVES = ("phi", "phi_true", "u", "u_applied")
 _NO_NOISE = SensorNoise(1.0, 1.0, 0.0, 0.0)
 _SLOW = 0.1  # of the top speed, from which on commands of the body tell an angle
@@ -93,8 +96,15 @@ class AxleInputs:
 
     @property
     def names(self) -> tuple[str, str]:
-        """Channels of angle and command."""
+        """Channels of angle and command; of a command that is not logged, what stands in for it: that of the replayed loop."""
+        if self.uncommanded:
+            return self.channel(self.measured), f"{REPLAYED}{self.name}.u"
         return self.channel(self.measured), self.channel("u" if "u" in self.logged else "u_applied")
+
+    @property
+    def uncommanded(self) -> bool:
+        """Whether neither the valve's command nor its opening is logged, so that what the replayed loop commands stands in for them."""
+        return not {"u", "u_applied"} & self.logged
 
     def channel(self, leaf: str) -> str:
         """Canonical name."""

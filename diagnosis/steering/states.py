@@ -34,9 +34,10 @@ _REASONS: dict[Side, Mapping[State, str]] = {
 _UNEXPLAINED = "something deviates there that no single fault explains well enough"
 _NO_COMMAND = "there is no {valve} command to compare with"
 _NO_MODEL = "the steering model does not hold here"
+_MISSING = "{name}, the command of its {{valve}}, is not in the log, and what the replayed loop commands instead does not fit the angle"
 
 
-def reasons_of(side: Side, axle: AxleFilter, *, judged: bool) -> dict[State, str]:
+def reasons_of(side: Side, axle: AxleFilter, *, judged: bool, missing: str = "") -> dict[State, str]:
     """Why a side has states that are no judgement: of what is not assessed, the reason that holds in this mission.
 
     Parameters
@@ -47,9 +48,11 @@ def reasons_of(side: Side, axle: AxleFilter, *, judged: bool) -> dict[State, str
         Its filters.
     judged : bool
         Whether this side can be judged by the plant.
+    missing : str
+        The command's channel where that is not in the log; else empty.
     """
     unseen = side is Side.SENSOR and bool(_unseen(axle).any())
-    why = _UNEXPLAINED if judged else _NO_MODEL
+    why = _UNEXPLAINED if judged else _MISSING.format(name=missing) if missing else _NO_MODEL
     return {**_REASONS[side], State.NOT_ASSESSED: f"{_NO_COMMAND}, or {why}" if unseen else why}
 
 

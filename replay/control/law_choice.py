@@ -15,6 +15,8 @@ from replay.machine.config import Machine
 
 Array = NDArray[np.float64]
 
+#: What a reading says of a law that does not explain the recorded commands.
+UNEXPLAINED = "no reading explains it well"
 _UNKNOWN_LEAD = 0.5
 
 
@@ -68,7 +70,7 @@ def choose_law(
         + f"; explains {100 * best.explained:.1f} % of the recorded command"
     )
     if control.law == "auto" and not fitted:
-        detail += "; no reading explains it well: the log may come from another controller"
+        detail += f"; {UNEXPLAINED}: the log may come from another controller"
     readings.append(
         Reading("control law", f"{law}: {mfhca.LAW_TEXT[law]}", f"{detail}; replayed with λ = {lambda_:.4g} s/m")
     )

@@ -157,3 +157,15 @@ def test_loop_replay_follows_the_time_of_the_evidence(open_page: OPEN) -> None:
     page.get_by_role("button", name="Whole mission").click()
     until(page, f"{shown} === '0,120'")
     page.wait_for_url(re.compile(r"t=27\.0000,39\.0000"))
+
+
+def test_spikes_of_a_command_do_not_squash_what_is_measured(open_page: OPEN) -> None:
+    page = open_page("five_faults")
+    got = page.evaluate(
+        """() => { const of = (role) => ({ role }), row = { traces: [of("commanded"), of("measured")] };
+          const asked = { y: Array.from({ length: 200 }, (_, i) => (i === 50 ? 9 : Math.sin(i / 9))) }, flat = { y: asked.y.map((v) => Math.min(v, 1)) };
+          const read = { y: Array.from({ length: 200 }, (_, i) => 2 * Math.sin(i / 9)) };
+          return [Looks.asked(row, [asked, read]), Looks.asked(row, [flat, read]), Looks.asked(row, [flat, { y: asked.y }])]; }"""
+    )
+    assert (got[0]["most"], got[0]["range"][1] < 3, got[0]["range"][0] <= -1.9) == (9, True, True)
+    assert got[1:] == [None, None]  # nothing is cut of what is measured

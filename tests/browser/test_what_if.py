@@ -69,10 +69,10 @@ def test_sliders_change_residual_and_evidence(open_page: OPEN) -> None:
     page.keyboard.press("w")
     words = page.locator("#whatif-words")
     expect(words).to_contain_text(
-        re.compile(r"What if: residual r\.m\.s\. [\d.]+ times its threshold, beyond it .*, first at [\d.]+ s, ")
+        re.compile(r"What if: residual [\d.]+ m/s r\.m\.s\., beyond its threshold .*, first at [\d.]+ s, ")
     )
     page.locator("#whatif-figure .main-svg").first.wait_for()
-    times = re.compile(r"What if: residual r\.m\.s\. ([\d.]+) times its threshold.* Log: r\.m\.s\. ([\d.]+) times")
+    times = re.compile(r"What if: residual ([\d.]+) m/s r\.m\.s\..* Log: ([\d.]+) m/s r\.m\.s\.")
     found = times.search(words.inner_text())
     assert found
     # the log's residual passes its threshold at one time, whoever says so
@@ -140,10 +140,10 @@ def test_a_residual_that_passes_its_threshold_now_and_then_is_said_to_be_so(open
     expect(page.locator("#whatif-words")).to_contain_text("What if")
     words = page.evaluate(
         """() => { const residual = Float64Array.from({ length: 100 }, (_, i) => (i >= 40 && i < 50 ? 1.2 : 0.1));
-          const d = { f: { start: 0, stop: 1, detected: null }, n: 100, t: 0, dt: 0.01, stride: 1, residual, threshold: new Float64Array(100).fill(1), passes: { start: 0.4, stop: 0.49 }, channel: { name: "" } };
-          return WhatIf.words(d, { ratio: residual, spec: { start: 0, stop: 1 } }); }"""
+          const d = { f: { start: 0, stop: 1, detected: null }, n: 100, t: 0, dt: 0.01, stride: 1, rk: 1, runit: "m/s", residual, threshold: new Float64Array(100).fill(1), passes: { start: 0.4, stop: 0.49 }, channel: { name: "" } };
+          return WhatIf.words(d, { ratio: residual, residual, spec: { start: 0, stop: 1 } }); }"""
     )
     assert (
-        "Log: r.m.s. 0.391 times its threshold, beyond it in 10 % of the fault, first at 0.400 s, 400 ms after the onset."
+        "Log: 0.391 m/s r.m.s., beyond its threshold in 10 % of the fault, first at 0.400 s, 400 ms after the onset."
         in words
     )

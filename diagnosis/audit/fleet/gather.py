@@ -15,6 +15,7 @@ from diagnosis.audit.fleet.owners import Owner, Owners
 from diagnosis.audit.fleet.read import FoundFault, Mission
 from diagnosis.audit.fleet.runs import Limits, Run, sides_of
 from diagnosis.audit.fleet.suspicions import suspicions_of
+from diagnosis.audit.store.outcome import MissionState
 from diagnosis.audit.store.repairs import Repair, repaired_at
 from diagnosis.results.vocabulary import Severity, Verdict
 
@@ -221,6 +222,11 @@ def _fleet_fault(
     )
 
 
+def _damaged(run: Run) -> bool:
+    """Whether something of a mission's log is lost: what it does not show may be in that."""
+    return run.result.state is MissionState.DEGRADED and not run.result.left_out
+
+
 class _Episode(NamedTuple):
     """The last time that a fault came and was not refuted: whether it ever was of high severity, and clean missions since.
 
@@ -244,6 +250,6 @@ def _episode(m: Machine, found: Sequence[tuple[Run, FoundFault]], assessed: Sequ
         if run.result.id in severe:
             high = severe[run.result.id] or (high and clean < OPEN)
             clean = 0
-        elif high and clean < OPEN and assessed[k] and own.would_show(run, key):
+        elif high and clean < OPEN and assessed[k] and own.would_show(run, key) and not _damaged(run):
             clean += 1
     return _Episode(high, clean)

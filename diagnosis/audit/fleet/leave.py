@@ -6,6 +6,7 @@ import shlex
 from collections import defaultdict
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
+from itertools import takewhile
 
 from diagnosis.audit.fleet.fault_types import FleetFaultRow
 from diagnosis.audit.fleet.fleet_types import FleetDocument, MachineRow, MissionRow
@@ -200,9 +201,7 @@ def _why(
     named += not_named(faults, _FAULTS, m)
     if leave is Leave.MUST_NOT:
         place = faults[0]["last"] if faults else last
-        was = "was" if m["unjudged"] == 1 else "were"
-        later = f"; {count(m['unjudged'], 'mission')} that may be later {was} not judged" if m["unjudged"] else ""
-        return place, (named or m["standing"]) + later
+        return place, (named or m["standing"]) + _later(m, missions)
     if leave is Leave.MAY:
         if any(not f["since"] for f in faults):
             worn = any(f["mode"] == FaultMode.INEFFICIENT for f in faults[:_FAULTS])
@@ -221,6 +220,18 @@ def _why(
     stands = m["standing"] + (f", because {why}{_halved(faults)}" if why else "")
     reason = f"{named}: {stands[0].lower()}{stands[1:]}" if named else stands
     return last, f"{reason} – {said}" if said else reason
+
+
+def _later(m: MachineRow, missions: Sequence[MissionRow]) -> str:
+    """The missions that may be later than the last judged one and gave no verdict, by name where they are few; empty for none."""
+    if not m["unjudged"]:
+        return ""
+    trailing = takewhile(lambda k: missions[k]["verdict"] == Verdict.NOT_ASSESSED, reversed(m["missions"]))
+    others = [k for k in m["undated"] if missions[k]["verdict"] == Verdict.NOT_ASSESSED]
+    names = [missions[k]["name"] for k in (*trailing, *others, *m["failed"])]
+    was = "was" if m["unjudged"] == 1 else "were"
+    who = f" ({join_words(names)})" if len(names) == m["unjudged"] <= _FAULTS else ""
+    return f"; {count(m['unjudged'], 'mission')} that may be later{who} {was} not judged"
 
 
 def _left_open(m: MachineRow, missions: Sequence[MissionRow]) -> str:

@@ -13,7 +13,7 @@ from diagnosis.audit.fleet.trend_types import Axis
 from diagnosis.audit.fleet.trends import PartTrend, fast_losses
 from diagnosis.audit.trends.trend import Forecast
 from diagnosis.decision.wording import join_words
-from diagnosis.pages.labels import utc, utc_moment
+from diagnosis.pages.labels import grouped, utc, utc_moment
 from diagnosis.results.candidates import UNCLEAR
 from diagnosis.results.fault_rows import state_label
 from diagnosis.results.machine_words import MachineWords
@@ -22,6 +22,7 @@ from replay.faults import Side
 
 #: Where a machine with faults to watch stands while a loss of its grows towards a half.
 FAST_GROWTH = "Faults to watch, and a loss that grows fast"
+_UNCLEARED = "No fault found, not cleared"
 _SHOWN = 3
 _NAMED = 12
 _WORK = (Verdict.STOP, Verdict.WATCH)  # verdicts that ask for work
@@ -52,9 +53,13 @@ def found_in(missions: int, assessed: int) -> str:
 
 
 def missions_words(all_missions: int, counted: int) -> str:
-    """How many missions there are and how many count: ``22 missions, 21 of them counted``."""
-    words = f"{all_missions:,} mission{'' if all_missions == 1 else 's'}".replace(",", "\u202f")
-    return words if counted == all_missions else f"{words}, {f'{counted:,}'.replace(',', chr(0x202F))} of them counted"
+    """How many missions count, and of how many logs where that is another number: ``21 missions, of 22 logs``."""
+    words = f"{grouped(counted)} mission{'' if counted == 1 else 's'}"
+    return (
+        words
+        if counted == all_missions
+        else f"{words}, of {grouped(all_missions)} log{'' if all_missions == 1 else 's'}"
+    )
 
 
 def open_words(is_open: bool, clean: int, needed: int) -> str:
@@ -104,7 +109,12 @@ def standing(m: Machine) -> str:
         if m.last_verdict is Verdict.NOT_ASSESSED:
             return words
         last = m.last_judged
-        since = f" since {utc(last.result.start_ns)[:10]}" if last and last.result.start_ns is not None else ""
+        day = utc(last.result.start_ns)[:10] if last and last.result.start_ns is not None else ""
+        if m.uncleared:
+            return f"{_UNCLEARED}; last judged ready{f' on {day}' if day else ''}" + (
+                ", but not cleared" if m.cleared is False else ""
+            )
+        since = f" since {day}" if day else ""
         return f"{words}{since}: last judged ready" + (", but not cleared" if m.cleared is False else "")
     stopped = m.last_judged is not None and m.last_judged.result.verdict is Verdict.STOP
     if m.verdict is Verdict.STOP and _is_open(m) and not stopped:
@@ -237,6 +247,13 @@ def sentences(
         words = _standing_now(m, trends[machines.index(m)])
         what = f": {join_words(faults)}" if faults else ""
         out.append(f"{m.label} – {_small(words)}{what}{note}.")
+    rest = [m for m in machines if m.verdict is Verdict.NOT_ASSESSED]
+    out += [
+        f"{m.label} – {_small(_standing_now(m, trends[machines.index(m)]))}: check it before it goes out."
+        for m in rest[:_SHOWN]
+    ]
+    if len(rest) > _SHOWN:
+        out.append(f"{count(len(rest) - _SHOWN, 'more machine')} not assessed: listed below.")
     near = [(m, t) for m, own in zip(machines, trends, strict=True) for t in own if t.approaching]
     near.sort(key=lambda p: p[1].trend.forecast.likely or 0.0)
     for m, t in near[:2]:

@@ -28,7 +28,7 @@ class MissionState(StrEnum):
 
 _WORDS = {
     MissionState.OK: "",
-    MissionState.DEGRADED: "degraded",
+    MissionState.DEGRADED: "damaged or in part left out",
     MissionState.UNREADABLE: "unreadable",
     MissionState.TIMEOUT: "took too long",
     MissionState.OUT_OF_MEMORY: "out of memory",

@@ -4,7 +4,7 @@ class FigureLooks {
   // Range of a row's axis, or null for all values; and what it cuts off.
   heights(row, curves) {
     const left = curves.filter((_, i) => !row.traces[i - curves.length + row.traces.length]?.right), held = this.held.get(Figure.named(row));
-    if (!held) return Figure.robust && !row.limits ? Looks.robust(left) : null;
+    if (!held) return row.limits ? null : Figure.robust ? Looks.robust(left) : Looks.asked(row, curves);
     const y = left.flatMap((c) => c.y.filter(Number.isFinite));
     return { range: held.range, least: y.reduce((a, b) => Math.min(a, b), Infinity), most: y.reduce((a, b) => Math.max(a, b), -Infinity) };
   }

@@ -185,7 +185,7 @@ class Figure extends FigureLooks {
         const coarse = this.coarseness(curves), shapes = coarse === this.coarse ? {} : { shapes: this.layout().shapes };
         this.coarse = coarse;
         const axes = {};
-        if (Figure.robust || this.held.size) this.perRow(curves).forEach((part, i) => Object.entries(Figure.ranged(this.heights(this.rows[i], part), this.rows[i])).forEach(([k, v]) => { axes[`yaxis${i ? i + 1 : ""}.${k}`] = v; }));
+        this.perRow(curves).forEach((part, i) => Object.entries(Figure.ranged(this.heights(this.rows[i], part), this.rows[i])).forEach(([k, v]) => { axes[`yaxis${i ? i + 1 : ""}.${k}`] = v; }));
         await Plotly.update(this.element, this.restyled(curves), { "xaxis.range": target, ...heads, ...shapes, ...axes });
         this.label(curves);
         if (Now.t !== null) this.read().show();

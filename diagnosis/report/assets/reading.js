@@ -100,6 +100,15 @@ const Looks = {
     return { ...row, traces, threshold: undefined, unit: "1", title: `${row.title} ÷ threshold`, levels: [1, -1] };
   },
 
+  // Range that a few outliers of a command do not stretch, while all of what is measured stays in sight.
+  asked(row, curves) {
+    const of = (c) => row.traces[curves.indexOf(c) - curves.length + row.traces.length], own = (f) => curves.filter((c) => of(c) && !of(c).right && f(of(c)));
+    const cut = Looks.robust(own((t) => t.role === "commanded")), rest = own((t) => t.role !== "commanded").flatMap((c) => c.y.filter(Number.isFinite));
+    if (!cut || !rest.length) return null;
+    const [low, high] = rest.reduce(([a, b], v) => [Math.min(a, v), Math.max(b, v)], cut.range);
+    return high - low < 0.6 * (Math.max(high, cut.most) - Math.min(low, cut.least)) ? { range: [low, high], least: Math.min(low, cut.least), most: Math.max(high, cut.most) } : null;
+  },
+
   // Range that a few outliers do not stretch, or null where there are none; and what is cut.
   robust(curves) {
     const all = curves.flatMap((c) => c.y.filter(Number.isFinite)).sort((a, b) => a - b), at = (q) => all[Math.floor(q * (all.length - 1))];

@@ -96,24 +96,24 @@ const WhatIf = {
     return rows;
   },
 
-  // In a sentence: how far beyond its threshold the residual is, and when it first was.
+  // In a sentence: how large the residual is, as the evidence has it, and when it was first beyond its threshold.
   words(d, w) {
     if (!d.residual) return "No residual of this part was recorded in which the change could be seen.";
     if (!w.ratio) return `What a changed ${d.sensor ? "reading" : "opening"} does to the residual of this part (${d.runit || "no unit"}, drawn above) is not computed here: no model of the ${d.channel.name.startsWith("steer.") ? "axle" : "wheel"} was found in the readings around it.`;
-    const size = (ratio, { start, stop }) => {
+    const size = (ratio, residual, { start, stop }) => {
       let sum = 0, n = 0, over = 0;
       for (let i = 0; i < d.n; i++) {
         const t = d.t + i * d.dt;
-        if (t >= start && t < stop && Number.isFinite(ratio[i])) { sum += ratio[i] ** 2; n += 1; over += Math.abs(ratio[i]) > 1 ? 1 : 0; }
+        if (t >= start && t < stop && Number.isFinite(ratio[i])) { sum += (d.rk * residual[i]) ** 2; n += 1; over += Math.abs(ratio[i]) > 1 ? 1 : 0; }
       }
       const share = 100 * over / (n || 1), part = over === n ? "all the time" : `in ${share < 1 ? "less than 1" : share > 99 ? "more than 99" : Now.number(Math.round(share))} % of the fault`;
-      return { over, words: `r.m.s. ${Now.number(+Math.sqrt(sum / (n || 1)).toPrecision(3))} times its threshold`, part };
+      return { over, words: `${Now.number(+Math.sqrt(sum / (n || 1)).toPrecision(3))} ${d.runit} r.m.s.`, part };
     };
     // As the sentences of the replay have it: some samples on end.
     const beyond = Replay.stretches({ y: w.ratio, t: d.t, dt: d.dt, stride: d.stride }, (i) => Replay.over(Math.abs(w.ratio[i]), 1)).find((s) => s.stop > w.spec.start && s.start < w.spec.stop);
-    const late = (s, onset, { over, part }) => { if (!s) return over ? `beyond it ${part}, in single readings only` : "never beyond it"; const ms = 1000 * (s.start - onset), is = `${Now.number(+Math.abs(ms).toPrecision(3))} ms`; return `beyond it ${part}, first at ${s.start.toFixed(3)} s, ${Math.abs(ms) < 0.5 ? "the onset" : ms > 0 ? `${is} after the onset` : `${is} before the onset stated`}`; };
+    const late = (s, onset, { over, part }) => { if (!s) return over ? `beyond its threshold ${part}, in single readings only` : "never beyond its threshold"; const ms = 1000 * (s.start - onset), is = `${Now.number(+Math.abs(ms).toPrecision(3))} ms`; return `beyond its threshold ${part}, first at ${s.start.toFixed(3)} s, ${Math.abs(ms) < 0.5 ? "the onset" : ms > 0 ? `${is} after the onset` : `${is} before the onset stated`}`; };
     const seen = d.f.detected, other = seen !== null && d.passes && Math.abs(seen - d.passes.start) > 2 * d.dt ? ` The fault was detected at ${seen.toFixed(3)} s by its probability, which weighs the readings together; the residual is one of them.` : "";
-    const then = size(w.ratio, w.spec), log = size(d.residual.map((v, i) => v / d.threshold[i]), d.f);
+    const then = size(w.ratio, w.residual, w.spec), log = size(d.residual.map((v, i) => v / d.threshold[i]), d.residual, d.f);
     return `What if: residual ${then.words}, ${late(beyond, w.spec.start, then)}${beyond && d.stride > 1 ? `, to ${Figure.duration(d.dt)}` : ""}. Log: ${log.words}, ${late(d.passes, d.f.start, log)}.${other}${d.plant ? ` Wheel model found here: K = ${Now.number(+d.plant.K.toPrecision(3))} m/s, τ = ${Now.number(+d.plant.tau.toPrecision(2))} s, dead zone ${Now.number(100 * d.plant.dead)} %; it explains ${Now.number(+(100 * d.plant.explains).toPrecision(3))} % of the healthy speed.` : ""}`;
   },
 };

@@ -118,7 +118,7 @@ def test_only_missions_count_that_would_have_shown_it(tmp_path: Path, share: flo
     stored(tmp_path, missions)
     assert standing(tmp_path)[0] == verdict
     page = build_fleet_page(document(tmp_path))
-    assert ("open, for none of the missions since would have shown it" in page) == (verdict == "stop")
+    assert ("open, for no mission since that was read whole would have shown it" in page) == (verdict == "stop")
 
 
 def test_a_machine_that_may_go_out_says_what_was_repaired(tmp_path: Path) -> None:

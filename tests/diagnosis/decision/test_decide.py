@@ -82,7 +82,7 @@ def test_parts_that_the_sentence_leaves_out_are_those_to_repair_alone() -> None:
     all_to_repair = verdict(machine(**stop, FL_sensor=silent))
     assert all_to_repair.text.endswith("; 1 more part is listed below.")
     got = verdict(machine(**stop, FL_sensor=silent, FR_sensor=weak))
-    assert got.title == "4 faults to repair, 1 to watch"
+    assert got.title == "4 parts to repair, 1 to check"
     assert got.text.endswith("; 1 more part to repair is listed below.")
 
 
@@ -160,7 +160,7 @@ def test_every_fault_above_info_has_an_action() -> None:
     assert got.actions[0]["severity"] == "high"
     assert "FR speed sensor" in str(got.actions[0]["text"])
     assert "without signal" in str(got.actions[0]["text"])
-    assert got.title == "1 fault to repair, 2 to watch, on 2 parts"
+    assert got.title == "1 part to repair, 1 to check, in 3 spells"
 
 
 def test_deviations_that_nothing_explains_give_no_all_clear() -> None:
@@ -370,7 +370,7 @@ def test_the_sentence_names_parts_in_the_order_of_the_actions_with_what_they_los
             ),
         )
     )
-    assert got.text == ("The FL drive valve was faulty for 9.0 s in 3 faults; the FR speed sensor was stuck for 9.0 s.")
+    assert got.text == ("The FL drive valve was faulty for 9.0 s in 3 spells; the FR speed sensor was stuck for 9.0 s.")
     assert "without signal for 4.0 s, stuck for 2.0 s" in str(got.actions[0]["text"])
     assert "inefficient (40 % lost, 95 % bounds 39 to 41 %) for 3.0 s" in str(got.actions[0]["text"])
 
@@ -378,14 +378,14 @@ def test_the_sentence_names_parts_in_the_order_of_the_actions_with_what_they_los
 def test_what_comes_again_and_again_is_one_fault_with_its_course() -> None:
     gaps = [finding(Side.SENSOR, FaultMode.NO_SIGNAL, 1000 * k, 1000 * k + 100) for k in range(1, 8)]
     alone = verdict(machine(FR_sensor=assessed(*gaps)))
-    assert alone.title == "1 fault to watch, seen 7 times"
+    assert alone.title == "1 part to watch, in 7 spells"
     assert alone.text == "The FR speed sensor was without signal for 700 ms in 7 gaps from 1.0 to 7.1 s."
     assert "in 7 gaps from 1.0 to 7.1 s" in str(alone.actions[0]["text"])
     few = verdict(machine(FR_sensor=assessed(*gaps[:2])))
-    assert few.title == "2 faults to watch, on 1 part"
+    assert few.title == "1 part to watch, in 2 spells"
     beside = finding(Side.ACTUATOR, FaultMode.INEFFICIENT, 3000, 9000, epsilon=0.3)
     both = verdict(machine(FR_sensor=assessed(*gaps), FL_actuator=assessed(beside)))
-    assert both.title == "2 faults to watch"
+    assert both.title == "2 parts to watch, in 8 spells"
 
 
 def test_what_is_unclear_in_several_ways_is_said_once_and_losses_have_bounds() -> None:
@@ -401,8 +401,8 @@ def test_what_is_unclear_in_several_ways_is_said_once_and_losses_have_bounds() -
         finding(Side.ACTUATOR, FaultMode.INEFFICIENT, 200_000, 201_000, epsilon=0.5),
     )
     text = str(verdict(machine(FR_actuator=assessed(*parts))).actions[0]["text"])
-    assert "faulty, kind unclear for 1.0 s in 2 faults" in text
-    assert "inefficient (40 to 50 % lost, from fault to fault, 95 % bounds 39 to 51 %) for 2.2 min in 2 faults" in text
+    assert "faulty, kind unclear for 1.0 s in 2 spells (at 0.0–0.5 and 2.0–2.5 s)" in text
+    assert "inefficient (40 to 50 % lost, from fault to fault, 95 % bounds 39 to 51 %) for 2.2 min in 2 spells" in text
 
 
 def test_a_sensor_that_lost_something_reads_too_little() -> None:

@@ -32,3 +32,11 @@ def test_a_command_of_the_body_costs_little_where_every_wheel_has_its_own() -> N
     wheels = ("FR", "FL")
     assert "little" in cost_of_missing("cmd.v", HYDRAULIC, {"wheel.FR.v_ref", "wheel.FL.v_ref"}, wheels)
     assert "no wheel has a command" in cost_of_missing("cmd.v", HYDRAULIC, {"wheel.FR.v_ref"}, wheels)
+
+
+def test_of_a_steering_without_commands_is_said_what_it_was_judged_by() -> None:
+    command, position = "steer.front.u", "steer.front.u_applied"
+    assert "replayed control law" in cost_of_missing(command, HYDRAULIC, {"steer.front.phi"})
+    assert "is not judged: its position" in cost_of_missing(command, HYDRAULIC, {position})
+    assert "neither" in cost_of_missing(position, HYDRAULIC, {"steer.front.phi"})
+    assert "how the angle follows its command" in cost_of_missing(position, HYDRAULIC, {command})

@@ -33,3 +33,10 @@ def test_a_second_measurement_is_asked_for_where_the_log_has_none(side: str, sig
         (one,) = short_parts([part], {part: assessment}, {part: 5.0}, {part: 60.0}, Limits(), HYDRAULIC, Kind.STEER)
         assert (signal in one.act) is asked
         assert one.act.startswith("steer from stop to stop several times")
+
+
+def test_the_missing_command_of_a_steering_valve_is_asked_for_by_its_name() -> None:
+    part = ("rear", "actuator")
+    lacking = {part: replace(OPEN, lacks={State.NOT_ASSESSED: Lack.COMMAND})}
+    (one,) = short_parts([part], lacking, {part: 0.0}, {part: 60.0}, Limits(), HYDRAULIC, Kind.STEER)
+    assert one.act.startswith("log steer.rear.u (the command of its valve)")

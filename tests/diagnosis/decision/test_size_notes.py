@@ -21,8 +21,8 @@ from tests.diagnosis.decision.findings import finding
         (FaultMode.STUCK, (1.0, 0.1, 1.0), Tier.MODEL, "By its row all is lost"),
         (FaultMode.INEFFICIENT, None, Tier.MODEL, "No ε̂ is stated: the readings do not tell how much is lost."),
         (FaultMode.NOISY, None, Tier.MODEL, "No ε̂ is stated: what varies does not tell"),
-        (FaultMode.INEFFICIENT, (0.4, 0.0, 0.8), Tier.MODEL, "The lower bound of ε̂ is open, so that nothing may be lost: the bounds hold"),
-        (FaultMode.NOISY, (0.7, 0.1, 1.0), Tier.MODEL, "The upper bound of ε̂ is open, so that all may be lost: noise hides"),
+        (FaultMode.INEFFICIENT, (0.4, 0.0, 0.8), Tier.MODEL, "The lower bound of ε̂ is open, which speaks of the size alone: "),
+        (FaultMode.NOISY, (0.7, 0.1, 1.0), Tier.MODEL, "The upper bound of ε̂ is open, so that all may be lost. Noise hides"),
         (FaultMode.INEFFICIENT, (0.5, 0.0, 1.0), Tier.DIRECT, "Neither bound of ε̂ says anything"),
     ],
 )  # fmt: skip

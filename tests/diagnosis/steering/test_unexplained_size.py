@@ -98,3 +98,12 @@ def test_a_sensor_whose_noise_shows_is_never_open_for_want_of_steering() -> None
 )
 def test_no_reason_is_given_that_does_not_hold(side: Side, why: str, *, blind: bool, judged: bool) -> None:
     assert reasons_of(side, axle(blind=blind), judged=judged)[State.NOT_ASSESSED] == why
+
+
+def test_a_command_that_is_not_in_the_log_is_named_as_the_reason() -> None:
+    why = reasons_of(Side.ACTUATOR, axle(), judged=False, missing="steer.rear.u")[State.NOT_ASSESSED]
+    assert why.startswith("steer.rear.u, the command of its {valve}, is not in the log")
+    assert (
+        "not in the log"
+        not in reasons_of(Side.ACTUATOR, axle(), judged=True, missing="steer.rear.u")[State.NOT_ASSESSED]
+    )

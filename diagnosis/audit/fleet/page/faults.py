@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections import Counter
+from collections.abc import Mapping, Sequence
 
 from diagnosis.audit.fleet.fault_types import FleetFaultRow, MissionFaultRow
 from diagnosis.audit.fleet.leave import GONE
@@ -30,6 +31,15 @@ def _each(f: FleetFaultRow, document: ShownDocument) -> list[MissionFaultRow]:
     return [same[0] for same in each if same]
 
 
+def _of_missions(worst: str, each: Sequence[str]) -> str:
+    """In how many missions a fault was of its severity, where it was not in all: by each mission's own evidence; else empty."""
+    others = Counter(s for s in each if s != worst)
+    if not others or worst not in each:
+        return ""
+    rest = ", ".join(f"{s} in {n}" for s, n in others.items())
+    return f" (in {sum(s == worst for s in each)} of {len(each)} missions; {rest}, by its own evidence)"
+
+
 def fault_context(f: FleetFaultRow, document: ShownDocument, directions: Mapping[tuple[int, str, str], str]) -> Context:
     """What the template shows of a fault of a machine.
 
@@ -46,9 +56,11 @@ def fault_context(f: FleetFaultRow, document: ShownDocument, directions: Mapping
     e, found = f["epsilon"], _each(f, document)
     notes = []
     if e and f["mode"] in SCALED and not f.get("unclear"):
-        before = [
-            share(each["value"]).removesuffix(" %") for m in found[-_COURSE:-1] if (each := m["epsilon"]) is not None
-        ]
+        # the first one, the last few, and a gap between them
+        told = found[:-1] if len(found) <= _COURSE + 1 else [found[0], *found[-_COURSE:-1]]
+        before = [share(each["value"]).removesuffix(" %") for m in told if (each := m["epsilon"]) is not None]
+        if len(told) < len(found) - 1 and found[0]["epsilon"] is not None:
+            before.insert(1, "…")
         bounds = f"{share(e['low']).removesuffix(' %')} to {share(e['high'])}"
         sizes = " → ".join([*before, f"{share(e['value'])} ({bounds})"])
         notes.append(f"{sizes} lost in the fault{', mission by mission' if before else ''}")
@@ -61,7 +73,7 @@ def fault_context(f: FleetFaultRow, document: ShownDocument, directions: Mapping
     elif f["repaired_ns"] is not None:
         notes.append(f"found again since the repair on {labels.utc_moment(f['repaired_ns'])}")
     if f["open"] and f["since"]:
-        none = ", for none of the missions since would have shown it"
+        none = ", for no mission since that was read whole would have shown it"
         notes.append(f"open{open_words(True, f['clean'], f['needed']) or none}")
     elif f["since"]:
         last_ones = f"last {count(f['since'], 'mission')}" if f["since"] > 1 else "last mission"
@@ -71,7 +83,7 @@ def fault_context(f: FleetFaultRow, document: ShownDocument, directions: Mapping
         "symbol": rows.fault_symbol(f),
         "words": UNCLEAR.capitalize() if f.get("unclear") else state_label(f["mode"], f["side"]),
         "part": words_of(document["machines"][f["machine"]]).part_words(f["kind"], f["component"], f["side"]),
-        "severity": f["severity"],
+        "severity": f["severity"] + _of_missions(f["severity"], [m["severity"] for m in found]),
         "status": _STATUS[f["status"]],
         "kind": f["status"],
         "count": f"{f['missions']} of {f['assessed']}",

@@ -13,8 +13,10 @@ from diagnosis.audit.store.outcome import MissionState
 from diagnosis.decision.wording import join_words
 from diagnosis.pages import labels
 from diagnosis.results.machine_words import words_of
-from diagnosis.results.vocabulary import Verdict
+from diagnosis.results.vocabulary import Kind, Verdict
 
+#: What mostly has the parts of a steering judged.
+_STEER = "steer from stop to stop twice at standstill and several times while driving, with the log running; where the report asks for a signal, log it"
 _FOLDERS = 4  # that are named
 _MACHINES = 3  # that are named
 _STANDING = {"new": "new", "recurring": "recurring", "once": "found once"}
@@ -31,7 +33,12 @@ def hours(seconds: float) -> str:
 def kpis(document: ShownDocument) -> list[tuple[str, str, str]]:
     """Value, what it is, and what belongs to it."""
     c = document["counts"]
-    unread = [f"{labels.grouped(c['states'][s])} {s.words}" for s in MissionState if s.words and c["states"].get(s)]
+    of_them = sum(
+        m["state"] is MissionState.DEGRADED and m["verdict"] is not None and not m.get("copy_of")
+        for m in document["missions"].as_found
+    )
+    states = {s: c["states"].get(s, 0) - (of_them if s is MissionState.DEGRADED else 0) for s in MissionState}
+    unread = [f"{labels.grouped(n)} {s.words}" for s, n in states.items() if s.words and n > 0]
     rest = [
         f"{labels.grouped(n)} {words}"
         for n, words in (
@@ -50,9 +57,10 @@ def kpis(document: ShownDocument) -> list[tuple[str, str, str]]:
     f = c["faults"]
     return [
         (
-            labels.grouped(c["missions"]),
+            labels.grouped(counted),
             "missions",
-            ", ".join([f"{labels.grouped(counted)} with a report", *unread, *rest])
+            (f"of {labels.grouped(c['missions'])} logs: " if c["missions"] != counted else "")
+            + ", ".join([f"{labels.grouped(counted)} with a report{_damaged(of_them)}", *unread, *rest])
             + (
                 f"; {labels.grouped(c['not_assessed'])} {Verdict.NOT_ASSESSED.group.lower()}"
                 if c["not_assessed"]
@@ -76,6 +84,11 @@ def kpis(document: ShownDocument) -> list[tuple[str, str, str]]:
             "nothing judged" if c["decided"] is None else _coverage(document["machines"]),
         ),
     ]
+
+
+def _damaged(of_them: int) -> str:
+    """How many of the missions with a report were not read whole, in brackets; empty for none."""
+    return f" ({labels.grouped(of_them)} of them {MissionState.DEGRADED.words})" if of_them else ""
 
 
 def of_faults(found: Mapping[str, int]) -> str:
@@ -124,7 +137,11 @@ def blind(machines: Sequence[MachineRow], document: ShownDocument) -> list[Conte
             # of one that is ready nothing is to be done: the checks of its axles passed
             ready = last is not None and last["verdict"] == Verdict.READY
             says = "why" if ready else "why, and what would have them judged"
-            out.append({"label": m["label"], "parts": join_words(parts), "address": address, "says": says})
+            steered = any(p["kind"] == Kind.STEER and p["assessed_last"] is False for p in m["parts"])
+            drive = _STEER if steered and not ready else ""
+            out.append(
+                {"label": m["label"], "parts": join_words(parts), "address": address, "says": says, "drive": drive}
+            )
     return out
 
 

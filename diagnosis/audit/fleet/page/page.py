@@ -9,7 +9,7 @@ from __future__ import annotations
 import base64
 import hashlib
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import lru_cache
 from pathlib import Path
 
@@ -25,9 +25,10 @@ from diagnosis.audit.fleet.page.changes import changes_of
 from diagnosis.audit.fleet.page.faults import fault_context
 from diagnosis.audit.fleet.page.figures import blind, hours, kpis, of_folders
 from diagnosis.audit.fleet.page.matrix import matrix
+from diagnosis.audit.fleet.page.points import in_points
 from diagnosis.audit.fleet.page.shown import Context, ShownDocument, shown
 from diagnosis.audit.fleet.page.svg import LEGEND, mark, sparkline, sprite
-from diagnosis.audit.fleet.page.trends import MOST, chosen, course, dead_words, interest, is_lost, level_words
+from diagnosis.audit.fleet.page.trends import MOST, chosen, course, dead_words, interest, is_lost, keys, level_words
 from diagnosis.audit.fleet.trend_types import TrendRow
 from diagnosis.audit.fleet.words import count, missions_words
 from diagnosis.pages import labels
@@ -57,7 +58,7 @@ _DEFINITIONS = (
     "Past: not found in the last three missions that judged the part. Faults of severity “info” are left out.",
     "A fault of high severity that no longer shows may be a loose contact. It stays open until the repair of its part is recorded "
     "(mfhca audit --repaired), or until ten missions do not find it that would have shown it: the part was judged, and by its report the "
-    "mission would have shown such a fault of ten seconds more often than not. Repaired: not found since the repair.",
+    "mission would have shown such a fault of ten seconds more often than not; a damaged log counts for none. Repaired: not found since the repair.",
     "Missions with a report count. A copy of a log, a log that was not read and one that is not audited yet are missions that "
     "do not count in machines, faults and trends.",
     "A mission judged a part, or judged it long enough: decided, healthy or faulty, for the seconds that the verdict “ready” takes and for four fifths of its driving; one that found a fault of it counts as one that judged it. Check before it goes out: the missions do not tell that the machine is sound.",
@@ -117,7 +118,10 @@ def build_fleet_page(found: FleetDocument) -> str:
         "unlisted": max(0, len(present) - _FAULTS),
         "past": [fault_context(f, document, directions) for f in past[:_FAULTS]],
         "past_count": len(past),
-        "trends": [course(t, document["machines"], _UNITS[axis], standing[t["machine"]]) for t in drawn],
+        "trends": [
+            course(t, document["machines"], _UNITS[axis], standing[t["machine"]], _start_of(document)) for t in drawn
+        ],
+        "keys": keys(drawn),
         "quiet": len(trends) - len(drawn),
         "brief": sum(t["forecast"]["state"] == "not_known" for t in trends if all(t is not d for d in drawn)),
         "crowded": len(drawn) == MOST,
@@ -143,7 +147,8 @@ def _leave(lists: Sequence[Left], document: ShownDocument) -> list[Context]:
             {
                 "label": document["machines"][x.machine]["label"],
                 "group": x.machine,
-                "reason": labels.visible(x.reason),
+                "reason": labels.visible(head),
+                "more": [labels.visible(one) for one in more],
                 "name": "" if x.mission is None else document["missions"][x.mission]["name"],
                 "files": [] if x.mission is None else document["missions"][x.mission]["files"][:2],
                 "address": "" if x.mission is None else document["missions"][x.mission]["address"],
@@ -152,12 +157,18 @@ def _leave(lists: Sequence[Left], document: ShownDocument) -> list[Context]:
             }
             for x in lists
             if x.leave is leave
+            for head, more in [in_points(x.reason)]
         ]
         words = leave.value[:1].upper() + leave.value[1:]
         first = sum(x.leave is Leave.CHECK for x in lists) if leave is Leave.MUST_NOT else 0
         but = f" for certain, but {count(first, 'machine')} must be checked first" if first else ""
         out.append({"symbol": symbols[leave].symbol, "words": words, "rows": rows_, "but": but})
     return out
+
+
+def _start_of(document: ShownDocument) -> Callable[[int], int | None]:
+    missions = document["missions"].as_found
+    return lambda place: missions[place].get("start_ns")
 
 
 def _by_machine(faults: Sequence[FleetFaultRow]) -> dict[int, list[FleetFaultRow]]:

@@ -131,7 +131,7 @@ def groups(document: ShownDocument) -> Iterator[tuple[str, str, int, Markup]]:
         listed = rest[:most]
         yield (
             "No machine known",
-            f"{len(rest)} mission{'s' if len(rest) != 1 else ''}{_cut(listed, rest)}",
+            f"{len(rest)} log{'s' if len(rest) != 1 else ''}{_cut(listed, rest)}",
             len(listed),
             Markup("".join(_row(missions[r], ANY_DRIVE) for r in listed)),
         )
@@ -167,7 +167,8 @@ def _row(m: ShownMission, machine_words: MachineWords) -> str:
     if m.get("open_loop"):
         notes.append("faults injected")
     if m["state"] is MissionState.DEGRADED:
-        notes.append(m["reason"])
+        kept = m.get("duration_s")
+        notes.append(f"{labels.span(kept)} of it could be read; {m['reason']}" if kept else m["reason"])
     note = f'<div class="small muted">{escape("; ".join(notes))}</div>' if notes else ""
     start, driving = m.get("start_ns"), m.get("driving_s")
     kinds = Counter(fault_words(f, machine_words) for f in faults)

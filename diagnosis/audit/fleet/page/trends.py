@@ -12,6 +12,7 @@ from diagnosis.audit.fleet.runs import sides_of
 from diagnosis.audit.fleet.trend_types import TrendRow
 from diagnosis.audit.fleet.words import count, round_to, share
 from diagnosis.decision.wording import join_words
+from diagnosis.pages.labels import utc
 from diagnosis.results.fault_rows import state_label
 from diagnosis.results.machine_words import words_of
 from replay.faults import TOTAL
@@ -69,6 +70,12 @@ def chosen(trends: Sequence[TrendRow], dead: Callable[[TrendRow], bool] = lambda
     return sorted(found, key=interest, reverse=True)[:MOST]
 
 
+def _dates(t: TrendRow, start_of: Callable[[int], int | None]) -> str:
+    """How many missions a course has, and the days of the first and the last."""
+    days = [utc(start)[:10] for p in (t["points"][0], t["points"][-1]) if (start := start_of(p[0])) is not None]
+    return f"{count(len(t['points']), 'mission')}, {' to '.join(dict.fromkeys(days))}".removesuffix(", ")
+
+
 def dead_words(t: TrendRow, standing: Sequence[FleetFaultRow]) -> str:
     """That a part is stuck or silent at times, of which no loss is made: its course looks as good as what is left; else empty."""
     mine = [
@@ -82,8 +89,23 @@ def dead_words(t: TrendRow, standing: Sequence[FleetFaultRow]) -> str:
     return f"not counting the time found as {rows}"
 
 
-def course(t: TrendRow, machines: Sequence[MachineRow], unit: str, standing: Sequence[FleetFaultRow] = ()) -> Context:
-    """Title, picture and words of one course."""
+def keys(trends: Sequence[TrendRow]) -> Context:
+    """Which marks the pictures of some trends have, beside dots and limit."""
+    return {
+        "fit": any(t["line"] is not None and t["forecast"]["state"] != "not_known" for t in trends),
+        "when": any(t["forecast"]["state"] == "crossing" for t in trends),
+        "odd": any(t["outliers"] for t in trends),
+    }
+
+
+def course(
+    t: TrendRow,
+    machines: Sequence[MachineRow],
+    unit: str,
+    standing: Sequence[FleetFaultRow] = (),
+    start_of: Callable[[int], int | None] = lambda place: None,
+) -> Context:
+    """Title, picture and words of one course; `start_of` a mission's place gives when it began [ns]."""
     title = f"{machines[t['machine']]['label']} · {words_of(machines[t['machine']]).part_words(t['kind'], t['component'], t['side'])}"
     line = t["line"]
     notes = []
@@ -110,17 +132,20 @@ def course(t: TrendRow, machines: Sequence[MachineRow], unit: str, standing: Seq
         notes.append(f"{count(len(t['outliers']), 'outlier')} excluded")
     words, beyond = t["forecast"]["words"], t["points"][-1][2] >= t["limit"]
     if beyond and t["forecast"]["state"] == "not_known":
-        notes.insert(0, f"how it goes on is {words}")
+        notes.insert(0, f"a forecast with bounds is {words}")
         words = f"above the limit of {share(t['limit'])}: {share(t['points'][-1][2])} lost over the whole of its last mission"
     if t.get("halving") and t["forecast"]["state"] == "not_known":
         notes.insert(
-            0, "if it goes on growing as in the last three, half may be lost before two more missions are over"
+            0,
+            "no forecast, but a reason to check it now: if it merely grows as in the last three, half may be lost before two more missions "
+            "are over",
         )
     if dead := dead_words(t, standing):
         words = f"{words}; {dead}, in which nothing was left of it: the dots are of the rest"
     state = "above" if beyond or dead or t["forecast"]["state"] == "above" else "near" if t["approaching"] else "calm"
     return {
         "title": title,
+        "dates": _dates(t, start_of),
         "state": state,
         "picture": trend_picture(t, title, unit),
         "words": words[:1].upper() + words[1:],

@@ -199,7 +199,7 @@ def test_a_report_is_not_said_to_tell_what_it_does_not(tmp_path: Path) -> None:
     for verdict, says in (("ready", "why"), ("not_assessed", "why, and what would have them judged")):
         one = Sample("a", verdict=verdict, blind=[("front", "actuator")])
         page = build_fleet_page(fleet_json(load_fleet(samples.write_store(tmp_path / verdict / "fleet.sqlite", [one]))))
-        assert f"its report</a> says {says}</li>" in page
+        assert f"its report</a> says {says}{'</li>' if verdict == 'ready' else '. <b>To the driver:</b> steer'}" in page
 
 
 def test_each_fault_of_a_row_names_its_mission_where_they_are_several(tmp_path: Path) -> None:

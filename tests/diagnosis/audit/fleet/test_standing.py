@@ -40,7 +40,7 @@ def write_object(folder: Path, k: int, mission: str, day: float) -> None:
     ("missions", "standing"),
     [
         ([*READY, EMPTY], "Not assessed since 2026-10-27: last judged ready"),
-        ([Sample("d0"), BLIND], "Not assessed since 2026-10-26: last judged ready"),
+        ([Sample("d0"), BLIND], "No fault found, not cleared; last judged ready on 2026-10-26"),
         ([Sample("d0"), Sample("d1", state="crashed")], "Not assessed since 2026-10-26: last judged ready"),
         ([Sample("d0"), Sample("d1", state=None)], "Not assessed since 2026-10-26: last judged ready"),
         (
@@ -224,8 +224,9 @@ def test_what_must_not_go_out_is_told_before_what_was_not_assessed(tmp_path: Pat
     stuck = Sample("a", "HX-1", verdict="stop", faults=[Fault(mode="stuck", severity="high")])
     blind = Sample("b", "HX-2", verdict="not_assessed")
     text = document(tmp_path, stuck, blind)["verdict"]["text"]
-    assert text[:2] == [
+    assert text[:3] == [
         "HX-1 – stop and repair: RL drive valve stuck.",
+        "HX-2 – not assessed: check it before it goes out.",
         "1 mission found no fault, but did not clear its machine.",
     ]
 
@@ -283,7 +284,7 @@ def test_missions_that_count_are_told_from_all(tmp_path: Path) -> None:
         Sample("d", state=None),
     )
     assert (d["counts"]["missions"], d["counts"]["counted"]) == (5, 2)
-    assert "5 missions, 2 of them counted" in build_fleet_page(d)
+    assert "2 missions, of 5 logs" in build_fleet_page(d)
 
 
 def test_a_copy_adds_nothing_to_what_was_not_assessed_and_the_figures_add_up(tmp_path: Path) -> None:
