@@ -363,4 +363,4 @@ def test_a_side_before_its_word_is_of_one_wheel_and_never_the_machine(name: str)
 
 @pytest.mark.parametrize("name", ["Left", "Reference", "Level", "Radar_speed_max", "lrSpeed_soll", "Rate"])
 def test_words_that_begin_like_a_side_stay_as_they_are(name: str) -> None:
-    assert "l" not in tokens(name) and "r" not in tokens(name)
+    assert not {"l", "r"} & {*tokens(name)}
