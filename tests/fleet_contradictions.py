@@ -29,6 +29,8 @@ def _lists(document: FleetDocument) -> Iterator[str]:
     if [x.machine for x in lists] != list(range(len(document["machines"]))):
         yield "a machine stands in no list, or in two"
     for left, machine in zip(lists, machines, strict=True):
+        if document["machines"][left.machine].get("cleared") != (left.leave is Leave.MAY):
+            yield f"{left.label}: cleared in the list {left.leave!r}"
         ready = machine.words.startswith("Ready") and "but a loss" not in machine.words
         if ready != (left.leave is Leave.MAY):
             yield f"{left.label}: {machine.words!r} in the list {left.leave!r}"

@@ -65,11 +65,11 @@ class Audit:
 
     @property
     def missions(self) -> pd.DataFrame:
-        """How the missions stand, shape (missions, 10), indexed by ``name``.
+        """How the missions stand, shape (missions, 11), indexed by ``name``.
 
         ``state`` (``ok``, ``degraded``, ``unreadable``, ``timeout``, ``out_of_memory``, ``crashed``), ``reason``,
         ``attempts``, ``machine_id``, ``machine_name``, ``verdict``, ``title``, ``report`` (folder below `output`, for
-        `mfhca.read_result`), ``faults`` (number), ``severity`` (of the worst).
+        `mfhca.read_result`), ``faults`` (number), ``severity`` (of the worst), ``limit`` (the limit that it met).
         """
         import pandas as pd
 

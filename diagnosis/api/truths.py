@@ -30,6 +30,8 @@ def results_and_truths(words: Sequence[Path], truth: Path | None) -> list[tuple[
     """
     if truth is None and len(words) == 2 and is_truth(words[1]):
         words, truth = words[:1], words[1]
+    elif truth is None and len(words) > 2 and (truths := [word for word in words if is_truth(word)]):
+        raise ConfigError(_too_many([word for word in words if word not in truths], truths))
     results = [path for word in words for path in _missions_at(word)]
     if truth is not None and len(results) > 1:
         raise ConfigError(f"--truth {truth}: {len(results)} results are given; the option is for a single one")
@@ -51,6 +53,21 @@ def logs_and_their_reports(pairs: Sequence[tuple[Path, Path]]) -> list[tuple[Pat
         for path, truth in pairs
         if saved_report(path) is not None and truth.resolve() in logs
     ]
+
+
+def _too_many(results: Sequence[Path], truths: Sequence[Path]) -> str:
+    """What to say where truth files stand among several results."""
+    logs = [path for path in results if saved_report(path) is None]
+    if len(results) == 2 and len(logs) == 1 and len(truths) == 1:
+        report = next(path for path in results if path not in logs)
+        return (
+            f"{logs[0]} and {report}: a log and a report are given with one truth; give the report to score it "
+            f"(mfhca evaluate {report} {truths[0]}), or the log to diagnose it first (mfhca evaluate {logs[0]} {truths[0]})"
+        )
+    return (
+        f"{truths[0]}: a truth may follow a single result, {len(results)} are given; leave it out where it lies beside its log, "
+        "or score one result after the other"
+    )
 
 
 def is_truth(path: Path) -> bool:

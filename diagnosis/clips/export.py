@@ -137,9 +137,9 @@ def _notes(mission: Mission, sources: Sequence[Source], contents: Contents, foun
             "beside the log's own; their headers keep the mission's."
         )
     if contents.log and len(sources) < len(mission.files):
-        notes.append(
-            f"Of {len(mission.files)} logs the messages of {len(sources)} were copied: only those of MCAP can be."
-        )
+        several = f"Of {len(mission.files)} logs the messages of {len(sources)} were copied"
+        only = several if len(mission.files) > 1 else "The log's messages were not copied"
+        notes.append(f"{only}: only those of MCAP can be.")
     return notes
 
 

@@ -40,7 +40,7 @@ class KnownFault:
     Attributes
     ----------
     wheel : int
-        Index.
+        Index among the driven wheels.
     side : Side
         Of the most probable hypothesis, where the finding leaves it open.
     finding : Finding
@@ -71,9 +71,9 @@ class Abducted:
         Wheel models behind the plant.
     plant : CoupledPlant
         The plant.
-    known : NDArray[np.bool_], shape (n, wheels)
+    known : NDArray[np.bool_], shape (n, driven wheels)
         Where the wheel's true speed is known, by a second measurement or a sensor that is not faulty.
-    faulty : NDArray[np.bool_], shape (n, wheels)
+    faulty : NDArray[np.bool_], shape (n, driven wheels)
         Where the diagnosis has a fault of the wheel.
     faults : tuple[KnownFault, ...]
         Of the wheels, by start.
@@ -91,7 +91,7 @@ class Abducted:
 
 
 def abduct(timeline: Timeline, replay: Replay, machine: Machine, found: ComponentResult, name: str) -> Abducted:
-    """Recorded world and plant of a diagnosed mission.
+    """Recorded world and plant of a diagnosed mission: of its driven wheels, which alone have commands.
 
     Parameters
     ----------
@@ -115,13 +115,14 @@ def abduct(timeline: Timeline, replay: Replay, machine: Machine, found: Componen
             "wheel in a machine file's [plant] (`mfhca fit`), or a mission that drives more"
         )
     faults = _faults(found, machine)
-    channels = wheel_channels(timeline, machine)
-    y = _read(channels.v, faults)
-    u = _filled(channels.u)
+    channels, driven = wheel_channels(timeline, machine), machine.driven_columns
+    v, true, applied = channels.v[:, driven], channels.true[:, driven], channels.applied[:, driven]
+    y = _read(v, faults)
+    u = _filled(channels.u[:, driven])
     let = {side: np.ones(y.shape) for side in (Side.SENSOR, Side.ACTUATOR)}
     held = {side: np.zeros(y.shape, np.bool_) for side in let}
     faulty = np.zeros(y.shape, np.bool_)
-    speed = np.array(channels.v)
+    speed = np.array(v)
     opening = np.array(u)
     for fault in faults:
         rows, i, f = slice(fault.finding.start, fault.finding.stop), fault.wheel, fault.finding
@@ -134,15 +135,15 @@ def abduct(timeline: Timeline, replay: Replay, machine: Machine, found: Componen
             stuck = 0.0 if f.sat is None else f.sat.mean
             rest = (1.0 - fault.let()) * stuck
             opening[rows, i] = fault.let() * u[rows, i] + _rest(
-                channels.applied[rows, i], fault.let() * u[rows, i], rest, timeline.dt
+                applied[rows, i], fault.let() * u[rows, i], rest, timeline.dt
             )
             held[fault.side][rows, i] = _held(u[:, i], stuck, f, _HELD_OPENING)
-    speed = np.where(channels.has_true, channels.true, speed)
+    speed = np.where(channels.has_true[driven], true, speed)
     ratio, turn = in_motion(measured_angle(timeline, machine), machine, timeline)
     coupled = bool(np.isfinite(ratio).all()) and machine.plant.coupling != "free"
     world = RecordedWorld(
         dt=timeline.dt,
-        v_ref=_filled(replay.v_ref),
+        v_ref=_filled(replay.v_ref[:, driven]),
         y=y,
         u=u,
         opening=np.clip(opening, -machine.control.u_max, machine.control.u_max),
@@ -151,8 +152,8 @@ def abduct(timeline: Timeline, replay: Replay, machine: Machine, found: Componen
         let_valve=let[Side.ACTUATOR],
         held_sensor=held[Side.SENSOR],
         held_valve=held[Side.ACTUATOR],
-        ratio=np.array(ratio) if coupled else np.ones(y.shape),
-        turn=without_nan(np.array(turn)),
+        ratio=np.array(ratio[:, driven]) if coupled else np.ones(y.shape),
+        turn=without_nan(np.array(turn[:, driven])),
         ground=_ground(found, machine, y.shape),
     )
     fit, plant = lightest(fits, world, machine, coupled=coupled)
@@ -169,15 +170,15 @@ def _check(timeline: Timeline, replay: Replay, machine: Machine, name: str) -> N
             f"{name}: faults were written into this recording, whose controller never met them; take the recording without them, or "
             "a simulated mission"
         )
-    if timeline.size * len(machine.wheels) > 4 * _MOST_SAMPLES:
-        most = 4 * _MOST_SAMPLES / len(machine.wheels) * timeline.dt
+    if timeline.size * len(machine.driven) > 4 * _MOST_SAMPLES:
+        most = 4 * _MOST_SAMPLES / len(machine.driven) * timeline.dt
         raise NotJudged(f"{name}: is longer than the {most:.0f} s that fit; choose a part with --start and --end")
     for leaf, words in (("u", "valve command"), ("v", "speed")):
-        logged = any_finite(stack(timeline, [f"wheel.{w}.{leaf}" for w in machine.wheels]))
+        logged = any_finite(stack(timeline, [f"wheel.{w}.{leaf}" for w in machine.driven]))
         if not logged.all():
-            wheel = machine.wheels[int(np.argmin(logged))]
+            wheel = machine.driven[int(np.argmin(logged))]
             raise NotJudged(f"{name}: wheel.{wheel}.{leaf} is not in the log; the {words} of every wheel is needed")
-    if not any_finite(replay.v_ref).all():
+    if not any_finite(replay.v_ref[:, machine.driven_columns]).all():
         raise NotJudged(
             f"{name}: the commanded speeds of the wheels are not known; log cmd.v and cmd.omega, or wheel.*.v_ref"
         )
@@ -186,8 +187,8 @@ def _check(timeline: Timeline, replay: Replay, machine: Machine, name: str) -> N
 def _faults(found: ComponentResult, machine: Machine) -> tuple[KnownFault, ...]:
     faults = []
     for (component, _), assessment in found.assessments.items():
-        if component in machine.wheels:
-            i = machine.wheels.index(component)
+        if component in machine.driven:
+            i = machine.driven.index(component)
             faults += [KnownFault(i, _side(f), f) for f in assessment.findings]
     return tuple(
         sorted({(f.wheel, f.side, f.finding.start): f for f in faults}.values(), key=lambda f: f.finding.start)
@@ -246,7 +247,7 @@ def _held(before: Array, value: float, finding: Finding, within: float) -> bool:
 def _ground(found: ComponentResult, machine: Machine, shape: tuple[int, ...]) -> Array:
     """Share of firm ground's hold under each wheel: less where the diagnosis has it slip."""
     ground = np.ones(shape)
-    for i, wheel in enumerate(machine.wheels):
+    for i, wheel in enumerate(machine.driven):
         for side in (Side.SENSOR, Side.ACTUATOR):
             assessment = found.assessments.get((wheel, side.value))
             if assessment is not None:
@@ -256,7 +257,11 @@ def _ground(found: ComponentResult, machine: Machine, shape: tuple[int, ...]) ->
 
 def _notes(machine: Machine, known: Flags, faulty: Flags, faults: tuple[KnownFault, ...], dt: float) -> list[str]:
     notes = []
-    for i, wheel in enumerate(machine.wheels):
+    if machine.unpowered:
+        notes.append(
+            f"{', '.join(machine.unpowered)}: without a drive, in no law's hands; what they weigh is in the load."
+        )
+    for i, wheel in enumerate(machine.driven):
         lost = float(np.count_nonzero(~known[:, i] & faulty[:, i])) * dt
         if lost > 0.0:
             notes.append(

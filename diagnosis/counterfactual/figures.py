@@ -71,7 +71,7 @@ def recoveries(abducted: Abducted, machine: Machine, shift: Array) -> list[Recov
     error = np.abs(world.speed + shift - world.v_ref)
     usual = _mean(np.abs(world.speed - world.v_ref), abducted.known & ~abducted.faulty) or 0.0
     limit = max(2.0 * usual, _LEAST_LIMIT)
-    return [_recovery(f, machine.wheels[f.wheel], error[:, f.wheel], limit, world.dt) for f in abducted.faults]
+    return [_recovery(f, machine.driven[f.wheel], error[:, f.wheel], limit, world.dt) for f in abducted.faults]
 
 
 def _recovery(fault: KnownFault, wheel: str, error: Array, limit: float, dt: float) -> RecoveryRow:

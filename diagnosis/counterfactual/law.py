@@ -58,7 +58,8 @@ def recorded_law(replay: Replay, machine: Machine, name: str) -> Law:
             '"printed", in a machine file'
         )
     values = {"lambda": law.lambda_, "beta": law.beta, "xi": law.xi, "zeta": law.zeta if law.psi == "forced" else 0.0}
-    psi0 = tuple(0.0 if p is None else p for p in replay.psi0) if law.psi == PRINTED else ()
+    own = [p for i, p in enumerate(replay.psi0) if i in machine.driven_columns] if law.psi == PRINTED else []
+    psi0 = tuple(0.0 if p is None else p for p in own)
     return Law("recorded", Controller("mfhca", values, law.law, law.lead), psi0)
 
 

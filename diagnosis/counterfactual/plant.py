@@ -67,7 +67,7 @@ def _map(plant: WheelPlant, u_max: float, *, beyond: bool) -> tuple[Array, Array
 
 
 def wheel_fits(timeline: Timeline, replay: Replay, machine: Machine, found: ComponentResult) -> list[WheelModelFit]:
-    """Wheel models that come into question: the diagnosis's, and where those were found in the mission, ones without the body."""
+    """Models of the driven wheels that come into question: the diagnosis's, and where those were found in the mission, ones without the body."""
     channels, angle = wheel_channels(timeline, machine), measured_angle(timeline, machine)
     fits = [found.wheel_model or wheel_fit(channels, replay, timeline, machine, angle)]
     if fits[0] is not None and fits[0].identified and machine.plant.coupling != "free":
@@ -76,7 +76,8 @@ def wheel_fits(timeline: Timeline, replay: Replay, machine: Machine, found: Comp
         fits.append(own)
         if own is not None:
             fits.append(replace(own, plants=tuple(None if p is None else replace(p, grip=None) for p in own.plants)))
-    return [f for f in fits if f is not None and all(p is not None for p in f.plants)]
+    driven = [replace(f, plants=tuple(f.plants[i] for i in machine.driven_columns)) for f in fits if f is not None]
+    return [f for f in driven if all(p is not None for p in f.plants)]
 
 
 def lightest(

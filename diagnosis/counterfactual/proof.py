@@ -32,14 +32,14 @@ def proof_of(abducted: Abducted, replay: Replay, machine: Machine) -> ProofTerms
         machine.control.xi,
         machine.control.beta,
     )
-    psi = np.nan_to_num(np.asarray(replay.psi))
+    psi = np.nan_to_num(np.asarray(replay.psi)[:, machine.driven_columns])
     return proof_terms(world.speed, world.v_ref, world.u, psi, world.let_valve, constants, world.dt)
 
 
 def proof_rows(terms: ProofTerms, machine: Machine, dt: float) -> list[ProofRow]:
     """Sizes of the terms, and where the bound does not hold, by wheel. `dt` in s."""
     rows: list[ProofRow] = []
-    for i, wheel in enumerate(machine.wheels):
+    for i, wheel in enumerate(machine.driven):
         known = np.isfinite(terms.rate[:, i]) & np.isfinite(terms.bound[:, i])
         rows.append(
             {

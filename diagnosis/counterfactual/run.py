@@ -158,7 +158,7 @@ def counterfactual(
         "duration_s": len(own.u) * abducted.world.dt,
         "rate_hz": 1.0 / abducted.world.dt,
         "known_s": {
-            w: float(np.count_nonzero(abducted.known[:, i])) * abducted.world.dt for i, w in enumerate(machine.wheels)
+            w: float(np.count_nonzero(abducted.known[:, i])) * abducted.world.dt for i, w in enumerate(machine.driven)
         },
         "faults": len(abducted.faults),
         "readings": [{"name": r.name, "value": r.value, "detail": r.detail} for r in replay.readings],
@@ -171,7 +171,7 @@ def counterfactual(
         "draws": request.draws,
         "notes": list(abducted.notes),
     }
-    return CounterfactualResult(document, abducted, machine.wheels, worlds, proof)
+    return CounterfactualResult(document, abducted, machine.driven, worlds, proof)
 
 
 def _world(
@@ -265,6 +265,6 @@ def _plant_rows(abducted: Abducted, machine: Machine) -> list[PlantRow]:
             "K_std": float(spread.K[i]),
             "tau_std": float(spread.tau[i]),
         }
-        for i, (wheel, plant) in enumerate(zip(machine.wheels, abducted.fit.plants, strict=True))
+        for i, (wheel, plant) in enumerate(zip(machine.driven, abducted.fit.plants, strict=True))
         if plant is not None
     ]

@@ -78,7 +78,9 @@ def by_the_gyro(
     if (several or one.view is None) and not one.data.unpowered:  # which closes no loop
         by_turns = several and not (turning is None and one.yaw is not None)
         ground = any(b.name != "odometry" for b in bodies)
-        sensor = replace(sensor, hidden=unseen(sought, which, several=by_turns, ground=ground))
+        sensor = replace(
+            sensor, hidden=unseen(sought, which, several=by_turns, ground=ground, gyro=one.yaw is not None)
+        )
     blocks = one.wheel.blocks.start
     width, where = int(blocks[1]) if blocks.size > 1 else 1, np.zeros(one.data.y.size, np.bool_)
     for x in sought.found:
@@ -122,7 +124,7 @@ def _named(wheels: Sequence[str]) -> str:
     return wheels[0] if len(wheels) == 1 else f"the mean of {', '.join(wheels[:-1])} and {wheels[-1]}"
 
 
-def unseen(sought: Sought, which: str = "", *, several: bool, ground: bool = False) -> str:
+def unseen(sought: Sought, which: str = "", *, several: bool, ground: bool = False, gyro: bool = False) -> str:
     """What does not show of an encoder that closes its drive's loop, a sentence.
 
     Parameters
@@ -135,6 +137,8 @@ def unseen(sought: Sought, which: str = "", *, several: bool, ground: bool = Fal
         Whether there are several drives, whose difference may turn the machine, without a yaw rate that says otherwise.
     ground : bool
         Whether a speed over ground is in the log, and does not show it.
+    gyro : bool
+        Whether a yaw rate is in the log, and does not show it.
     """
     of = f"A factor on an encoder{which} that closes its own drive's speed loop"
     if np.isfinite(sought.smallest):
@@ -145,5 +149,6 @@ def unseen(sought: Sought, which: str = "", *, several: bool, ground: bool = Fal
         )
     count = "let each {wheel} make ten turns by its encoder, and count them"
     does = count if ground else "log a speed over ground (gnss.speed)"
-    does = "log a yaw rate (imu.yaw_rate) with turns both ways" if several else does
+    by_turns = "record a longer drive with turns both ways, as the yaw rate of this one does not settle it"
+    does = (by_turns if gyro else "log a yaw rate (imu.yaw_rate) with turns both ways") if several else does
     return f"{of} would not show in this log, and is not assessed: {does}."

@@ -12,6 +12,8 @@ from replay.export.clips.viewer_layouts import COLOURS, stacked
 
 _TITLE = "mfhca diagnosis"
 _SHOWN = ("level", "epsilon", "p")
+# Between which each is drawn: a constant one has no range of its own; what gives more than it should has an ε below 0.
+_LIMITS = {"level": (-0.1, 3.1), "epsilon": (-0.5, 1.05), "p": (-0.05, 1.05)}
 
 
 def foxglove_diagnosis(parts: Sequence[str]) -> str:
@@ -78,6 +80,8 @@ def plotjuggler_diagnosis(hardware_id: str, parts: Mapping[str, Collection[str]]
                 continue
             name = "/".join(filter(None, (DIAGNOSTICS, hardware_id, part, key)))
             ElementTree.SubElement(drawn, "curve", name=name, color=COLOURS[k % len(COLOURS)])
+        low, high = _LIMITS[key]
+        ElementTree.SubElement(drawn, "limitY", min=f"{low:g}", max=f"{high:g}")
     ElementTree.SubElement(window, "currentTabIndex", index="0")
     ElementTree.indent(root, " ")
     return "<?xml version='1.0' encoding='UTF-8'?>\n" + ElementTree.tostring(root, encoding="unicode") + "\n"

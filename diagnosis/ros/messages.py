@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from diagnosis.report.confidence import headline
 from diagnosis.results.document import IntervalRow, ReportDocument
+from diagnosis.results.ending import Ending, ending_of
 from diagnosis.results.machine_words import words_of
 from diagnosis.results.vocabulary import Verdict
 from diagnosis.ros.statuses import Level, Status, courses, fault_name, level_of
@@ -96,8 +97,7 @@ def events(report: ReportDocument) -> list[tuple[int, bytes]]:
         part = fault_name(fault, words_of(report["machine"]))
         begin, end = fault["start_ns"], fault["stop_ns"]
         found.append((begin, 2, _event(begin, level_of(fault["severity"]), part, _begins(fault, part))))
-        lasted = fault["stop_s"] - fault["start_s"]
-        found.append((end, 1, _event(end, Level.OK, part, f"{fault['id']} ends: {part}, after {lasted:.2f} s")))
+        found.append((end, 1, _event(end, *_ends(fault, part, report))))
     return [(ns, octets) for ns, _, octets in sorted(found, key=lambda e: e[:2])]
 
 
@@ -106,6 +106,18 @@ def _begins(fault: IntervalRow, part: str) -> str:
     size = [] if epsilon is None else [f"ε {epsilon['value']:.2f} ({epsilon['low']:.2f}–{epsilon['high']:.2f})"]
     facts = ", ".join([*size, f"p {fault['probability']:.3f}", f"severity {fault['severity']}"])
     return " ".join([f"{fault['id']} begins: {part}, {facts}.", *fault["evidence"]])
+
+
+def _ends(fault: IntervalRow, part: str, report: ReportDocument) -> tuple[Level, str, str]:
+    """Level, part and words of the event at a fault's last moment; one that was not seen to end keeps its level."""
+    after = f"after {fault['stop_s'] - fault['start_s']:.2f} s"
+    ending = ending_of(fault, report)
+    if ending is Ending.ENDED:
+        return Level.OK, part, f"{fault['id']} ends: {part}, {after}"
+    level = level_of(fault["severity"])
+    if ending is Ending.LASTS:
+        return level, part, f"{fault['id']} {Ending.LASTS}: {part}, {after}"
+    return level, part, f"{fault['id']} was last seen, not seen to end: {part}, {after}"
 
 
 def _event(ns: int, level: Level, name: str, words: str) -> bytes:

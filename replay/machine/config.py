@@ -275,6 +275,11 @@ class Machine:
         return tuple(w for w in self.wheels if w not in self.unpowered)
 
     @property
+    def driven_columns(self) -> list[int]:
+        """Places of `driven` among `wheels`."""
+        return [i for i, w in enumerate(self.wheels) if w not in self.unpowered]
+
+    @property
     def axles(self) -> tuple[str, ...]:
         """Steered axles; empty without geometry."""
         return () if self.geometry is None else self.geometry.axles

@@ -15,6 +15,7 @@ UNITS: dict[str, tuple[Quantity, float]] = {
     "mm/s": ("speed", 1e-3),
     "cm/s": ("speed", 1e-2),
     "km/h": ("speed", 1 / 3.6),
+    "kn": ("speed", 1852 / 3600),
     "rad/s": ("rotation", 1.0),
     "deg/s": ("rotation", math.pi / 180),
     "rpm": ("rotation", 2 * math.pi / 60),

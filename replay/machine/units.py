@@ -22,6 +22,7 @@ _SPELLINGS = {
     "rad/s": "rad/sec rads/s radian/s radians/s rad.s-1 rad*s^-1",
     "m/s": "m/sec mps m.s-1 m*s^-1 meter/s meters/s mètre/s",
     "km/h": "kph kmh kmph km/std",
+    "kn": "kt kts knot knots knoten nœud nœuds",
     "m": "meter meters metre metres mètre mètres",
     "%": "percent prozent proz proz. pct pourcent",
     "1": "- ratio",

@@ -14,7 +14,7 @@ from replay.log.formats import LOG_FORMATS, LogFormatRow
 from replay.log.raw_log import Clock, LogSummary, RawLog, Window
 from replay.log.source_options import SourceOptions
 from replay.readers.common.border import Bordered
-from replay.readers.common.mistaken import lfs_pointer, mistaken
+from replay.readers.common.mistaken import mistaken, pointer
 from replay.readers.common.protocol import Reader
 
 _BLOCK, _FEW = 1 << 24, 16  # bytes that are looked at, at most, and fewer than which tell nothing
@@ -53,12 +53,13 @@ def open_log(path: Path) -> Reader:
     """
     try:
         if not path.exists():
-            raise LogError(f"{path} does not exist; expected a log file or a rosbag2 folder")
+            gone = pointer(path) if path.is_symlink() else ""
+            raise LogError(gone or f"{path} does not exist; expected a log file or a rosbag2 folder")
         if path.is_file() and path.stat().st_size == 0:
             raise LogError(f"{path} is empty (0 bytes); the recording was not written, copy or record it again")
         check_regular(path)
-        if pointer := lfs_pointer(path):
-            raise LogError(pointer)
+        if points := pointer(path):
+            raise LogError(points)
         for reader in readers():
             if reader.matches(path):
                 return reader

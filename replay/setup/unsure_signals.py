@@ -19,6 +19,7 @@ _QUESTIONS = {
     Open.SECOND: "are {names} second sensors of what {beside} and the like measure? They are taken so: what both say is believed.",
     Open.YAW_RATE: "is {names} the yaw rate of the machine, in {turns}? It is taken so.",
     Open.PLACE: "are {names} places by a satellite receiver, in degrees? They are taken so.",
+    Open.GROUND: "is {names} the speed over ground by a satellite receiver, in {speeds}? It is taken so.",
     Open.ANGLE: "are {names} steering angles, in {angles}? They are taken so.",
     Open.DRIVERS: "is {names} the angle of the wheel that the driver turns, as its name says? Then it is geared to the axle's, and it is not taken.",
     Open.OPENING: "are {names} what valves or pumps are told, or where they stand (1 is fully open)? They are taken so.",
@@ -63,6 +64,7 @@ def unsure_signals(
                     unit=" in rad" if bare else "",
                     turns=unit or "rad/s",
                     angles=unit,
+                    speeds=unit or "m/s",
                 ),
             )
     return {one.signal: one.origin for kind, ones in kinds.items() if kind is not Open.DRIVERS for one in ones}

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 
 from replay.machine.config import Machine
 from replay.machine.geometry import own_axle
-from replay.signals.name_words import tokens
+from replay.signals.name_words import apart, tokens
 from replay.signals.named_units import bare_name
 
 _LONG = {
@@ -55,6 +55,7 @@ _INDEX = re.compile(r"\[(\d+)\]|(?<=[A-Za-z_])[ #-]?(\d+)(?![\d.,/])")
 def position(name: str) -> tuple[str | None, str | None]:
     """Return front or rear, and left or right, as far as a name says."""
     along = across = None
+    name = apart(name)
     loose = _LOOSE.findall(name.lower())
     words = tokens(name)
     for token in words:
@@ -91,6 +92,14 @@ def is_place(word: str) -> bool:
     return word in _LONG or word in _PAIRS
 
 
+def without_place(name: str) -> str:
+    """The name without the places at its end: of ``wheel_rpm_FL`` and ``speed_kmh_front_left`` wheel_rpm and speed_kmh."""
+    parts = re.split(r"([_ .-]+)", name)
+    while len(parts) > 2 and (is_place(parts[-1].lower()) or parts[-1].lower() in ("l", "r")):
+        parts = parts[:-2]
+    return "".join(parts)
+
+
 def is_steering(name: str) -> bool:
     """Whether a name speaks of steering, or of an angle of an axle."""
     if re.search(r"cast[eo]r", name.lower()):  # swivels by itself
@@ -116,7 +125,7 @@ def speaks_of_no_wheel(name: str) -> bool:
 def side_of(name: str) -> str | None:
     """Left or right of a name that says nothing of front and rear; None where it says more, or neither."""
     along, across = position(name)
-    if along is None and across is None and "r" in _LOOSE.findall(name.lower()):
+    if along is None and across is None and "r" in _LOOSE.findall(apart(name).lower()):
         across = "right"
     return across if along is None else None
 

@@ -14,6 +14,15 @@ _JOINED = re.compile(
     r"(?i)(front|rear|back|middle|mid|vorne|vorn|hinten|left|right|links|rechts|voor|achter|etu|taka)"
     r"(?=left|right|links|rechts|front|rear|back|wheel|rad|voor|achter|wiel|vasen|oikea|pyora|pyoera)"
 )
+# A place in capitals and what is of it, written as one: Rspeed, LSpeed, FLcmd.
+_OF_A_PLACE = (
+    "speed", "spd", "vel", "velocity", "velo", "rpm", "enc", "encoder", "tick", "count", "wheel", "motor", "pos", "position", "torque",
+    "trq", "current", "cmd", "command", "ref", "target", "actual", "act", "set", "meas", "steer", "angle", "valve", "pwm", "duty", "volt",
+)  # fmt: skip
+_CAPITAL_PLACE = re.compile(
+    r"(?<![A-Za-z])([LR]|[FRBVHM][LR]|[LR][FRBM])"
+    rf"(?=(?:{'|'.join(f'[{w[0].upper()}{w[0]}]{w[1:]}' for w in _OF_A_PLACE)})s?(?![a-z]))"
+)
 _UMLAUTS = str.maketrans(
     {
         "ä": "ae",
@@ -95,6 +104,11 @@ def folded(text: str) -> str:
     return "".join(c for c in plain if not unicodedata.combining(c))
 
 
+def apart(name: str) -> str:
+    """The name with a place in capitals parted from what is of it: ``Rspeed``: R_speed."""
+    return _CAPITAL_PLACE.sub(r"\1_", name)
+
+
 def tokens(name: str) -> list[str]:
     """Lower-case words of a name, split at other characters, at digits, before capitals and within German compounds."""
     return [*_tokens(name)]
@@ -102,7 +116,7 @@ def tokens(name: str) -> list[str]:
 
 @lru_cache(4096)
 def _tokens(name: str) -> tuple[str, ...]:
-    parted = _JOINED.sub(r"\1_", _PREFIX.sub("", folded(name)))
+    parted = _JOINED.sub(r"\1_", _PREFIX.sub("", apart(folded(name))))
     found = [t.lower() for t in re.findall(r"[A-Z]{1,}(?![a-z])|[A-Z]?[a-z]+|\d+", parted)]
     return tuple(part for word in found for part in _parted(word))
 

@@ -37,6 +37,19 @@ def bare_name(name: str) -> tuple[str, str]:
     return name, ""
 
 
+def unit_by_word(name: str, bare: str) -> str:
+    """Unit that the last words of a name state, else those before a place at its end; empty where neither does.
+
+    Parameters
+    ----------
+    name : str
+        As recorded: ``wheel_rpm_FL``.
+    bare : str
+        Without places at its end, of which the whole may be a unit: ``wheel_rpm``, or ``RPM`` of ``RPM_FL``.
+    """
+    return unit_by_end(name) or ("" if bare == name else unit_by_end(f"of_{bare}"))
+
+
 def unit_by_end(name: str, doubtful: bool = False) -> str:
     """Unit that the last words of a name state (``n_ist_VR_rpm``), empty where they state none.
 

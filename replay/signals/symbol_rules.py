@@ -12,9 +12,9 @@ from replay.machine.quantities import UNITS
 from replay.machine.signal_table import CANONICAL, Scope
 from replay.machine.units import known_unit
 from replay.signals.candidate import Candidate, source_of
-from replay.signals.name_parts import axle_of, index_of, is_drive, is_place, is_steering, wheel_of
+from replay.signals.name_parts import axle_of, index_of, is_drive, is_place, is_steering, wheel_of, without_place
 from replay.signals.name_words import ASKING, MEASURED, english, role, tokens
-from replay.signals.named_units import bare_name, unit_by_end
+from replay.signals.named_units import bare_name, unit_by_word
 
 _EFFORT_UNITS = (("A", r"current|(^|_)amp"), ("V", r"volt"), ("%", r"duty|pwm"))
 # Fields of messages that are no measured values.
@@ -94,7 +94,8 @@ def by_symbol(channel: Channel, machine: Machine, first: Mapping[str, int]) -> I
     said = _said(channel, machine)
     if said is None:
         return
-    yield from _by_word(channel, said.text, said.parts[-1], said.unit, len(machine.wheels) > 1)
+    if wheel_of(said.bare, machine) is None:  # R_speed_cmd is of the right wheel alone
+        yield from _by_word(channel, said.text, said.parts[-1], said.unit, len(machine.wheels) > 1)
     leaf = _leaf(said)
     if leaf is None:
         return
@@ -169,7 +170,7 @@ def _said(channel: Channel, machine: Machine) -> _Said | None:
     asked = role([*last, *(w for part in parts if {*part} <= ASKING | {"st"} for w in part), *(topic & ASKING)])
     valve = _VALVE.search("_".join(last)) or (_VALVE.search(text) and not re.search(r"motor|drive", text))
     return _Said(
-        name, bare, _stated_unit(channel, stated) or unit_by_end(name), parts, text, last,
+        name, bare, _stated_unit(channel, stated) or unit_by_word(name, without_place(name)), parts, text, last,
         asked or ("act" if topic & _STATES else ""), is_steering(bare), valve is not None,
     )  # fmt: skip
 
@@ -270,7 +271,8 @@ def _by_word(channel: Channel, text: str, last: Sequence[str], unit: str, turns_
     if signal == "gnss.speed" and (ASKING & {*last} or any(_NO_SIGNAL.search(w) for w in text.split("_"))):
         return
     asks, named = role(last), True
-    turns = "yaw_rate" in last or ({*last} - MEASURED == {"yaw", "rate"} and not re.search(r"odom|est", text))
+    turning = {*last} - MEASURED - {*tokens(unit)}  # yaw_rate_deg_s
+    turns = "yaw_rate" in last or (turning == {"yaw", "rate"} and not re.search(r"odom|est", text))
     turns |= asks == "ref" and _is_yaw_rate(last, unit, turns_alone)
     if turns and asks != "both":
         named = signal is not None or asks == "ref"

@@ -31,6 +31,9 @@ _RADIANS, _TURN_DEG = 1.6, 90.0  # a steering angle at most
 _FULL, _LEAST = 1.1, 0.05  # of full opening: at most, with some noise, and what it reaches
 _LIKE = 0.8  # correlation of a valve's position with its command
 _PLACES = (frozenset(("pos",)), frozenset(("position",)))
+_TOLD = frozenset(("cmd", "command", "ctrl", "control", "y"))  # y: what a controller puts out
+_OVER_GROUND = frozenset(("sog",))
+_KNOTS = frozenset(("kn", "kt", "kts", "knots"))
 #: Letters of a drive's and of a steering valve, as in the control law's u_a and u_s, and what stands before a position.
 _VALVES = {"u": (frozenset(("ua",)), frozenset(("us",))), "u_applied": (frozenset(("apos",)), frozenset(("spos",)))}
 
@@ -56,6 +59,17 @@ def places(channels: Mapping[str, Channel]) -> Iterator[tuple[str, str]]:
     if len(lat) == 1 and len(lon) == 1:
         yield "gnss.lat", lat[0]
         yield "gnss.lon", lon[0]
+
+
+def over_ground(channels: Mapping[str, Channel]) -> Iterator[tuple[str, str, str]]:
+    """Yield signal, name and unit, which may be empty, of columns that may be the speed over ground: ``SOG``, ``gps_sog_kn``."""
+    for name, channel in channels.items():
+        words, unit = _words(channel)
+        knots = _KNOTS & words
+        unit = unit or ("kn" if knots else "")
+        own = words - knots - _RECEIVER - {"gps", "gnss"}
+        if own == _OVER_GROUND and (known_unit(unit) is None or UNITS[known_unit(unit) or ""][0] == "speed"):
+            yield "gnss.speed", name, unit
 
 
 def angles(channels: Mapping[str, Channel], machine: Machine) -> Iterator[tuple[str, str, str, bool]]:
@@ -88,7 +102,8 @@ def openings(
 ) -> Iterator[tuple[str, str, str]]:
     """Yield signal, name and unit of columns that may be openings by what stands beside them.
 
-    ``pos_FL`` goes as the command ``u_FL`` of the same wheel does; ``us_rear`` and ``spos_rear`` are of an axle whose angle is there.
+    ``pos_FL`` goes as the command ``u_FL`` of the same wheel does; ``us_rear`` and ``spos_rear`` are of an axle whose angle is there;
+    ``cmd_FL``, ``ctrl_FL`` and ``y_VL`` stay within a full opening, where the wheels' commanded speeds are other channels.
 
     Parameters
     ----------
@@ -100,6 +115,7 @@ def openings(
         Labels of channels that are taken by their names, by canonical signal.
     """
     steered = {s.split(".")[1] for s in named if s.startswith("steer.") and s.endswith(".phi")}
+    speeds = "cmd.v" in named or any(s.startswith("wheel.") and s.endswith(".v_ref") for s in named)
     for name, channel in channels.items():
         words, unit = _words(channel)
         opened = _unit(channel, unit)
@@ -111,6 +127,8 @@ def openings(
                 yield f"steer.{axle}.{leaf}", name, opened
             elif words == of_drive and wheel is not None:
                 yield f"wheel.{wheel}.{leaf}", name, opened
+        if speeds and wheel is not None and len(words) == 1 and words <= _TOLD and not is_steering(name):
+            yield f"wheel.{wheel}.u", name, opened
         if words in _PLACES and wheel is not None and (label := named.get(f"wheel.{wheel}.u")) is not None:
             command = channels.get(label)
             if command is not None and _alike(channel, command):

@@ -21,6 +21,7 @@ class Open(StrEnum):
     OPENING = "opening"
     YAW_RATE = "yaw rate"
     PLACE = "place"
+    GROUND = "over ground"
     ANGLE = "angle"
     DRIVERS = "drivers"
 
@@ -62,6 +63,7 @@ _REASONS = {
     Open.SECOND: "may be a second sensor beside {beside!r}; if it is",
     Open.YAW_RATE: "may be the yaw rate, which its name does not say of all its axes; if it is, with its unit (rad/s, deg/s)",
     Open.PLACE: "may be a place by a satellite receiver; if it is, in degrees",
+    Open.GROUND: "may be the speed over ground by a satellite receiver; if it is, with its unit (m/s, km/h, kn)",
     Open.ANGLE: "may be a steering angle; if it is, and in {unit}",
     Open.DRIVERS: "is the wheel that the driver turns, by its name, which is geared to the axle; if it is the axle's own angle, and in {unit}",
     Open.OPENING: "may be what a valve or pump is told, or where it stands (1 is fully open); if it is",
@@ -70,5 +72,7 @@ _REASONS = {
 
 def _as_written(found: Unsure) -> SignalSource:
     """The origin with what stands in for what is open."""
-    unit = {Open.COUNTS: "rad", Open.SPEED: found.origin.unit or "…"}.get(found.kind, found.origin.unit)
+    unit = {Open.COUNTS: "rad", Open.SPEED: found.origin.unit or "…", Open.GROUND: found.origin.unit or "…"}.get(
+        found.kind, found.origin.unit
+    )
     return replace(found.origin, unit=unit)

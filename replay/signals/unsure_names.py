@@ -32,7 +32,7 @@ from replay.signals.named_units import bare_name, unit_by_end
 from replay.signals.rules import MESSAGE_TYPES, candidates
 from replay.signals.second_ones import number_of, seconds
 from replay.signals.symbol_rules import valve_current
-from replay.signals.unsure_body import angles, openings, places, turns
+from replay.signals.unsure_body import angles, openings, over_ground, places, turns
 from replay.signals.unsure_kinds import Open, Unsure
 from replay.signals.unsure_openings import unsure_opening
 
@@ -103,6 +103,9 @@ def _beside_others(
     free = {name: c for name, c in columns.items() if name not in sure}
     for signal, name, unit in turns(free):
         yield Unsure(signal, source_of(free[name], unit), Open.YAW_RATE)
+    for signal, name, unit in over_ground(free):
+        if signal not in named:
+            yield Unsure(signal, source_of(free[name], unit), Open.GROUND)
     for signal, name in places(free):
         yield Unsure(signal, source_of(free[name], "deg"), Open.PLACE)
     every = {**free, **fields}

@@ -14,6 +14,7 @@ from diagnosis.audit.fleet.document_rows import bounds_row, mission_row, rounded
 from diagnosis.audit.fleet.fault_types import FleetFaultRow, Status
 from diagnosis.audit.fleet.fleet_fault import FleetFault
 from diagnosis.audit.fleet.fleet_types import SCHEMA, CountsRow, FleetDocument, MachineRow, PartRow
+from diagnosis.audit.fleet.leave import lists_of
 from diagnosis.audit.fleet.machines import Machine
 from diagnosis.audit.fleet.news import news, since_runs
 from diagnosis.audit.fleet.read import Mission
@@ -22,7 +23,7 @@ from diagnosis.audit.fleet.trend_types import Axis
 from diagnosis.audit.fleet.trends import PartTrend, fast_losses, trends_of, untold_losses
 from diagnosis.audit.store.outcome import ENDS, READ
 from diagnosis.results.candidates import UNCLEAR
-from diagnosis.results.vocabulary import Verdict
+from diagnosis.results.vocabulary import Leave, Verdict
 from replay.version import __version__
 
 _STATUSES: tuple[Status, ...] = ("new", "recurring", "once", "past", "repaired")
@@ -107,7 +108,7 @@ def fleet_document(fleet: Fleet, baseline: BaselineRow | None = None) -> FleetDo
     status, tag, title = words.headline(fleet.machines, len(fleet.unknown), lost)
     counts = _counts(fleet, first)
     unread = sum(m.result is not None and m.result.state not in READ for m in fleet.missions)
-    return {
+    document: FleetDocument = {
         "schema": SCHEMA,
         "version": __version__,
         "axis": fleet.axis,
@@ -150,6 +151,10 @@ def fleet_document(fleet: Fleet, baseline: BaselineRow | None = None) -> FleetDo
         ],
         "baseline": baseline,
     }
+    for left in lists_of(document):  # what of earlier missions is open counts too
+        machine = document["machines"][left.machine]
+        machine["leave"], machine["cleared"] = left.leave, left.leave is Leave.MAY
+    return document
 
 
 def _counts(fleet: Fleet, first: Mapping[int, str]) -> CountsRow:
@@ -195,7 +200,7 @@ def _machine(m: Machine, at: Mapping[str, int]) -> MachineRow:
         "standing": words.standing(m),
         "last_verdict": m.last_verdict,
         "last_judged_ns": m.last_judged.result.start_ns if m.last_judged else None,
-        "cleared": m.cleared,
+        "last_cleared": m.cleared,
         "not_cleared": m.not_cleared,
         "open_points": list(m.limits.open_points),
         "suspicions": [

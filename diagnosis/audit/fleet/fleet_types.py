@@ -14,7 +14,7 @@ from diagnosis.audit.fleet.baseline_types import BaselineRow
 from diagnosis.audit.fleet.fault_types import FleetFaultRow, MissionFaultRow
 from diagnosis.audit.fleet.trend_types import Axis, TrendRow
 from diagnosis.audit.store.outcome import MissionState
-from diagnosis.results.vocabulary import Verdict
+from diagnosis.results.vocabulary import Leave, Verdict
 from diagnosis.results.words_row import Worded
 
 SCHEMA = "mfhca-fleet/1"
@@ -126,8 +126,12 @@ class MachineRow(Worded):
         Of its last judged mission.
     last_judged_ns : int or None
         Start of that mission.
-    cleared : bool or None
-        Whether that mission's report lets it go out, and that of each which may be later; null: not said.
+    leave : Leave
+        Whether it may go out: by its reports, and by what of earlier missions is open.
+    cleared : bool
+        Whether `leave` is *may go out*.
+    last_cleared : bool or None
+        Whether the report of its last judged mission alone lets it go out, and that of each which may be later; null: not said.
     not_cleared : str
         Why that report does not let it go out; empty where it does, or is not of faults to watch.
     open_points : list[str]
@@ -161,7 +165,9 @@ class MachineRow(Worded):
     standing: str
     last_verdict: Verdict
     last_judged_ns: int | None
-    cleared: bool | None
+    leave: NotRequired[Leave]
+    cleared: NotRequired[bool]
+    last_cleared: bool | None
     not_cleared: NotRequired[str]
     open_points: NotRequired[list[str]]
     suspicions: NotRequired[list[SuspicionRow]]

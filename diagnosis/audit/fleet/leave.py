@@ -89,8 +89,8 @@ def lists_of(document: FleetDocument) -> tuple[Left, ...]:
     for k, m in enumerate(document["machines"]):
         untold = [t for t in beyond[k] if _is_untold(t, every[k], document["missions"])]
         lost = any(is_lost(t["points"][-1][3], t["limit"]) for t in untold)
-        leave = leave_of(m["verdict"], m["cleared"], m["unjudged"], lost=lost or bool(fast[k]))
-        otherwise = leave_of(m["verdict"], m["cleared"], m["unjudged"], lost=lost)  # but for what grows
+        leave = leave_of(m["verdict"], m["last_cleared"], m["unjudged"], lost=lost or bool(fast[k]))
+        otherwise = leave_of(m["verdict"], m["last_cleared"], m["unjudged"], lost=lost)  # but for what grows
         place, reason = _why(otherwise, m, standing[k], document["missions"], rising[k])
         reason += _repaired(every[k], m) if leave is Leave.MAY else ""
         reason = _with_growth(otherwise, m, _with_losses(leave, m, reason, untold), fast[k], untold)
@@ -142,7 +142,12 @@ def _with_losses(leave: Leave, m: MachineRow, reason: str, untold: Sequence[Tren
             f"{part} lost {100 * value:.0f} % over the whole of its last mission, beyond the limit of {100 * t['limit']:.0f} %{bounds}"
         )
     losses = "; ".join(said)
-    if leave is Leave.CHECK and m["verdict"] in (Verdict.READY, Verdict.WATCH) and not m["unjudged"] and m["cleared"]:
+    if (
+        leave is Leave.CHECK
+        and m["verdict"] in (Verdict.READY, Verdict.WATCH)
+        and not m["unjudged"]
+        and m["last_cleared"]
+    ):
         return f"{losses}, though no fault was stated in it: check the part"
     return f"{reason}; {losses}"
 

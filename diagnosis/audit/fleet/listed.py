@@ -82,7 +82,11 @@ def machine_words(
     """
     if m["verdict"] == Verdict.READY and leave is not Leave.MAY:
         return f"Ready by its last report, but a loss {'grows fast' if halving else 'is beyond its limit'}"
-    if halving and m["verdict"] == Verdict.WATCH and leave_of(m["verdict"], m["cleared"], m["unjudged"]) is Leave.MAY:
+    if (
+        halving
+        and m["verdict"] == Verdict.WATCH
+        and leave_of(m["verdict"], m["last_cleared"], m["unjudged"]) is Leave.MAY
+    ):
         return FAST_GROWTH
     if m["verdict"] == Verdict.READY and standing:
         often = any(f["status"] == "recurring" for f in standing)

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import os
 import re
 import zipfile
 from pathlib import Path
 
 _POINTER = b"version https://git-lfs.github.com/spec/"
+# What git-annex leaves in place of a file's content, in a file that is unlocked or as the end of a link.
+_ANNEX = re.compile(rb"(?:[^\s]*/)?annex/objects/(?:[^\s/]+/)*([A-Z0-9_]+(?:-[sSmC]\d+)*--[^\s/]+)\s*\Z")
+_ANNEX_SIZE = re.compile(r"-s(\d+)(?=-)")
 _MOST_POINTER = 1024
 _HEAD = 512
 _NAMED = 5
@@ -26,8 +30,10 @@ _KINDS = (
 )
 
 
-def lfs_pointer(path: Path) -> str:
-    """Sentence on a git-LFS pointer that stands where a log belongs, in a recording's folder too; else empty.
+def pointer(path: Path) -> str:
+    """Sentence on a pointer of git-LFS or git-annex that stands where a log belongs, in a recording's folder too; else empty.
+
+    git-annex leaves a file with the path of the content, or a link to it that leads nowhere.
 
     Parameters
     ----------
@@ -35,19 +41,33 @@ def lfs_pointer(path: Path) -> str:
         File or folder.
     """
     if path.is_dir():
-        return next((found for child in sorted(path.iterdir()) if child.is_file() and (found := _pointer(child))), "")
+        return next(
+            (found for child in sorted(path.iterdir()) if not child.is_dir() and (found := _pointer(child))), ""
+        )
     return _pointer(path)
 
 
 def _pointer(path: Path) -> str:
-    if path.stat().st_size > _MOST_POINTER:
+    if path.is_symlink() and not path.exists():
+        return _annexed(path, os.fsencode(path.readlink()))
+    if not path.is_file() or path.stat().st_size > _MOST_POINTER:
         return ""
     text = path.read_bytes()
     if not text.startswith(_POINTER):
-        return ""
+        return _annexed(path, text)
     size = re.search(rb"^size (\d+)", text, re.MULTILINE)
     whole = f", which has {int(size[1])} bytes" if size else ""
     return f"{path} is a git-LFS pointer, not the log itself{whole}; fetch the log with `git lfs pull`"
+
+
+def _annexed(path: Path, text: bytes) -> str:
+    """Sentence on the text of a git-annex pointer; else empty."""
+    found = _ANNEX.match(text)
+    if found is None:
+        return ""
+    size = _ANNEX_SIZE.search(found[1].decode("utf-8", "replace").partition("--")[0] + "-")
+    whole = f", which has {int(size[1])} bytes" if size else ""
+    return f"{path} is a git-annex pointer, not the log itself{whole}; fetch the log with `git annex get {path.name}`"
 
 
 def mistaken(path: Path) -> str:

@@ -6,6 +6,7 @@ import json
 from collections.abc import Sequence
 from pathlib import Path
 
+import pandas as pd
 import pyarrow.parquet as pq
 import pytest
 
@@ -123,3 +124,27 @@ def test_a_controller_in_the_simulator(tmp_path: Path, capsys: pytest.CaptureFix
     ):
         assert run([*words, "--force", *more]) == 2
         assert sentence in capsys.readouterr().err.replace("\n", " ")
+
+
+def test_wheels_without_a_drive_are_in_no_law_s_hands(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    log = tmp_path / "m.csv"
+    assert run([*SIMULATE, "-o", str(log), "--fault", "FR sensor stuck 20 22"]) == 0
+    table = pd.read_csv(log)
+    free = [c for c in table if c.startswith(("wheel.RR.", "wheel.RL.")) and not c.endswith((".v", ".v_true"))]
+    table.drop(columns=free).to_csv(tmp_path / "free.csv", index=False)
+    file = tmp_path / "free.toml"
+    file.write_text(
+        '[machine]\nwheels = ["FR", "FL", "RR", "RL"]\nunpowered = ["RR", "RL"]\n[geometry]\nwheelbase = 2.1\n'
+        "joint_spacing = 1.46\nwheel_offset = 0.2\nwheel_diameter = 0.854\nmax_speed = 0.36\n",
+        encoding="utf-8",
+    )
+    words = ["-m", str(file), "--controller", "p", "--draws", "2", "-o", str(tmp_path / "out")]
+    assert run(["counterfactual", str(tmp_path / "free.csv"), *words]) == 0
+    assert "RR, RL: without a drive" in " ".join(capsys.readouterr().out.split())
+    document = json.loads((tmp_path / "out" / "counterfactual.json").read_text("utf-8"))
+    assert list(document["known_s"]) == [row["wheel"] for row in document["plant"]] == ["FR", "FL"]
+    own = document["self_replay"]
+    assert own["error_replayed"] == pytest.approx(own["error_recorded"], rel=0.02)
+    names = pq.read_table(tmp_path / "out" / "counterfactual.parquet").column_names
+    assert "p.FR.v" in names
+    assert not any(".RR." in name for name in names)

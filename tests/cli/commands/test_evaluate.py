@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from pathlib import Path
 from typing import Any
 
@@ -197,3 +198,18 @@ def test_what_cannot_be_evaluated_is_one_line(
         assert seen.err.startswith("error: ")
         assert seen.err.count("\n") == 1
         assert words in seen.err
+
+
+def test_a_log_and_a_report_with_one_truth_are_said_to_be_both_given(
+    made: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    log, report, truth = made / "drive.mcap", made / "monday", made / "drive.truth.json"
+    for results in ([log, report], [report, log]):
+        assert run(["evaluate", *map(str, results), str(truth)]) == 2
+        said = " ".join(capsys.readouterr().err.split())
+        assert "a log and a report are given with one truth; give the report to score it" in said
+        assert f"mfhca evaluate {report} {truth}" in said.replace("\n", "")
+    other = tmp_path / "other"
+    shutil.copytree(report, other)
+    assert run(["evaluate", str(report), str(other), str(truth)]) == 2
+    assert "a truth may follow a single result, 2 are given" in " ".join(capsys.readouterr().err.split())

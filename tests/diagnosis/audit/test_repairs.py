@@ -424,3 +424,15 @@ def test_parts_that_were_judged_since_a_repair_are_not_said_to_be_unjudged(
     repair(tmp_path, "HX-1 FR sensor", 2.5)
     since = f"FR speed sensor not found by 1 mission since the repair on {utc_moment(at(2.5))}"
     assert standing(tmp_path)[:2] == ("not_assessed", f"{since}, {words}")
+
+
+def test_a_machine_with_an_open_fault_is_not_cleared_whatever_its_last_report_says(tmp_path: Path) -> None:
+    stored(tmp_path, course("x.."))
+    found = document(tmp_path)
+    (machine,) = found["machines"]
+    assert (machine["leave"], machine["cleared"], machine["verdict"]) == (Leave.MUST_NOT, False, "stop")
+    for machine, left in zip(found["machines"], lists_of(found), strict=True):  # type: ignore[arg-type]
+        assert machine["cleared"] == (left.leave is Leave.MAY)
+    stored(tmp_path / "clean", course("..."))
+    (machine,) = document(tmp_path / "clean")["machines"]
+    assert (machine["leave"], machine["cleared"]) == (Leave.MAY, True)

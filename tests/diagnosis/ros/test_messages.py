@@ -221,6 +221,18 @@ def test_events_tell_the_verdict_and_every_fault(tmp_path: Path) -> None:
     assert [(m.stamp.sec, m.stamp.nanosec) for _, m in told][1] == (1_760_000_004, 250_000_000)
 
 
+@pytest.mark.parametrize(
+    ("stop", "said"),
+    [(10.0, "F1 lasts to the end of the log: FR speed sensor stuck, after 6.00 s"),
+     (6.125, "F1 was last seen, not seen to end: FR speed sensor stuck, after 2.12 s")],
+)  # fmt: skip
+def test_a_fault_that_was_not_seen_to_end_keeps_its_level(tmp_path: Path, stop: float, said: str) -> None:
+    document = report([fault(1, "sensor", "stuck", (4.0, stop), "high", 1.0)])
+    document["states"] = [s for s in document["states"] if s["start_s"] < stop]
+    _, _, last = by_rosbags(written(tmp_path, document))["/mfhca/events"]
+    assert (last[1].level, last[1].msg) == (40, said)
+
+
 def test_a_part_of_the_mission_tells_its_own_time_and_the_verdict(tmp_path: Path) -> None:
     part = {"start_ns": START + 5 * SECOND, "stop_ns": START + 7 * SECOND}
     found = by_rosbags(written(tmp_path, report(), **part))

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from replay.log.raw_log import Channel
-from replay.machine.config import haulotte
+from replay.machine.config import Machine, haulotte
 from replay.readers.tables.columns import unit_of
 from replay.signals.name_parts import is_steering
 from replay.signals.name_words import english, folded, role, tokens
@@ -333,3 +333,34 @@ def test_words() -> None:
 def test_a_tables_odometry_is_the_measured_speed_of_the_machine(name: str, signals: list[str]) -> None:
     found = [c.signal for c in candidates({name: column(name)}, haulotte())]
     assert [s for s in found if s.startswith("odom")] == signals
+
+
+@pytest.mark.parametrize(
+    ("name", "signal", "unit"),
+    [
+        ("wheel_rpm_FL", "wheel.FL.v", "rpm"),
+        ("RPM_FR", "wheel.FR.v", "rpm"),
+        ("speed_kmh_rear_left", "wheel.RL.v", "km/h"),
+        ("yaw_rate_deg_s", "imu.yaw_rate", "deg/s"),
+        ("YawRate_rad_s", "imu.yaw_rate", "rad/s"),
+        ("yaw_rate_cmd_deg_s", "cmd.omega", "deg/s"),
+        ("FLspeed_kmh", "wheel.FL.v", "km/h"),
+        ("RRspeed", "wheel.RR.v", ""),
+    ],
+)
+def test_units_within_a_name_and_places_written_with_a_word(name: str, signal: str, unit: str) -> None:
+    assert found(column(name)) == [(signal, unit)]
+
+
+@pytest.mark.parametrize("name", ["{}speed", "{}speed_cmd", "{}_speed_cmd", "{}Speed_cmd"])
+def test_a_side_before_its_word_is_of_one_wheel_and_never_the_machine(name: str) -> None:
+    two = Machine("two", "", ("R", "L"), None)
+    signal = "v_ref" if "cmd" in name else "v"
+    for side in ("R", "L"):
+        channel = column(name.format(side))
+        assert [c.signal for c in candidates({channel.name: channel}, two)] == [f"wheel.{side}.{signal}"]
+
+
+@pytest.mark.parametrize("name", ["Left", "Reference", "Level", "Radar_speed_max", "lrSpeed_soll", "Rate"])
+def test_words_that_begin_like_a_side_stay_as_they_are(name: str) -> None:
+    assert not {"l", "r"} & {*tokens(name)}

@@ -138,3 +138,22 @@ def test_a_draft_takes_them_with_a_question_and_leaves_the_drivers_wheel(tmp_pat
     assert draft.machine.signals["imu.yaw_rate"].column == "gyro"
     assert any(q.startswith("is gyro the yaw rate of the machine, in rad/s?") for q in draft.questions)
     assert all(s.column != "SteeringWheelAngle" for s in draft.machine.signals.values())
+
+
+@pytest.mark.parametrize(("name", "size", "unit"), [("cmd_{}", 1.0, "1"), ("ctrl_{}", 100.0, "%"), ("y_{}", 1.0, "1")])
+def test_what_a_wheel_is_told_beside_commanded_speeds_may_be_an_opening(name: str, size: float, unit: str) -> None:
+    wheels = {name.format(w): size * PART for w in PLACES}
+    speeds = {f"v_ref_{w}": SPEED for w in PLACES} | {f"speed_{w}": SPEED for w in PLACES}
+    found = asked(wheels | speeds)
+    assert {found[n] for n in wheels} == {(f"wheel.{w}.u", Open.OPENING, unit) for w in PLACES}
+    assert not wheels.keys() & asked(wheels | {f"speed_{w}": SPEED for w in PLACES}).keys()  # a speed may be asked so
+    assert not wheels.keys() & asked({n: 400.0 * size * x for n, x in wheels.items()} | speeds).keys()
+
+
+@pytest.mark.parametrize(
+    ("name", "unit"), [("SOG", ""), ("gps_sog", ""), ("sog_kn", "kn"), ("SOG [kn]", "kn"), ("sog_kmh", "km/h")]
+)
+def test_a_speed_over_ground_is_asked_for(name: str, unit: str) -> None:
+    assert asked({name: np.abs(SPEED)}) == {name: ("gnss.speed", Open.GROUND, unit)}
+    assert "gnss.speed" not in sure(name)
+    assert asked({name: SPEED, "gps_speed": SPEED}) == {}

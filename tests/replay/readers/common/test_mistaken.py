@@ -86,3 +86,26 @@ def test_a_table_of_one_column(tmp_path: Path, text: str) -> None:
         LogError, match=r"run\.csv is a table of one column \(first line .*expected a time and at least one signal"
     ):
         open_log(tmp_path / "run.csv")
+
+
+@pytest.mark.parametrize("extra", ["", ".bag", ".tar.gz"])
+@pytest.mark.parametrize("before", ["/", "../.git/"])
+def test_a_pointer_of_git_annex(tmp_path: Path, extra: str, before: str) -> None:
+    key = f"SHA256E-s31390--f50d7ac4c6b9031379986bc362fcefb65f1e52621ce1708d537e740fefc59cc0{extra}"
+    path = tmp_path / "drive.bag"
+    words = (
+        r"drive\.bag is a git-annex pointer, not the log itself, which has 31390 bytes; .*`git annex get drive\.bag`"
+    )
+    path.write_text(f"{before}annex/objects/{key}\n", encoding="utf-8")
+    with pytest.raises(LogError, match=words):
+        open_log(path)
+    path.unlink()
+    path.symlink_to(f"{before}annex/objects/J9/p1/{key}/{key}")
+    with pytest.raises(LogError, match=words):
+        open_log(path)
+
+
+def test_a_link_that_leads_nowhere_else_does_not_exist(tmp_path: Path) -> None:
+    (tmp_path / "drive.bag").symlink_to(tmp_path / "gone.bag")
+    with pytest.raises(LogError, match="does not exist"):
+        open_log(tmp_path / "drive.bag")
