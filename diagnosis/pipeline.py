@@ -17,7 +17,7 @@ from diagnosis.channels.recording_gaps import recording_gaps, without_gaps
 from diagnosis.channels.resting_position import with_zeroed_positions
 from diagnosis.channels.shared_gain import without_shared_gain
 from diagnosis.channels.silence import with_silent_sensors
-from diagnosis.clearing.backwards import without_claims
+from diagnosis.clearing.backwards import shown_alone, without_claims
 from diagnosis.clearing.beside import (
     less_sure_beside_dead_sensors,
     less_sure_beside_dead_valves,
@@ -193,6 +193,8 @@ def _walk(
     )
     found = found if doubt is None else _without_valves(found, doubt)
     found = found if scale is None else _with_scale(found, scale)
+    if _is_another(mission, machine):
+        found = replace(found, assessments=shown_alone(found.assessments, timeline.dt))
     if not found.events:  # a machine that does not follow its commands has a report, though no part is judged
         _require_something(found.assessments, mission, machine)
     publish(Progress(Stage.DECIDING))
@@ -210,6 +212,11 @@ def _walk(
         near = known_probability(report, windows.step * timeline.dt, timeline.dt, windows.columns)
         windows = replace(windows, columns={**windows.columns, **near})
     return MissionResult(report, _columns(judged, report, shown), windows)
+
+
+def _is_another(mission: Mission, machine: Machine) -> bool:
+    """Whether a log is not of the machine that stands in for its own, for it names other wheels."""
+    return bool(mission.signals.other_wheels) and "geometry" in machine.assumed
 
 
 def _without_valves(found: ComponentResult, doubt: OpeningDoubt) -> ComponentResult:
@@ -272,7 +279,7 @@ def _without_contradicted(judged: Judged) -> Judged:
 def _with_what_stands_out(judged: Judged) -> Judged:
     """The same with parts named that the checks of the all-clear leave no doubt about, unless the whole machine explains them."""
     found = judged.found
-    if judged.hints or judged.places:
+    if judged.hints or judged.places or _is_another(judged.mission, judged.machine):
         return judged
     more = as_late_axles(what_stands_out(judged.checks, judged.cells, found.words), judged.cells, found.words)
     if not (more := without_explained(more, found.events, judged.machine.axles)):

@@ -37,6 +37,22 @@ def without_claims(
     }
 
 
+def shown_alone(assessments: Mapping[Part, Assessment], dt: float) -> dict[Part, Assessment]:
+    """Assessments with what second measurements and channels show by themselves: of a machine that stands in for one with other wheels no model holds.
+
+    Parameters
+    ----------
+    assessments : Mapping[tuple[str, str], Assessment]
+        By component and side.
+    dt : float
+        Sample [s].
+    """
+    alone = (Tier.DIRECT, Tier.SIGNAL)
+    return {
+        part: without_findings(a, [f for f in a.findings if f.tier not in alone], dt) for part, a in assessments.items()
+    }
+
+
 def without_findings(a: Assessment, claimed: Collection[Finding], dt: float) -> Assessment:
     """The same without some of its findings: what they claim is not assessed. `dt` in s."""
     if not claimed:

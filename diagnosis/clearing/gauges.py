@@ -155,7 +155,7 @@ def _wheels(cells: Cells) -> Iterator[Gauges]:
         moving = (np.abs(motion) > resp.MOVING * top / resp.USUAL_TOP) & ~cells.told(name)
         ratio = None
         lasting: dict[Deviation, float] = {}
-        if _known(used[:, i]) and len(cells.driven) > resp.OTHERS and (tells or not (twice and measured)):
+        if _known(used[:, i]) and len(cells.driven) >= resp.OTHERS and (tells or not (twice and measured)):
             limit = limits[i]
             off = np.where(cells.explained(name), np.nan, responses.windows[:, i])
             usual, back = responses.usual[i], (~responses.ahead[:, i]).astype(np.intp)

@@ -107,8 +107,7 @@ def wheel_checks(cells: Cells, clear_at: float) -> Iterator[Checked]:
             part = whole if for_a_part is None else lasts(cells, about_plant, for_a_part.off, for_a_part.limit * share)
             yield max(whole, part, key=times)
         # where an opening is no speed, what it gives says nothing of a wheel whose sides are both measured twice
-        # of two wheels, each is the other's measure: enough for what lies behind drives that are measured twice
-        enough = powered > OTHERS or (powered == OTHERS and all(twice[i]))
+        enough = powered >= OTHERS  # of two wheels, each is the other's measure: one of both is off, or nobody is
         if _known(used[:, i]) and enough and (tells or not all(twice[i])):
             own = limits[i]
             response = (*about, either, Check.RESPONSE)

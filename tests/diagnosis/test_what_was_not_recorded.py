@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from diagnosis.pipeline import diagnose_signals
+from replay.faults import FaultMode, FaultSpec, Side
 from replay.log.raw_log import Channel
 from replay.log.source_options import SignalSource
 from replay.machine.config import haulotte
@@ -51,6 +52,15 @@ def test_a_log_of_more_wheels_clears_no_machine_of_four() -> None:
     verdict = diagnose_signals(signals, haulotte()).report["verdict"]
     assert "the log names 2 more wheels than this machine has (MR, ML), which were not judged" in verdict["scope"]
     assert not verdict["cleared"]
+
+
+def test_of_a_machine_that_stands_in_for_one_with_other_wheels_no_model_holds() -> None:
+    fault = FaultSpec("FR", Side.ACTUATOR, FaultMode.NO_SIGNAL, 20.0, 32.0, 1.0, 0.0)
+    signals = replace(signals_of(simulated(fault), base=True), other_wheels=("MR", "ML"))
+    stands_in = diagnose_signals(signals, haulotte()).report["intervals"]
+    known = diagnose_signals(signals, replace(haulotte(), assumed=())).report["intervals"]
+    assert {i["tier"] for i in stands_in} <= {"direct", "signal"}
+    assert "model" in {i["tier"] for i in known}
 
 
 @pytest.mark.parametrize("asked", ["which wheels are left_3_speed, right_3_speed?", "which wheel is rear_speed?"])
