@@ -40,6 +40,7 @@ _EDGE = 0.15  # of a finding
 _ENDS_S, _UNMOVED = 0.15, 0.2  # of a finding, in which a valve comes to rest; of how its command moves meanwhile
 _LOSES, _IT_IS = 0.1, 0.85  # of its gain, from which it is a loss; probability of what a measured opening shows
 _AS_TOLD = 0.15  # of its command: no further off it, a valve opens as it is told; warm coils give up to 0.16 less
+_BRIEF_S = 3.0  # in which a position may be off its command by less than a loss
 _SHIFTED = 0.5  # of the loss, from which a zero is no matter of how it changes
 _SHOWN = "The measured opening moves with its command: {gain:.2f} of it, {zero:+.1f}{{percent}} off."
 _STANDS = "The measured opening stays at {place:+.1f}{{percent}}."
@@ -99,7 +100,17 @@ def _of_valve(found: SideFindings, inputs: AxleInputs, min_sat: float) -> SideFi
         stays = f.mode.total and _stands_while_told(f, y, command, use, inputs.timeline.dt)
         (stands if stays else open_).append(f)
     found = found._replace(findings=_or_all_off(open_, command, losses=True))
-    return found._replace(findings=tuple(sorted([*found.findings, *stands], key=lambda f: f.start)))
+    told_of = sorted([*found.findings, *stands], key=lambda f: f.start)
+    return found._replace(findings=tuple(f for f in told_of if not _hardly_off(f, measured)))
+
+
+def _hardly_off(f: Finding, measured: Measured) -> bool:
+    """Whether a position is off in no row of the table for so short, and by so small a share of its command, that supply and warm coils do the same."""
+    use = measured.use[f.start : f.stop]
+    y, x = (z[f.start : f.stop][use] for z in (measured.y, measured.x))
+    if f.mode is not FaultMode.OUTSIDE_TABLE or (f.stop - f.start) * measured.dt >= _BRIEF_S or not use.any():
+        return False
+    return bool(np.sum((y - x) ** 2) < _LOSES**2 * np.sum(x**2))
 
 
 def _explained(found: SideFindings, measured: Measured) -> list[Finding]:
