@@ -117,7 +117,8 @@ def wheel_checks(cells: Cells, clear_at: float) -> Iterator[Checked]:
             response = (*about, either, Check.RESPONSE)
             driven = worst(cells, response, -windows[:, i], own.below, apart=True)
             most_slow = max(own.below, -_CREEPING_RESPONSE * float(np.log1p(-clear_at)))
-            most_slow = alone(slowest, i, most_slow, _LEAST_CREEPING, _CREEPING_ALONE)
+            if not any(twice[i]):
+                most_slow = alone(slowest, i, most_slow, _LEAST_CREEPING, _CREEPING_ALONE)
             found = [driven, worst(cells, response, -slow[:, i], most_slow, apart=True)]
             if any(twice[i]):
                 most_long = long_limit(long_most, i, own.below)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from diagnosis.results.assessment import Finding
 from diagnosis.results.result import Hypothesis
-from replay.faults import FaultMode
+from replay.faults import FaultMode, State
 
 Array = NDArray[np.float64]
 
@@ -79,6 +79,8 @@ def or_shifted(finding: Finding, why: str = SHIFTED_SENTENCE) -> Finding:
     p = {(h.side, h.mode): h.p for h in finding.hypotheses}
     had = p.get(other, 0.0)
     moved = max(0.0, _SHIFTED * (p.get(own, 0.0) + had) - had)  # what says so already is not said twice
+    least = max((q for row, q in p.items() if row not in (own, other) and row[1] != State.HEALTHY.value), default=0.0)
+    moved = min(moved, max(0.0, p.get(own, 0.0) - least))  # it is called stuck: no other row may come before that
     p |= {own: p.get(own, 0.0) - moved, other: had + moved}
     named = sorted((Hypothesis(*row, share) for row, share in p.items()), key=lambda h: -h.p)
     return replace(finding, probability=p[own], hypotheses=tuple(named), evidence=(*finding.evidence, why))

@@ -126,10 +126,15 @@ def known_probability(
                 faulty = 1.0 - sum(h["p"] for h in fault["hypotheses"] if h["mode"] == State.HEALTHY)
                 if fault["side"] == Side.SENSOR_OR_ACTUATOR:
                     values[rows] = np.fmax(values[rows], 0.5 * faulty)
-                elif np.mean(np.nan_to_num(values[rows][told])) < _HARDLY * faulty:
+                elif _least_half(np.nan_to_num(values[rows][told])) < _HARDLY * faulty:
                     values[rows] = np.fmax(values[rows], faulty)
         out[name] = np.where(known, values, values.dtype.type(np.nan))
     return out
+
+
+def _least_half(x: NDArray[np.floating]) -> float:
+    """Mean of some values, or of their later half, whichever is less: what shows at its beginning alone rests on other evidence, too."""
+    return float(min(np.mean(x), np.mean(x[x.size // 2 :])))
 
 
 def _rows(t: NDArray[np.floating], step: float, start: float, stop: float) -> slice:

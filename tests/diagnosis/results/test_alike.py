@@ -60,3 +60,9 @@ def test_both_are_named() -> None:
         {"stuck": 0.54, "outside_table": 0.36, "healthy": 0.1}
     )
     assert told.evidence == ("why", SHIFTED_SENTENCE)
+
+
+def test_no_other_row_comes_before_the_one_it_is_called() -> None:
+    rows = tuple(Hypothesis("actuator", mode, 0.25) for mode in ("stuck", "noisy", "inefficient", "no_signal"))
+    told = or_shifted(Finding(0, 9, Side.ACTUATOR, FaultMode.STUCK, 0.25, rows, None, None, (), Tier.DIRECT))
+    assert told.probability == max(h.p for h in told.hypotheses)

@@ -86,6 +86,16 @@ def test_a_fault_that_rests_on_other_evidence_has_its_own_probability() -> None:
         np.testing.assert_allclose(found[name][200:300], told)
 
 
+def test_so_has_one_that_the_columns_show_at_its_beginning_alone() -> None:
+    hypotheses = [{"side": "sensor", "mode": "noisy", "p": 0.95}, {"side": "none", "mode": "healthy", "p": 0.05}]
+    fault = samples.fault(mode="noisy", start_s=20.0, stop_s=30.0, probability=0.95, hypotheses=hypotheses)
+    report = samples.report_with() | {"intervals": [fault], "states": [state("noisy", 20.0, 30.0)]}
+    name = "evidence.FR.sensor.probability"
+    seen = np.where(T < 23.0, 0.9, 0.02).astype(np.float32)
+    found = known_probability(report, T, 0.1, {name: seen})  # type: ignore[arg-type]
+    np.testing.assert_allclose(found[name][200:300], 0.95)
+
+
 def test_rows_that_were_weighed_over_a_whole_fault_have_its_probabilities_during_it_alone() -> None:
     hypotheses = [
         {"side": "sensor", "mode": "stuck", "p": 0.7},
