@@ -88,8 +88,8 @@ def sensors_alone(
             *([open_words(checks)] if checks else []),
         ]
     )
-    rest = f"{seen}; {unjudged}" if _all_of(axles, faults, checks) else unjudged[0].upper() + unjudged[1:]
-    return f"{_DOUBTED}, {rest_of_it}", f"{doubt[0].upper()}{doubt[1:]}. {rest}"
+    rest = f"{seen[0].lower()}{seen[1:]}; {unjudged}" if _all_of(axles, faults, checks) else unjudged
+    return f"{_DOUBTED}, {rest_of_it}", f"{doubt[0].upper()}{doubt[1:]}; {rest}"
 
 
 def _drives(wheels: Sequence[str], every: Set[str]) -> str:

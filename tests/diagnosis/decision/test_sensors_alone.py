@@ -72,7 +72,7 @@ def test_a_steering_sensor_that_may_be_stuck_is_named_first() -> None:
     title, text = said([finding(Side.SENSOR, FaultMode.STUCK, p=0.4)])
     assert title == "A sensor is in doubt, drives not judged"
     assert text.startswith("The front steering sensor may have been stuck for ")
-    assert "No fault was seen in the speed sensors" in text
+    assert "no fault was seen in the speed sensors" in text
 
 
 def test_a_speed_sensor_in_doubt_has_no_clean_bill() -> None:
