@@ -32,7 +32,9 @@ def of_faults(
         for other in report["intervals"]:
             if other["component"] == fault["component"] and side in _sides(other) and other["id"] != fault["id"]:
                 inside &= ~_rows(columns, other["start_s"], other["stop_s"])
-        if not inside.any() or not any(name.startswith(base) for name in columns):
+        whole = np.count_nonzero(_rows(columns, fault["start_s"], fault["stop_s"]))
+        little = np.count_nonzero(inside) < 0.1 * whole  # left beside other faults: no picture of this one
+        if little or not inside.any() or not any(name.startswith(base) for name in columns):
             continue
         for leaf, key in (("epsilon", "value"), ("epsilon_low", "low"), ("epsilon_high", "high")):
             said = np.nan if fault["epsilon"] is None else fault["epsilon"][key]
