@@ -130,7 +130,7 @@ def beside_others(off: Array) -> Array:
 
 
 def alone_limit(beside: Array, j: int, share: float) -> float:
-    """From which on axle `j` counts by `beside_others` [ln]; `share` is the loss that counts [ln]."""
+    """From which on axle `j` counts by `beside_others`, of shape (windows, axles) [ln]; `share` is the loss that counts [ln]."""
     return alone([float(x) for x in largest(beside)], j, np.inf, _APART * share, _APART_ALONE)
 
 

@@ -168,9 +168,9 @@ def _blind(y, x, bank, mean, cov, out):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def _stands_beside(y, x, white, bank, mean, out):  # type: ignore[no-untyped-def]
-    """Healthy is as well who does not join in the jitter of a steady x: `mean[CONSTANT, 1]` is what x was of late."""
+    """Healthy is as well who stands while a steady x jitters, rather than joining in: `mean[CONSTANT, 1]` is what x was of late."""
     late = mean[CONSTANT, 1]
-    if abs(x - late) < bank.jitter:
+    if abs(x - late) < bank.jitter and abs(y - late) < bank.jitter:
         r = bank.r * white
         out[EXACT] = max(out[EXACT], -0.5 * ((y - late) ** 2 / r + np.log(2 * np.pi * r)))
 
