@@ -218,7 +218,9 @@ def _beside_body(cells: Cells) -> Iterator[MachineEvent]:
     speeds, v, usual = _common(cells)
     with np.errstate(invalid="ignore"):
         near = (np.abs(np.abs(speeds) - v[:, np.newaxis]) < _ALIKE * usual).sum(axis=1)
-        use = (v > _MOVES * usual) & (near >= np.isfinite(speeds).sum(axis=1) / 2)
+        known = np.isfinite(speeds).sum(axis=1)
+        # of some of the wheels, in a turn, the median is one side's
+        use = (v > _MOVES * usual) & np.where(known == speeds.shape[1], near >= known / 2, near == known)
     counts = _counts(cells)
     for body in bodies(cells):
         found = _held(cells, body.speed, speeds, usual) or _contradicts(

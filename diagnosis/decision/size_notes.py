@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+import re
+
 from diagnosis.results.assessment import Finding
 from diagnosis.results.open_sizes import WHOLE, open_bounds
 from diagnosis.results.result import Epsilon
 from diagnosis.results.vocabulary import Kind, Tier
 from replay.faults import FaultMode
 
+_GROWS = 0.1  # from first to last
+#: What `diagnosis.estimation.simple_causes` says of a loss that changes.
+_COURSE = re.compile(r" is (\d\.\d+) at first and (\d\.\d+) at last of ")
+
 
 def size_note(finding: Finding, epsilon: Epsilon | None, kind: Kind) -> str:
-    """Why ε̂ of a fault is missing, or bounded to one side at most; empty where both bounds say something.
+    """How a size changed, and why ε̂ of a fault is missing, or bounded to one side at most; empty where both bounds say something.
 
     Parameters
     ----------
@@ -29,9 +35,10 @@ def size_note(finding: Finding, epsilon: Epsilon | None, kind: Kind) -> str:
         if epsilon.low >= WHOLE:
             return ""
         return "By its row all is lost (ε̂ = 1); the lower bound is less, for other rows come into question, too."
+    course = _course(finding)
     low, high = open_bounds(epsilon.low, epsilon.high)
-    if not (low or high):
-        return ""
+    if course or not (low or high):
+        return course
     open_ = (
         "Neither bound of ε̂ says anything: the size may be anything, whatever the probability that something is wrong"
         if low and high
@@ -41,6 +48,17 @@ def size_note(finding: Finding, epsilon: Epsilon | None, kind: Kind) -> str:
     )
     why = _why(finding, kind)
     return f"{open_}. {why[:1].upper()}{why[1:]}."
+
+
+def _course(finding: Finding) -> str:
+    """What is lost at first and at last of a loss that grows, of which ε̂ is the mean; empty of any other."""
+    found = next((m for m in map(_COURSE.search, finding.evidence) if m), None)
+    if found is None or finding.mode is not FaultMode.INEFFICIENT:
+        return ""
+    first, last = (1.0 - float(x) for x in found.groups())
+    if last - first < _GROWS:
+        return ""
+    return f"It grows: {100 * max(first, 0.0):.0f} % are lost at first, {100 * last:.0f} % at last; ε̂ and its bounds are of all that time."
 
 
 def _missing(mode: FaultMode) -> str:

@@ -35,7 +35,9 @@ def when_words(fault: IntervalRow, report: ReportDocument) -> str:
 
 
 def times_words(faults: Sequence[IntervalRow], report: ReportDocument) -> str:
-    """The same of one part's faults: of the most urgent one, and of the last, which says how it stands with the part; empty for none.
+    """The same of one part's faults: when the first was seen, of the most urgent one, and of the last, which says how it stands with the part.
+
+    Empty for none.
 
     Parameters
     ----------
@@ -46,5 +48,10 @@ def times_words(faults: Sequence[IntervalRow], report: ReportDocument) -> str:
     """
     if not faults:
         return ""
-    last = max(faults, key=lambda f: f["stop_s"])
-    return "; ".join(when_words(f, report) for f in ([faults[0]] if last is faults[0] else [faults[0], last]))
+    first, last = min(faults, key=lambda f: f["start_s"]), max(faults, key=lambda f: f["stop_s"])
+    begins = (
+        f"first seen at {clock(first['start_s'], _DIGITS)} ({first['id']}); "
+        if first["start_s"] < faults[0]["start_s"]
+        else ""
+    )
+    return begins + "; ".join(when_words(f, report) for f in ([faults[0]] if last is faults[0] else [faults[0], last]))

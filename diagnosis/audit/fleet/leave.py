@@ -16,7 +16,7 @@ from diagnosis.audit.fleet.page.rows import fault_words, not_named
 from diagnosis.audit.fleet.runs import sides_of
 from diagnosis.audit.fleet.suspicion_words import with_suspicions
 from diagnosis.audit.fleet.trend_types import TrendRow
-from diagnosis.audit.fleet.words import count, open_words
+from diagnosis.audit.fleet.words import count, open_words, small
 from diagnosis.decision.severity import HALF
 from diagnosis.decision.wording import MORE, join_words
 from diagnosis.pages.labels import utc_moment
@@ -223,20 +223,34 @@ def _why(
         return last, f"{_said(missions[last])}{said and f' – {said}'}"
     why = m.get("not_cleared", "").removesuffix(MORE)
     stands = m["standing"] + (f", because {why}{_halved(faults)}" if why else "")
-    reason = f"{named}: {stands[0].lower()}{stands[1:]}" if named else stands
+    reason = f"{named}: {small(stands)}" if named else stands
     return last, f"{reason} – {said}" if said else reason
 
 
 def _later(m: MachineRow, missions: Sequence[MissionRow]) -> str:
-    """The missions that may be later than the last judged one and gave no verdict, by name where they are few; empty for none."""
+    """The missions after the last verdict, and those that may be, by name where they are few; empty for none."""
     if not m["unjudged"]:
         return ""
-    trailing = takewhile(lambda k: missions[k]["verdict"] == Verdict.NOT_ASSESSED, reversed(m["missions"]))
+    newer = [
+        missions[k]["name"]
+        for k in takewhile(lambda k: missions[k]["verdict"] == Verdict.NOT_ASSESSED, reversed(m["missions"]))
+    ]
     others = [k for k in m["undated"] if missions[k]["verdict"] == Verdict.NOT_ASSESSED]
-    names = [missions[k]["name"] for k in (*trailing, *others, *m["failed"])]
-    was = "was" if m["unjudged"] == 1 else "were"
-    who = f" ({join_words(names)})" if len(names) == m["unjudged"] <= _FAULTS else ""
-    return f"; {count(m['unjudged'], 'mission')} that may be later{who} {was} not judged"
+    dark, rest = [missions[k]["name"] for k in (*others, *m["failed"])], m["unjudged"] - len(newer)
+    said = (
+        f"; {count(len(newer), 'newer mission')}{_by_name(newer, len(newer))} did not clear the machine"
+        if newer
+        else ""
+    )
+    if rest > 0:
+        was = "was" if rest == 1 else "were"
+        said += f"; {count(rest, 'mission')} that may be later{_by_name(dark, rest)} {was} not judged"
+    return said
+
+
+def _by_name(names: Sequence[str], number: int) -> str:
+    """So many missions by name, in brackets, where they are few and all known; else empty."""
+    return f" ({join_words(list(names))})" if len(names) == number <= _FAULTS else ""
 
 
 def _left_open(m: MachineRow, missions: Sequence[MissionRow]) -> str:

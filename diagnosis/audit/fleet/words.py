@@ -173,7 +173,7 @@ def headline(
     damaged = [m for m in machines if is_damaged(m)]
     if not machines:
         return Verdict.NOT_ASSESSED, "nothing judged", "No mission could be judged"
-    tag = f"{count(verdicts.count(status), 'machine')}: {_small(status.short)}"
+    tag = f"{count(verdicts.count(status), 'machine')}: {small(status.short)}"
     if status is Verdict.WATCH and len(damaged) == verdicts.count(Verdict.WATCH):
         apart = all(_lacks_a_file(m) for m in damaged)
         tag = f"{count(len(damaged), 'machine')}: {'files left out' if apart else 'damaged logs'}"
@@ -205,9 +205,9 @@ def _leave_words(leaves: Sequence[Leave]) -> str:
     return ", ".join(parts) + (f", {rest} must be checked first" if rest else "")
 
 
-def _small(text: str) -> str:
-    """Text that begins with a small letter."""
-    return text[0].lower() + text[1:]
+def small(text: str) -> str:
+    """Text that begins with a small letter, unless with a name in capitals, such as a wheel's."""
+    return text if text[:2].isupper() else text[0].lower() + text[1:]
 
 
 def _was(n: int) -> str:
@@ -246,10 +246,10 @@ def sentences(
         note = f" ({m.note})" if m.note else ""
         words = _standing_now(m, trends[machines.index(m)])
         what = f": {join_words(faults)}" if faults else ""
-        out.append(f"{m.label} – {_small(words)}{what}{note}.")
+        out.append(f"{m.label} – {small(words)}{what}{note}.")
     rest = [m for m in machines if m.verdict is Verdict.NOT_ASSESSED]
     out += [
-        f"{m.label} – {_small(_standing_now(m, trends[machines.index(m)]))}: check it before it goes out."
+        f"{m.label} – {small(_standing_now(m, trends[machines.index(m)]))}: check it before it goes out."
         for m in rest[:_SHOWN]
     ]
     if len(rest) > _SHOWN:

@@ -62,6 +62,20 @@ def test_a_receiver_that_comes_to_show_less_contradicts_the_wheels() -> None:
     assert "as fast as by its {wheels} up to" in text
 
 
+def test_in_a_tight_turn_the_wheels_that_are_left_beside_a_fault_are_one_sides() -> None:
+    one = mission(5)
+    t = (one.stamps - one.stamps[0]) * 1e-9
+    turns = (t >= 20.0) & (t < 40.0)
+    side = {"R": 1.4, "L": 0.6}
+    columns = {
+        n: x * np.where(turns, side[n[7]], 1.0) if n.startswith("wheel.") and n.endswith((".v", ".v_true")) else x
+        for n, x in one.columns.items()
+    }
+    cells = in_cells(replace(one, columns=columns), base=False)
+    beside = replace(cells, stated={"FR": [(0.0, LENGTH)]})
+    assert not [e.text for e in as_a_whole(beside) if e.text.startswith("By ")]
+
+
 @pytest.mark.parametrize(
     ("share", "since", "words"),
     [

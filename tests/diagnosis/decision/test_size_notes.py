@@ -33,3 +33,20 @@ def test_an_open_or_missing_size_has_its_reason(
     note = size_note(found, None if bounds is None else Epsilon(*bounds), Kind.WHEEL)
     assert note.startswith(words)
     assert bool(note) == bool(words)
+
+
+@pytest.mark.parametrize(
+    ("gains", "words"),
+    [
+        ("0.96 at first and 0.60 at last", "It grows: 4 % are lost at first, 40 % at last;"),
+        ("0.66 at first and 0.60 at last", ""),
+        ("0.60 at first and 0.96 at last", ""),
+        ("0.70", ""),
+    ],
+)
+def test_a_loss_that_grows_says_what_is_lost_at_last(gains: str, words: str) -> None:
+    evidence = (f"wheel.FR.v is {gains} of wheel.FR.v_true all through it.",)
+    found = replace(finding(Side.SENSOR, FaultMode.INEFFICIENT), tier=Tier.DIRECT, evidence=evidence)
+    note = size_note(found, Epsilon(0.22, 0.05, 0.43), Kind.WHEEL)
+    assert note.startswith(words)
+    assert bool(note) == bool(words)

@@ -39,5 +39,5 @@ def test_of_several_faults_of_a_part_the_most_urgent_and_the_last_are_told() -> 
     assert both.startswith("F1 began at 0:20.000")
     assert both.endswith("and lasts to the end of the log")
     assert "F2" not in both
-    assert times_words([last, first], report) == when_words(last, report)
+    assert times_words([last, first], report) == f"first seen at 0:20.000 (F1); {when_words(last, report)}"
     assert times_words([], report) == ""

@@ -28,4 +28,7 @@ def test_the_missions_that_may_be_later_are_named(tmp_path: Path) -> None:
     stuck = Sample("a", verdict="stop", faults=[Fault(mode="stuck", severity="high")])
     d = document(tmp_path, stuck, Sample("later", day=1.0, verdict="not_assessed"))
     (left,) = lists_of(d)
-    assert "1 mission that may be later (later) was not judged" in left.reason
+    assert "1 newer mission (later) did not clear the machine" in left.reason
+    unread = document(tmp_path / "unread", stuck, Sample("lost", state="unreadable", day=None, verdict="stop"))
+    (left,) = lists_of(unread)
+    assert "1 mission that may be later (lost) was not judged" in left.reason
