@@ -31,7 +31,7 @@ from diagnosis.wheels.entry_kernel import enter
 from diagnosis.wheels.models import A_BIAS, A_GAIN, HEALTHY, S_GAIN, S_STUCK, WheelFilterModel
 from diagnosis.wheels.models import MODELS as WHEEL_MODELS
 from diagnosis.wheels.shared_kernel import weights
-from diagnosis.wheels.step_kernel import WheelInput, correct, predict
+from diagnosis.wheels.step_kernel import WheelInput, correct, least_steps, predict
 from replay.machine.config import Limits
 from tests.diagnosis.steering.test_step_kernel import LAG
 from tests.diagnosis.steering.test_step_kernel import MODEL as AXLE
@@ -166,7 +166,8 @@ def test_a_dead_sensor_shows_nothing_of_the_speed() -> None:
     z, P = np.zeros((WHEEL_MODELS, 4)), np.zeros((WHEEL_MODELS, 4, 4))
     z[S_STUCK] = [0.3, 1.0, 0.0, 0.1]
     P[S_STUCK] = np.diag([0.01, 0.0, 1.0, 0.04])
-    correct(S_STUCK, wheel_input(y=0.2), 1.0, WHEEL.constants(DT, 0.001), z, P)
+    q, k = wheel_input(y=0.2), WHEEL.constants(DT, 0.001)
+    correct(S_STUCK, q, 1.0, k, z, P, np.log(least_steps(q, k)))
     assert z[S_STUCK, 0] == 0.3
     assert P[S_STUCK, 0, 0] == 0.01
     assert z[S_STUCK, 3] == pytest.approx(0.2, abs=1e-3)
@@ -185,7 +186,7 @@ def test_innovations_of_a_healthy_wheel_are_white_and_as_large_as_the_filter_say
         q = wheel_input(y, drive)
         share = predict(HEALTHY, q, k, z, P)
         out.append((y - z[HEALTHY, 0]) / np.sqrt(P[HEALTHY, 0, 0] + WHEEL.noise**2 / 10))
-        correct(HEALTHY, q, share, k, z, P)
+        correct(HEALTHY, q, share, k, z, P, np.log(least_steps(q, k)))
     e = np.array(out)
     assert np.mean(e**2) == pytest.approx(1.0, abs=0.03)
     assert abs(np.mean(e[1:] * e[:-1])) < 0.03
