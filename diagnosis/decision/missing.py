@@ -25,7 +25,7 @@ _COSTS = {
     "steer.u": "the {steer.actuator} is judged by what the replayed control law would have commanded, and where the angle does not fit that, not at all",
     "steer.u_applied": "the {steer.actuator} is judged by how the angle follows its command; a constant angle gives no evidence on it",
     "cmd.v": "without recorded v_c,i no {wheel} has a command: no tracking error, and driving time by measured speeds",
-    "cmd.omega": "commands of the {wheels} are computed as if driving straight ahead, unless v_c,i is recorded",
+    "cmd.omega": "commands of the {wheels} follow from the steering angles, unless v_c,i is recorded; where no axle is steered they are unknown, but on the middle line",
     "cmd.lateral": "{wheels} with rollers have no expected speed while the machine is to move sideways",
     "imu.yaw_rate": "how the machine turns is known by commands, {wheels} and steering angles alone",
     "gnss.lat": "no speed of the body by GNSS to judge the {wheels} by; the path is drawn from odometry, if at all",
