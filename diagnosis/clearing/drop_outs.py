@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.clearing.cells import Array, Cells
+from diagnosis.clearing.leaps import longest_series
 from diagnosis.clearing.untold_faults import finding_of
 from diagnosis.results.assessment import Finding
 from diagnosis.results.sizes import amount
@@ -13,7 +14,7 @@ from replay.arrays.runs import runs_of
 from replay.faults import FaultMode, Side
 
 _LONGEST_S, _OF_TOP = 0.15, 0.1  # of a drop, and share of the top speed that is read before and after it
-_GAP_S, _LEAST, _LASTS_S = 5.0, 8, 3.0  # between drops of one fault; of it; which lasts at least
+_LEAST, _LASTS_S = 8, 3.0  # drops of one fault; which lasts at least
 _ALIKE = 0.5  # of the drops, in which a second speed drops, too
 _DROPS = "{name} drops to 0 and back {number} times within {longest:g} s each, from about {size}, as behind a loose contact: the inertia of a {{wheel}} forbids that."
 _SECOND = "{second} does not drop with it."
@@ -22,21 +23,17 @@ _SECOND = "{second} does not drop with it."
 def fault_of_drop_outs(wheel: str, cells: Cells) -> Finding | None:
     """The longest time in which a wheel's speed drops out again and again, no fault of it being stated there; None where it hardly does."""
     name, second, dt = f"wheel.{wheel}.v", f"wheel.{wheel}.v_true", cells.timeline.dt
-    at, height = _drops(cells, name)
-    told = cells.told(wheel)[np.minimum(at // cells.width, cells.size - 1)] if at.size else np.zeros(0, np.bool_)
-    at, height = at[~told], height[~told]
+    at, height = longest_series(wheel, cells, *_drops(cells, name))
     if at.size < _LEAST:
         return None
-    edges = np.flatnonzero(np.diff(at) * dt > _GAP_S) + 1
-    start, stop = max(zip([0, *edges], [*edges, at.size], strict=True), key=lambda s: s[1] - s[0])
-    first, last = int(at[start]), int(at[stop - 1]) + 1
-    if stop - start < _LEAST or (last - first) * dt < _LASTS_S:
+    first, last = int(at[0]), int(at[-1]) + 1
+    if (last - first) * dt < _LASTS_S:
         return None
     x = cells.timeline.get(second)
-    if x is not None and np.mean(np.abs(x[at[start:stop]]) < 0.5 * height[start:stop]) > _ALIKE:
+    if x is not None and np.mean(np.abs(x[at]) < 0.5 * height) > _ALIKE:
         return None
-    size = amount(float(np.median(height[start:stop])), "m/s", 2)
-    evidence = [_DROPS.format(name=name, number=int(stop - start), longest=_LONGEST_S, size=size)]
+    size = amount(float(np.median(height)), "m/s", 2)
+    evidence = [_DROPS.format(name=name, number=at.size, longest=_LONGEST_S, size=size)]
     evidence += [] if x is None else [_SECOND.format(second=second)]
     return finding_of((first, last), FaultMode.NOISY, None, tuple(evidence), Side.SENSOR)
 

@@ -6,13 +6,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.clearing.cells import Array, Cells
+from diagnosis.clearing.leaps import heights, longest_series
 from diagnosis.clearing.untold_faults import finding_of
 from diagnosis.clearing.wild import wild_at
 from diagnosis.results.assessment import Finding
 from diagnosis.results.sizes import amount
 from replay.faults import FaultMode, Side
 
-_GAP_S, _LEAST = 5.0, 8  # between leaps of one fault; of it
+_LEAST = 8  # leaps of one fault
 _MOST = 0.12  # of the readings: more of them are no single ones, but how coarse a speed is read
 _LASTS_S = 3.0
 _ALIKE = 0.3  # of a leap, by which a second speed leaps the same way
@@ -31,23 +32,18 @@ def fault_of_spikes(wheel: str, cells: Cells) -> Finding | None:
         The mission.
     """
     name, second = f"wheel.{wheel}.v", f"wheel.{wheel}.v_true"
-    at, height = wild_at(cells, name)
-    told = cells.told(wheel)[np.minimum(at // cells.width, cells.size - 1)] if at.size else np.zeros(0, np.bool_)
-    at, height = at[~told], height[~told]
+    at, height = longest_series(wheel, cells, *wild_at(cells, name))
     if at.size < _LEAST:
         return None
-    edges = np.flatnonzero(np.diff(at) * cells.timeline.dt > _GAP_S) + 1
-    start, stop = max(zip([0, *edges], [*edges, at.size], strict=True), key=lambda s: s[1] - s[0])
-    first, last = int(at[start]), int(at[stop - 1]) + 1
+    first, last = int(at[0]), int(at[-1]) + 1
     fresh = int(np.count_nonzero(cells.timeline.fresh[name][first:last]))
-    number = int(stop - start)
-    if number < _LEAST or number > _MOST * fresh or (last - first) * cells.timeline.dt < _LASTS_S:
+    if at.size > _MOST * fresh or (last - first) * cells.timeline.dt < _LASTS_S:
         return None
     x = cells.timeline.get(second)
-    if x is not None and _leaps_too(x, at[start:stop], height[start:stop]):
+    if x is not None and _leaps_too(x, at, height):
         return None
-    size = amount(float(np.median(height[start:stop])), "m/s", 2)
-    evidence = [_SPIKES.format(number=number, all=fresh, name=name, size=size)]
+    size = amount(float(np.median(height)), "m/s", 2)
+    evidence = [_SPIKES.format(number=at.size, all=fresh, name=name, size=size)]
     evidence += [] if x is None else [_SECOND.format(second=second)]
     return finding_of((first, last), FaultMode.NOISY, None, tuple(evidence), Side.SENSOR)
 
@@ -56,5 +52,5 @@ def _leaps_too(x: Array, at: NDArray[np.intp], height: Array) -> bool:
     """Whether a second speed, shape (n,), leaps at most of some samples, by a good part of these heights: then the wheel does."""
     inner = (at > 0) & (at < x.size - 1)
     before, after = x[at[inner]] - x[at[inner] - 1], x[at[inner]] - x[at[inner] + 1]
-    leap = np.where(before * after > 0.0, np.minimum(np.abs(before), np.abs(after)), 0.0)
+    leap = heights(before, after)
     return bool(leap.size and np.mean(leap > _ALIKE * height[inner]) > 0.5)

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from diagnosis.clearing.cells import Array, Cells
+from diagnosis.clearing.leaps import heights
 from diagnosis.clearing.longer import around, longer
 from diagnosis.clearing.measure import alone, off_commands, times, worst
 from diagnosis.clearing.responses import largest
@@ -92,7 +93,7 @@ def _peaks(cells: Cells, name: str) -> Array:
     v = y[at]
     release(y)
     before, after = v[1:-1] - v[:-2], v[1:-1] - v[2:]
-    height = np.where(before * after > 0.0, np.minimum(np.abs(before), np.abs(after)), 0.0)
+    height = heights(before, after)
     cell = at[1:-1] // cells.width
     total, count = (
         frame.sums(np.bincount(cell, z, minlength=cells.size).astype(np.float64)) for z in (height, np.ones(cell.size))

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.clearing.cells import Array, Cells
+from diagnosis.clearing.leaps import heights
 from replay.arrays.blocks import release
 
 _NOISES, _OF_TOP = 8.0, 0.1  # times the usual noise, and share of the top speed, from which on a reading is wild
@@ -56,7 +57,7 @@ def _wild(cells: Cells, name: str) -> tuple[NDArray[np.intp], Array]:
     v = y[at]
     release(y)
     before, after = v[1:-1] - v[:-2], v[1:-1] - v[2:]
-    alone = np.where(before * after > 0.0, np.minimum(np.abs(before), np.abs(after)), 0.0)
+    alone = heights(before, after)
     usual = float(np.median(np.abs(before + after))) / 0.6745 / np.sqrt(6.0)
     wild = alone > max(_NOISES * usual, _OF_TOP * cells.machine.max_speed)
     return at[1:-1][wild], np.asarray(alone[wild], dtype=np.float64)

@@ -13,6 +13,7 @@ from diagnosis.results.loop_rows import LoopRow, MeanRow, MetricsRow, PaperRow
 from diagnosis.results.vocabulary import Tier
 from replay.arrays.blocks import blocks
 from replay.arrays.numeric import without_nan
+from replay.control.kinematics import rotation
 from replay.control.loop import Replay, any_finite, stack
 from replay.faults import DECIDED, Side, State
 from replay.machine.config import Machine
@@ -158,12 +159,25 @@ def _undecided(assessment: Assessment) -> list[Finding]:
 
 
 def body_motion(timeline: Timeline, replay: Replay, machine: Machine) -> tuple[Array, Array]:
-    """Commanded or mean measured speed of the body [m/s], and its yaw rate where known [rad/s]. Both of shape (n,)."""
+    """Commanded or mean measured speed of the body [m/s], and its yaw rate [rad/s]: commanded, else by its angles, else measured. Both of shape (n,).
+
+    The yaw rate is 0 where nothing tells it.
+    """
     v = timeline.get("cmd.v")
     if v is None or not np.isfinite(v).any():
         v = timeline.map(_mean_speed, replay.v_ref, stack(timeline, [f"wheel.{w}.v" for w in machine.wheels]))
     omega = timeline.get("cmd.omega")
-    return v, np.broadcast_to(0.0, v.shape) if omega is None else omega
+    if omega is not None:
+        return v, omega
+    if machine.geometry is not None and machine.axles:
+        geometry, phi = machine.geometry, stack(timeline, [f"steer.{axle}.phi" for axle in machine.axles])
+
+        def by_angles(speed: Array, asked: Array, read: Array) -> Array:
+            return speed * rotation(np.where(np.isfinite(asked), asked, read), geometry)[0]
+
+        return v, timeline.map(by_angles, v, replay.phi_ref, phi)
+    measured = timeline.get("imu.yaw_rate")
+    return v, np.broadcast_to(0.0, v.shape) if measured is None else measured
 
 
 def _mean_speed(v_ref: Array, v: Array) -> Array:

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from replay.control.kinematics import wheel_commands
+from replay.control.kinematics import commands_by_angles, wheel_commands
 from replay.control.law_fit import MIN_EXPLAINED
-from replay.control.loop import Replay
+from replay.control.loop import Replay, stack
 from replay.machine.config import Machine
 from replay.signals.timeline import Timeline
 
@@ -54,31 +54,19 @@ def measure(timelines: Sequence[Timeline], replays: Sequence[Replay], machine: M
     parts: list[dict[str, dict[str, float]]] = []
     for t, r in zip(timelines, replays, strict=True):
         one: dict[str, dict[str, float]] = {"speed": {}, "command": {}, "angle": {}, "effort": {}, "top": {}}
-        speed, omega = t.get("cmd.v"), t.get("cmd.omega")
-        mapped = None
-        if machine.geometry is not None and speed is not None:
-            mapped = wheel_commands(
-                speed,
-                np.zeros_like(speed) if omega is None else omega,
-                machine.geometry,
-                dt=t.dt,
-                max_steer=machine.max_steer,
-                phi_dot=machine.control.phi_dot,
-                phi_dot_hz=machine.control.phi_dot_hz,
-                measured_angle=r.wheel_phi,
-            )
+        commands = _commands(t, r, machine)
         for i, w in enumerate(machine.wheels):
             for leaf in ("v", "v_true"):
                 one["speed"][f"wheel.{w}.{leaf}"] = _ratio(t.get(f"wheel.{w}.{leaf}"), r.v_ref[:, i])
             for leaf in ("u", "u_applied"):
                 one["effort"][f"wheel.{w}.{leaf}"] = _ratio(t.get(f"wheel.{w}.{leaf}"), r.v_ref[:, i])
-            if mapped is not None:
-                one["command"][f"wheel.{w}.v_ref"] = _ratio(t.get(f"wheel.{w}.v_ref"), mapped.speed[:, i])
+            if commands is not None:
+                one["command"][f"wheel.{w}.v_ref"] = _ratio(t.get(f"wheel.{w}.v_ref"), commands[0][:, i])
         for j, a in enumerate(machine.axles):
             for leaf in ("phi", "phi_true"):
                 one["angle"][f"steer.{a}.{leaf}"] = _ratio(t.get(f"steer.{a}.{leaf}"), r.phi_ref[:, j])
-            if mapped is not None:
-                one["command"][f"steer.{a}.phi_ref"] = _ratio(t.get(f"steer.{a}.phi_ref"), mapped.axle_angle[:, j])
+            if commands is not None and commands[1] is not None:
+                one["command"][f"steer.{a}.phi_ref"] = _ratio(t.get(f"steer.{a}.phi_ref"), commands[1][:, j])
         for name, x in t.signals.items():
             known = np.abs(x[np.isfinite(x)])
             one["top"][name] = float(np.quantile(known, 0.995)) if known.size else float("nan")
@@ -86,6 +74,30 @@ def measure(timelines: Sequence[Timeline], replays: Sequence[Replay], machine: M
     gains = [r.fits[0].lambda_ for r in replays if r.fits and r.fits[0].explained > MIN_EXPLAINED]
     gain = float(np.median(gains)) if gains else float("nan")
     return Ratios(**{kind: _medians([p[kind] for p in parts]) for kind in parts[0]}, gain=gain)
+
+
+def _commands(t: Timeline, r: Replay, machine: Machine) -> tuple[Array, Array | None] | None:
+    """Commanded speeds of the wheels [m/s] and angles of the axles [rad] that the body's command gives, (n, wheels), (n, axles).
+
+    Without a commanded yaw rate the angles give the speeds, and nothing gives the angles. None without a command.
+    """
+    speed, omega = t.get("cmd.v"), t.get("cmd.omega")
+    if machine.geometry is None or speed is None:
+        return None
+    if omega is None:
+        phi = stack(t, [f"steer.{axle}.phi" for axle in machine.axles])
+        return commands_by_angles(r.phi_ref, phi, speed, machine.geometry), None
+    mapped = wheel_commands(
+        speed,
+        omega,
+        machine.geometry,
+        dt=t.dt,
+        max_steer=machine.max_steer,
+        phi_dot=machine.control.phi_dot,
+        phi_dot_hz=machine.control.phi_dot_hz,
+        measured_angle=r.wheel_phi,
+    )
+    return mapped.speed, mapped.axle_angle
 
 
 def _medians(parts: list[dict[str, float]]) -> dict[str, float]:

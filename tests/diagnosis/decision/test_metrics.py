@@ -15,7 +15,7 @@ from diagnosis.results.result import Hypothesis
 from diagnosis.results.vocabulary import Tier
 from replay.control.loop import Replay, replay_loop
 from replay.faults import FaultMode, Side, State
-from replay.machine.config import Machine
+from replay.machine.config import Machine, haulotte
 from replay.signals.timeline import Timeline
 
 STEP = 10_000_000  # 100 Hz
@@ -169,6 +169,22 @@ def test_body_motion_without_a_command_is_the_wheels_mean() -> None:
     assert_array_equal(omega, 0.0)
     commanded = replace(line, signals={**line.signals, "cmd.v": np.array([0.5, 0.5, 0.5])})
     assert_array_equal(body_motion(commanded, loop(line), MACHINE)[0], 0.5)
+
+
+def test_body_motion_without_a_commanded_yaw_rate_follows_from_the_angles() -> None:
+    machine, front = haulotte(), np.array([0.0, 0.1, np.nan, 0.1])
+    asked = np.array([np.nan, np.nan, 0.2, np.nan])
+    line = timeline(
+        cmd__v=np.full(4, 0.5), steer__front__phi=front, steer__front__phi_ref=asked, steer__rear__phi=np.zeros(4)
+    )
+    v, omega = body_motion(line, loop(line, machine), machine)
+    length = machine.geometry.axle_x("front") - machine.geometry.axle_x("rear")
+    assert_allclose(omega, v * np.tan([0.0, 0.1, 0.2, 0.1]) / length)
+
+
+def test_body_motion_of_a_machine_without_axles_takes_the_gyro() -> None:
+    line = timeline(cmd__v=[0.5, 0.5], imu__yaw_rate=[0.1, np.nan])
+    assert_array_equal(body_motion(line, loop(line), MACHINE)[1], [0.1, np.nan])
 
 
 def test_a_drive_that_is_commanded_to_rest_is_not_asked_for_anything() -> None:
