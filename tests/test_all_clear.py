@@ -115,3 +115,22 @@ def test_nobody_is_blamed_where_a_speed_loop_hunts(all_clear: ModuleType) -> Non
     report = all_clear.diagnose_signals(signals, all_clear.hydrostatic.machine_of(made)).report
     assert [f["id"] for f in report["intervals"] if f["severity"] != "info"] == []
     assert report["verdict"]["title"] == "The wheels swing together"
+
+
+def test_the_calibration_error_of_a_campaign_is_that_of_its_bins(all_clear: ModuleType) -> None:
+    import campaign_tables
+
+    p, right = np.array([0.55, 0.58, 0.95, 0.93, 1.0]), np.array([True, False, True, True, True])
+    expected = (abs(0.55 + 0.58 - 1) + abs(0.95 + 0.93 + 1.0 - 3)) / 5
+    assert campaign_tables.ece(p, right) == pytest.approx(expected)
+    usual, most = campaign_tables.ece_of_calibrated(np.full(100, 0.6))
+    assert usual == pytest.approx(np.sqrt(0.6 * 0.4 / 100 * 2 / np.pi), rel=0.05)  # mean size of a normal error
+    assert most > usual
+    names = [t.name for t in all_clear.troubles(60.0)]
+    (found,) = all_clear.run(all_clear.Task("default", names.index(DEAD), 11, 60.0, ("spool",)))
+    assert found.claims
+    assert all(0.0 < probability <= 1.0 for probability, _ in found.claims)
+    lines = list(campaign_tables.claims_table([found], TIERS))
+    assert len(lines) == 2
+    assert lines[1].startswith("spool")
+    assert f"of {len(found.claims)} (" in lines[1]

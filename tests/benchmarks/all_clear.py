@@ -47,6 +47,7 @@ import transporter
 import tug
 from accuracy import EVIDENCE
 from campaign import Outcome, Task, judged
+from campaign_tables import claims_table, table
 from foreign_machine import NAME as FOREIGN
 from foreign_machine import faults_for, has, maker, missions, scenario
 from troubles import Trouble, troubles
@@ -242,24 +243,6 @@ def run_all(tasks: Sequence[Task], jobs: int) -> Iterator[list[Outcome]]:
     print(file=sys.stderr)
 
 
-def table(outcomes: Sequence[Outcome]) -> Iterator[str]:
-    """Lines: a machine and level of evidence each."""
-    yield f"{'machine':<22}{'evidence':<9}{'faulty':>7}{'cleared':>8}{'abstain':>8}{'wrong':>6}{'named':>6}{'high wrong':>12}   healthy: stopped, watch, not assessed, ready"
-    for machine in dict.fromkeys(o.machine for o in outcomes):
-        for tier in (*TIERS, SECOND):
-            own = [o for o in outcomes if (o.machine, o.tier) == (machine, tier)]
-            if not own:
-                continue
-            ill, sound = ([o for o in own if (o.trouble == "healthy") is flag] for flag in (False, True))
-            count = [sum(o.outcome == x for o in ill) for x in ("cleared", "abstained", "wrong part", "named")]
-            wrong, high = sum(o.wrong_high for o in ill), sum(o.high for o in ill)
-            states = [sum(o.status == s for o in sound) for s in ("stop", "watch", "not_assessed", "ready")]
-            yield (
-                f"{machine:<22}{tier:<9}{len(ill):>7}{count[0]:>8}{count[1]:>8}{count[2]:>6}{count[3]:>6}{wrong:>6} of {high:<5}"
-                f"   {', '.join(map(str, states))} of {len(sound)}"
-            )
-
-
 def main() -> None:
     """Simulate, judge, print."""
     parser = argparse.ArgumentParser(description="Wrong all-clears and wrong stops.")
@@ -279,7 +262,11 @@ def main() -> None:
     parser.add_argument("--tiers", nargs="+", choices=(*TIERS, SECOND), default=TIERS)
     parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument("--json", type=Path, metavar="FILE", help="write every outcome")
+    parser.add_argument("--read", type=Path, nargs="+", metavar="FILE", help="run nothing: tables of what --json wrote")
     asked = parser.parse_args()
+    if asked.read:
+        lines = [line for file in asked.read for line in file.read_text().splitlines()]
+        return show([Outcome(**json.loads(line)) for line in lines])
     structure = next(n for n, s in STRUCTURES.items() if s.kind == asked.seeds)
     machines = asked.machine or [DEFAULT, structure]
     tasks = tasks_of(
@@ -293,7 +280,12 @@ def main() -> None:
             if file:
                 file.write("".join(json.dumps(asdict(o)) + "\n" for o in batch))
                 file.flush()
-    print("\n".join(table(outcomes)))
+    return show(outcomes)
+
+
+def show(outcomes: Sequence[Outcome]) -> None:
+    """Print the tables, and what was cleared or crashed."""
+    print("\n".join([*table(outcomes, (*TIERS, SECOND)), "", *claims_table(outcomes, (*TIERS, SECOND))]))
     for o in outcomes:
         if o.outcome in ("cleared", "crashed"):
             print(f"{o.outcome}: {o.machine}, {o.tier}: {o.trouble}, seed {o.seed}")

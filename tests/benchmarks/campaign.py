@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from troubles import Part, Trouble, troubles
@@ -48,6 +49,7 @@ class Outcome:
     bounded: int = 0
     held: int = 0
     findings: tuple[str, ...] = ()
+    claims: tuple[tuple[float, bool], ...] = ()  # probability of each finding, and whether part and row are right
     seed: int = -1
     kind: int | None = None
 
@@ -69,7 +71,8 @@ def judged(task: Task, tier: str, name: str, report: ReportDocument, parts: froz
     sure = [f["probability"] >= _SURE for f in found]
     if parts is None:
         sound = Outcome(task.machine, name, tier, verdict["status"], len(high), len(high), verdict["status"], words)
-        return replace(sound, sure=sum(sure), wrong_sure=sum(sure), **own)
+        claims = tuple((f["probability"], False) for f in found)
+        return replace(sound, sure=sum(sure), wrong_sure=sum(sure), claims=claims, **own)
     right = [any(_names(f["component"], f["side"], part) for part in parts) for f in found]
     wrong_high = 0 if not parts else sum(f["severity"] == "high" and not ok for f, ok in zip(found, right, strict=True))
     named = any(right) if parts else bool(found)
@@ -86,8 +89,18 @@ def judged(task: Task, tier: str, name: str, report: ReportDocument, parts: froz
     held = [h for f in on_part for h in _held(task, f)]
     return replace(
         ill, sure=sum(sure) if parts else 0, wrong_sure=wrong_sure,
-        rows=len(rows), right_rows=sum(rows), bounded=len(held), held=sum(held), **own,
+        rows=len(rows), right_rows=sum(rows), bounded=len(held), held=sum(held), claims=_claims(task, found, right), **own,
     )  # fmt: skip
+
+
+def _claims(task: Task, found: Sequence[IntervalRow], right: Sequence[bool]) -> tuple[tuple[float, bool], ...]:
+    """Probability of each finding, and whether it names a part that fails with its row, or with none; empty where what is wrong has no row."""
+    if task.trouble is None or not task.trouble.faults:
+        return ()
+    return tuple(
+        (f["probability"], ok and (f["mode"] == "outside_table" or f["mode"] in _modes(task, f)))
+        for f, ok in zip(found, right, strict=True)
+    )
 
 
 def _modes(task: Task, finding: IntervalRow) -> set[str]:
