@@ -53,6 +53,9 @@ _SLOWER = 3.0  # times the deviation of the others' speeds
 #: Of full opening, by which a wheel may differ from the others at one speed, and times what the next one does. Healthy wheels of 14 machines
 #: (28 tuning missions) had 0.07 where no other had 0.032, and else 1.6 times the next.
 LEAST_OFFSET, _OFF_ALONE = 0.08, 2.2
+#: The same of one of two driven wheels, in windows alone: over the mission each is as far off as the other. Two healthy ones of such a truck had 0.033
+#: at most, and 1.5 times each other's (five missions).
+_OFF_OF_PAIR = 2.0
 _STANDS_BEHIND, _FOLLOWS = 0.5, (0.7, 1.3)  # of its command: a wheel that hardly answers beside one that does
 
 
@@ -135,9 +138,11 @@ def wheel_checks(cells: Cells, clear_at: float) -> Iterator[Checked]:
                 yield lasts(cells, (*about, either, Check.LASTING_EXCESS), lasting[i].above, own.lasting_above)
             if tells and not any(twice[i]) and i in beside:
                 yield worst(cells, (*about, either, Check.SAME_SIDE), *beside[i], apart=True)
-            if tells and not any(twice[i]) and np.isfinite(offsets[1][i]):
+            if tells and (not any(twice[i]) or powered == OTHERS) and np.isfinite(offsets[1][i]):
                 about_opening = (*about, either, Check.OPENING_OFFSET)
                 once, usual = (alone(x, i, 1.0, LEAST_OFFSET, _OFF_ALONE) for x in most_off)
+                if powered == OTHERS:
+                    once = alone(most_off[0], i, 1.0, LEAST_OFFSET, _OFF_OF_PAIR, others=1)
                 yield max(
                     worst(cells, about_opening, offsets[0][:, i], once, apart=True),
                     lasts(cells, about_opening, float(offsets[1][i]), usual),
