@@ -6,12 +6,14 @@ from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from diagnosis.clearing.cells import Array, Cells
 from diagnosis.clearing.leaps import heights
 from diagnosis.clearing.longer import around, longer
-from diagnosis.clearing.measure import alone, off_commands, times, worst
+from diagnosis.clearing.measure import alone, as_followed, lasts, off_commands, times, worst
 from diagnosis.clearing.responses import largest
+from diagnosis.clearing.seconds import slope_off
 from diagnosis.results.clearing import Check, Checked
 from diagnosis.results.vocabulary import Kind
 from replay.arrays.blocks import release
@@ -24,6 +26,7 @@ _VALVE, _LEAST, _TIMES, _LONG = 1.4, 0.6, 2.2, {Kind.WHEEL: 0.6, Kind.STEER: 1.0
 _JITTER = 0.2  # of the loss that counts: noise of a position, of full opening
 _OF_NOISE = 0.5645  # mean height of the peaks of white noise of one sample's standard deviation, 0 between them
 _MANY = 8  # readings of a window
+_SMALL = 0.1  # of `OPENING`: a command that varies by less, root mean square, shows nothing
 
 
 class BesideCommands(NamedTuple):
@@ -71,11 +74,26 @@ def valve_checks(cells: Cells, kind: Kind, clear_at: float) -> Iterator[Checked]
         if not all(np.isfinite(cells.means(f"{part}.{leaf}")).any() for leaf in ("u", "u_applied")):
             continue
         about = (kind, name, Side.ACTUATOR)
+        yield worst(cells, (*about, Check.JITTER), _jitter(cells, part), _JITTER * clear_at, apart=True)
+        if not np.isfinite(off[:, i]).any():
+            whole = _by_changes(cells, kind, i, cells.apart(name))
+            yield lasts(cells, (*about, Check.SECOND_MEASUREMENT), whole, _LONG[kind] * clear_at)
+            continue
         brief = worst(cells, (*about, Check.SECOND_MEASUREMENT), off[:, i], limits[i], apart=True)
         most = _LONG[kind] * clear_at
         lasting = worst(cells, (*about, Check.SECOND_MEASUREMENT), long[:, i], most, apart=True)
         yield max(brief, around(lasting), key=times)
-        yield worst(cells, (*about, Check.JITTER), _jitter(cells, part), _JITTER * clear_at, apart=True)
+
+
+def _by_changes(cells: Cells, kind: Kind, i: int, use: NDArray[np.bool_]) -> float | None:
+    """By how much a position changes more or less than its command over the mission, as a share, of a valve that is opened by little alone.
+
+    `use` of shape (cells,); None where that tells too little.
+    """
+    leaves = cells.wheels if kind is Kind.WHEEL else cells.axles
+    position, command = leaves("u_applied"), leaves("u")
+    followed = as_followed(cells, position, command, OPENING)
+    return slope_off(np.where(use, position[:, i], np.nan), followed[:, i], cells.dt, _SMALL * OPENING)
 
 
 def _jitter(cells: Cells, part: str) -> Array:

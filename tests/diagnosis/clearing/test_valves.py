@@ -64,3 +64,28 @@ def test_a_speed_alone_beside_its_second_measurement_is_held_to_what_the_others_
     check = checks_by_part(with_columns(mission, wheel__RR__v=v), base=False)["RR", "sensor", Check.SECOND_MEASUREMENT]
     assert not check.passed
     assert check.limit < 0.12
+
+
+def opened_by_little(loses: float) -> SimulatedMission:
+    """A mission whose rear axle is steered by a hundredth of full opening alone and whose valve loses a share of that."""
+    mission, size = simulated(), 0.015
+    u = mission.columns["steer.rear.u"]
+    command = size * np.sin(2.0 * np.pi * 0.15 * np.arange(u.size) / RATE_HZ)
+    opening = (1.0 - loses) * command
+    return with_columns(mission, steer__rear__u=command, steer__rear__u_applied=opening)
+
+
+def test_a_valve_that_is_opened_by_little_alone_is_judged_by_all_of_the_mission() -> None:
+    for loses, passes in ((0.0, True), (0.1, True), (0.35, False), (1.0, False)):
+        check = checks_by_part(opened_by_little(loses), base=False)["rear", "actuator", Check.SECOND_MEASUREMENT]
+        assert check.worst is not None
+        assert abs(check.worst - loses) < 0.05
+        assert check.passed is passes
+        assert check.start_s is None
+
+
+def test_a_valve_that_is_not_opened_at_all_stays_open() -> None:
+    mission = simulated()
+    none = np.zeros(mission.columns["steer.rear.u"].size)
+    mission = with_columns(mission, steer__rear__u=none, steer__rear__u_applied=none)
+    assert checks_by_part(mission, base=False)["rear", "actuator", Check.SECOND_MEASUREMENT].worst is None
