@@ -6,7 +6,8 @@ another one of the machine is off by as much in the same moment. A loss or an of
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,9 +15,10 @@ from numpy.typing import NDArray
 from diagnosis.channels.noise import shifted
 from diagnosis.direct.identification import IdentifiedPair
 from diagnosis.direct.low_speed import evened_off, in_lasting, left_open
-from diagnosis.results.assessment import Assessment, Finding
+from diagnosis.results.assessment import CODE, Assessment, Finding
 from replay.arrays.numeric import without_nan
 from replay.arrays.sliding import largest_within
+from replay.faults import State
 
 Array = NDArray[np.float64]
 
@@ -27,6 +29,7 @@ _SLOW = 0.2  # of it
 _ALONE = 0.25  # of a deviation's power, at moments that no other sensor shares: more is the sensor's own
 _KEPT = 0.5  # of the deviation, that a fault shows at steady speed as well
 _LEAST = 0.15  # of a finding at steady speed, to tell
+_HARDLY = 0.08  # of the speed: as little off is no loss that counts
 
 
 def without_shared_moments(
@@ -58,8 +61,24 @@ def without_shared_moments(
     for w, a in assessments.items():
         others = {name: x for name, x in habit.items() if name != w}
         shared = [f for f in a.findings if _shared(f, off[w], _beside(f, others, lasting), steady[w], found[w].pair.dt)]
-        out[w] = left_open(a, shared)
+        out[w] = _healthy_at_speed(left_open(a, shared), shared, steady[w] & _as_it_should(off[w], found[w]))
     return out
+
+
+def _as_it_should(off: Array, one: IdentifiedPair) -> NDArray[np.bool_]:
+    """Samples that are off by less than a healthy sensor may be at steady speed, shape (n,)."""
+    return np.asarray(off < _HARDLY * np.abs(without_nan(one.samples.x)))
+
+
+def _healthy_at_speed(a: Assessment, shared: Sequence[Finding], steady: NDArray[np.bool_]) -> Assessment:
+    """An assessment that calls a sensor healthy in what such findings leave open, where it reads as it should at steady speed."""
+    if not shared:
+        return a
+    states = a.states.copy()
+    for f in shared:
+        inside = states[f.start : f.stop]
+        inside[(inside == CODE[State.NOT_ASSESSED]) & steady[f.start : f.stop]] = CODE[State.HEALTHY]
+    return replace(a, states=states)
 
 
 def _by_itself(finding: Finding, off: Array, steady: NDArray[np.bool_], fast: NDArray[np.bool_]) -> bool:

@@ -32,6 +32,7 @@ _TRAVEL, _STANDS = (
     0.015,
 )  # of the span: a command that moves by more takes a healthy valve along; not in its middle
 _FEW, _EVEN = 10, 0.5  # samples; probability of a row
+_NOISE = 0.01  # of the span: by less a reading varies beside its reference on a machine that is fast
 _MOST_PROBABLY = 0.75  # that a gain is more than any row has
 
 
@@ -46,7 +47,8 @@ def mode_of(isolated: Isolated, found: IdentifiedPair, limits: Limits) -> FaultM
             return None
         return _mode_of_gain(isolated, noise, found, limits)
     if mode.varying:
-        counts = limits.min_sat / 2 if found.pair.side is Side.SENSOR else least_constant(found, limits)
+        sensor = found.pair.side is Side.SENSOR
+        counts = max(limits.min_sat / 2, _NOISE * found.pair.span) if sensor else least_constant(found, limits)
         least = max(2.5 * found.model.noise, 1.5 * noise, counts)
         epsilon = isolated.estimate[0]
         outside = epsilon is not None and epsilon.exceeds_table(limits.min_epsilon) > _MOST_PROBABLY

@@ -101,3 +101,15 @@ def test_what_all_sensors_read_while_the_machine_creeps_is_a_habit_however_total
         pair.samples.y[creeps] = 0.0
     told = without_shared_moments(pairs, {w: assessment(2000, 2800, FaultMode.NO_SIGNAL) for w in WHEELS})
     assert not any(a.findings for a in told.values())
+
+
+def test_such_a_sensor_is_healthy_at_steady_speed_where_it_reads_as_it_should() -> None:
+    """What is left open are the moments themselves."""
+    pairs = {w: sensor(late_s=0.1 if w in ("FR", "RL") else 0.0) for w in WHEELS}
+    pairs["FR"].samples.y[400:415] -= 0.1
+    told = without_shared_moments(pairs, {"FR": assessment(300, 1400)})["FR"]
+    assert told.findings == ()
+    healthy = told.states == CODE[State.HEALTHY]
+    assert healthy[550:750].all()
+    assert not healthy[405:410].any()
+    assert not healthy[slice(*TURN)].any()

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from diagnosis.direct.identification import IdentifiedPair
 from diagnosis.direct.isolation import Isolated
 from diagnosis.direct.stated_mode import mode_of, slowly_off
-from diagnosis.estimation.fault_models import STUCK
+from diagnosis.estimation.fault_models import NOISY, STUCK
 from replay.faults import FaultMode, Side
 from replay.machine.config import Limits
 
@@ -47,3 +47,14 @@ def test_what_a_second_evens_out_is_no_slow_deviation() -> None:
     quick = 0.02 * np.sin(2 * np.pi * 10.0 * np.arange(SIZE) * DT)
     assert slowly_off(SPEED, SPEED + quick, DT) < 0.001
     assert slowly_off(SPEED, SPEED + quick + 0.05, DT) == pytest.approx(0.05, rel=0.02)
+
+
+@pytest.mark.parametrize(("top", "expected"), [(0.5, FaultMode.NOISY), (3.0, None)])
+def test_noise_of_a_hundredth_of_the_speed_that_a_machine_reaches_moves_nothing(
+    top: float, expected: FaultMode | None
+) -> None:
+    seen = SimpleNamespace(noise=0.002, deviation=0.02)
+    pair = SimpleNamespace(side=Side.SENSOR, span=top, dt=DT)
+    found = SimpleNamespace(pair=pair, model=SimpleNamespace(noise=0.002, dt=DT))
+    isolated = SimpleNamespace(run=SimpleNamespace(row=NOISY), seen=seen, estimate=(None, None, 1.0))
+    assert mode_of(cast(Isolated, isolated), cast(IdentifiedPair, found), Limits()) is expected
