@@ -93,10 +93,10 @@ def axle_checks(cells: Cells, clear_at: float) -> Iterator[Checked]:
             ) * share
             parted = lasts(cells, (*about, either, Check.RATE), None if told else rates.parted[j], between)
             yield max([deviates, alone_off, *(c for c in (changed, parted) if c.worst is not None)], key=times)
-            if len(cells.machine.axles) > 1 and not joint:
-                yield lasts(cells, (*about, either, Check.LASTING_RATE), rates.apart[j], RATE[twice][1] * share)
-            elif not twice:  # both sides of which are measured twice needs nothing to compare with
-                yield lasts(cells, (*about, either, Check.PLANT_RATE), rates.apart[j], RATE[twice][1] * share)
+            against = Check.LASTING_RATE if len(cells.machine.axles) > 1 and not joint else Check.PLANT_RATE
+            # both sides of which are measured twice needs nothing to compare with
+            if not twice or (against is Check.LASTING_RATE and rates.apart[j] is not None):
+                yield lasts(cells, (*about, either, against), rates.apart[j], RATE[twice][1] * share)
 
 
 def _beside_second(cells: Cells, axle: str, angle: Array, second: Array, clear_at: float) -> Checked:
