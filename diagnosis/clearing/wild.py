@@ -12,6 +12,7 @@ from diagnosis.clearing.leaps import heights
 from replay.arrays.blocks import release
 
 _NOISES, _OF_TOP = 8.0, 0.1  # times the usual noise, and share of the top speed, from which on a reading is wild
+_TURNING = 20  # readings that tell its noise while it turns
 _FEW = 3  # in a window: fewer are a recorder's
 
 
@@ -58,6 +59,13 @@ def _wild(cells: Cells, name: str) -> tuple[NDArray[np.intp], Array]:
     release(y)
     before, after = v[1:-1] - v[:-2], v[1:-1] - v[2:]
     alone = heights(before, after)
-    usual = float(np.median(np.abs(before + after))) / 0.6745 / np.sqrt(6.0)
-    wild = alone > max(_NOISES * usual, _OF_TOP * cells.machine.max_speed)
+    wild = alone > max(_NOISES * _usual(v, cells.machine.limits.driving_speed), _OF_TOP * cells.machine.max_speed)
     return at[1:-1][wild], np.asarray(alone[wild], dtype=np.float64)
+
+
+def _usual(v: Array, driving_speed: float) -> float:
+    """Usual noise of readings, shape (n,), while the wheel turns where it mostly stands, for a wheel that stands has none [m/s]."""
+    second = np.abs(v[2:] + v[:-2] - 2.0 * v[1:-1])
+    turns = np.minimum(np.abs(v[2:]), np.abs(v[:-2])) > driving_speed
+    some = [second, second[turns]] if np.count_nonzero(turns) >= _TURNING else [second]
+    return max(float(np.median(s)) for s in some) / 0.6745 / float(np.sqrt(6.0))

@@ -30,6 +30,7 @@ _UNMADE, _UNMADE_S = (
     10.0,
 )  # of its command, or it of that, and commanded time: nothing like the command is made of it
 _ELSEWHERE, _ELSEWHERE_S = 0.35, 1.5  # of the top speed: all drives that far off their commands, for so long
+_MOVES, _READINGS = 0.1, 100  # of a usual large speed; how many tell what a wheel reads of its command
 _STATE_S = 4.0  # of that, from which on it is worth a verdict
 
 
@@ -172,13 +173,7 @@ def otherwise(judged: Mapping[str, Judged], block_s: float, followed: Flags) -> 
 
 def unlike(judged: Mapping[str, Judged]) -> dict[str, Reason]:
     """Wheels that make something else of their command than other wheels do, or any drive would, with a sentence."""
-    out = {
-        w: Reason(
-            f"over the whole mission it reads {share:.2f} × what the other {{wheels}} make of the same command: a scaled or wrongly "
-            "mapped sensor, {or_size}a weak {valve}"
-        )
-        for w, share in unlike_others(judged).items()
-    }
+    out = {w: _unlike(w, share, judged) for w, share in unlike_others(judged).items()}
     for w, own in _made(judged).items():
         if w not in out and not _NEAR[0] <= own <= _NEAR[1]:
             out[w] = Reason(
@@ -187,6 +182,32 @@ def unlike(judged: Mapping[str, Judged]) -> dict[str, Reason]:
                 Lack.UNIT,
             )
     return out
+
+
+def _unlike(wheel: str, share: float, judged: Mapping[str, Judged]) -> Reason:
+    """The sentence of a wheel whose answer is `share` of what the others make of its command."""
+    readings = {w: _reads(j) for w, j in judged.items() if j.response.answered}
+    others = [x for w, x in readings.items() if w != wheel and np.isfinite(x)]
+    beside = readings.get(wheel, np.nan) / float(np.median(others)) if others else np.nan
+    if _LASTING <= beside <= 1.0 / _LASTING:
+        return Reason(
+            f"where it is told to move and moves it reads {beside:.2f} × what the other {{wheels}} make of the same command, but the answer that "
+            f"was found for the whole mission is {share:.2f} × theirs: it did not follow its commands all the time"
+        )
+    return Reason(
+        f"over the whole mission it reads {share:.2f} × what the other {{wheels}} make of the same command: a scaled or wrongly "
+        "mapped sensor, {or_size}a weak {valve}"
+    )
+
+
+def _reads(one: Judged) -> float:
+    """Usual share of its command that a wheel reads where it is told to move and moves [1]; NaN where that is seldom."""
+    y, asked = np.abs(np.nan_to_num(one.data.y)), np.abs(np.nan_to_num(one.data.asked))
+    known = one.data.fresh & (y > 0.0) & (asked > 0.0)
+    if np.count_nonzero(known) < _READINGS:
+        return np.nan
+    known &= (y > _MOVES * np.quantile(y[known], 0.9)) & (asked > _MOVES * np.quantile(asked[known], 0.9))
+    return float(np.median(y[known] / asked[known])) if np.count_nonzero(known) >= _READINGS else np.nan
 
 
 def unlike_others(judged: Mapping[str, Judged]) -> dict[str, float]:

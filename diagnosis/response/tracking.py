@@ -109,8 +109,9 @@ def assess_tracking(
     states = np.where(driven, CODE[State.NOT_ASSESSED], CODE[State.NOT_EXCITED]).astype(np.int8)
     states[~np.isfinite(v) | ~np.isfinite(v_ref)] = CODE[State.NO_DATA]
     last, proved = _last_motion(v, reference, lag, dt)
-    small = _small_copy(v[last:], reference[last:], dt)
-    found = None if small else _standstill(v, _Tracking(asked, driven, last, proved, lag), dt, names)
+    copies = _small_copy(v[last:], reference[last:], dt) > 0.0
+    small = _small_copy(v, reference, dt) if copies else 0.0  # a moment before its end has any size
+    found = None if copies else _standstill(v, _Tracking(asked, driven, last, proved, lag), dt, names)
     findings = sorted(
         (
             *(() if found is None else (found,)),

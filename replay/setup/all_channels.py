@@ -12,7 +12,7 @@ from replay.arrays.blocks import blocks
 from replay.log.raw_log import Channel, RawLog
 from replay.machine.config import Machine
 from replay.machine.units import known_unit
-from replay.signals.channel_data import sparse_rows
+from replay.signals.channel_data import own_rows
 from replay.signals.file_names import in_its_file, named_channels
 from replay.signals.named_units import unit_by_end
 from replay.signals.rules import candidates
@@ -89,19 +89,19 @@ def channel_rows(logs: Sequence[RawLog], machine: Machine) -> list[ChannelRow]:
             if channel.field.startswith("pose.pose.orientation."):  # four numbers, one heading
                 label = f"{channel.topic}.pose.pose.orientation"
             could_be = dict.fromkeys(signal for _, signal in sorted(fits.get(label, [])))
-            rows.append(_row(channel, log.source, tuple(could_be)))
+            rows.append(_row(log, channel, tuple(could_be)))
     return rows
 
 
-def _row(channel: Channel, source: str, could_be: tuple[str, ...]) -> ChannelRow:
+def _row(log: RawLog, channel: Channel, could_be: tuple[str, ...]) -> ChannelRow:
     low, high = _range(channel)
     stamps = channel.stamps
-    if not channel.topic and channel.values.dtype.kind == "f":
-        stamps = stamps[sparse_rows(channel.values)]
+    if not channel.topic:
+        stamps = stamps[own_rows(log, channel)]
     period = median_period(stamps)
     unit, guessed = unit_of_channel(channel)
     return ChannelRow(
-        channel.name, channel.topic, channel.field, channel.type_name, source, len(stamps),
+        channel.name, channel.topic, channel.field, channel.type_name, log.source, len(stamps),
         1e9 / period if period > 0 else None, low, high, unit, guessed, could_be,
     )  # fmt: skip
 

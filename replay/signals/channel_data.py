@@ -12,6 +12,11 @@ from numpy.typing import NDArray
 from replay.log.raw_log import Channel, RawLog
 from replay.log.source_options import SignalSource
 
+_HALF_FILLED = 0.6  # of a table's rows: a column that fills more of them is not slow
+_TOGETHER = 0.5  # of a column's rows that another fills too: both belong to one part of a merged table
+_MET, _TOLD = 0.2, 0.8  # of a column's rows that other parts fill too, at most; of its empty ones, at least
+_LOOKED_AT = 5000  # rows
+
 
 def is_source(path: str, pattern: str | None) -> bool:
     """Whether a log's path is one that a pattern of files names; every one without a pattern."""
@@ -53,16 +58,65 @@ def channel_data(log: RawLog, channel: Channel, source: SignalSource) -> tuple[N
         return channel.stamps, yaw
     values = np.asarray(channel.values)
     if not channel.topic:
-        return _sparse(channel.stamps, values)
+        rows = own_rows(log, channel)
+        return channel.stamps[rows], values[rows]
     return channel.stamps, values
 
 
-def _sparse(stamps: NDArray[np.int64], values: NDArray[Any]) -> tuple[NDArray[np.int64], NDArray[Any]]:
-    """Drop the empty cells of a slow column beside fast ones; cells of a silent channel stay empty."""
+def own_rows(log: RawLog, channel: Channel) -> NDArray[np.int64]:
+    """Rows of a table that hold the samples of one of its columns: without the empty cells of a slow column beside fast ones.
+
+    Empty cells of a silent channel stay, in which its neighbours go on.
+
+    Parameters
+    ----------
+    log : RawLog
+        Whose column it is.
+    channel : Channel
+        Of n rows.
+
+    Returns
+    -------
+    NDArray[np.int64], shape (k,)
+        Ascending numbers of rows; all n where the column is not slow.
+    """
+    values = np.asarray(channel.values)
     if values.dtype.kind != "f":
-        return stamps, values
+        return np.arange(len(values))
     rows = sparse_rows(values)
-    return stamps[rows], values[rows]
+    if len(rows) < len(values):
+        return rows
+    return _of_its_part(log, channel, np.isfinite(values))
+
+
+def _of_its_part(log: RawLog, channel: Channel, filled: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """Rows of a column's part of a table that was put together from several, whose rows fill the columns of one part each.
+
+    All rows where it was not. `filled`, shape (n,), are those that the column fills.
+    """
+    share = float(filled.mean()) if filled.size else 1.0
+    if not 0.0 < share <= _HALF_FILLED or np.count_nonzero(filled) < 3:
+        return np.arange(filled.size)
+    own, empty = (_some(np.flatnonzero(where)) for where in (filled, ~filled))
+    part, met, told = filled.copy(), np.zeros(own.size, bool), np.zeros(empty.size, bool)
+    for other in log.channels.values():
+        cells = np.asarray(other.values)
+        if other.topic or other is channel or len(cells) != filled.size or cells.dtype.kind != "f":
+            continue
+        here = np.isfinite(cells[own])
+        if here.mean() > _TOGETHER:
+            part |= np.isfinite(cells)
+        else:
+            met |= here
+            told |= np.isfinite(cells[empty])
+    told |= part[empty]
+    merged = met.mean() <= _MET and told.mean() >= _TOLD
+    return np.flatnonzero(part) if merged else np.arange(filled.size)
+
+
+def _some(rows: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Some of many rows, evenly spread."""
+    return rows[:: max(1, rows.size // _LOOKED_AT)]
 
 
 def sparse_rows(values: NDArray[Any]) -> NDArray[np.int64]:
@@ -72,7 +126,7 @@ def sparse_rows(values: NDArray[Any]) -> NDArray[np.int64]:
     """
     rows = np.flatnonzero(~np.isnan(values))
     steps = np.diff(rows)
-    if len(rows) < 3 or len(rows) > 0.6 * len(values):
+    if len(rows) < 3 or len(rows) > _HALF_FILLED * len(values):
         return np.arange(len(values))
     usual = np.median(steps)
     regular = float((np.abs(steps - usual) <= max(1.0, 0.2 * usual)).mean())

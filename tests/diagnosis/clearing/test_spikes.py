@@ -52,3 +52,12 @@ def test_a_healthy_speed_a_few_leaps_and_a_coarse_reading_are_no_spikes() -> Non
     assert _found(MISSION) is None
     assert _found(_leaping(0.0008)) is None
     assert _found(_leaping(0.5)) is None
+
+
+@pytest.mark.parametrize(("noise", "leaps", "told"), [(0.1, 0.0, False), (0.02, 0.0, False), (0.02, 0.03, True)])
+def test_a_wheel_that_mostly_stands_is_held_to_its_noise_while_it_turns(noise: float, leaps: float, told: bool) -> None:
+    rng, size = np.random.default_rng(3), MISSION.stamps.size
+    turns = np.arange(size) > 0.7 * size
+    speed = 0.6 + noise * rng.normal(size=size) + np.where(rng.random(size) < leaps, 1.0, 0.0)
+    mission = replace(MISSION, columns={**MISSION.columns, "wheel.FL.v": np.where(turns, speed, 0.0)})
+    assert (_found(mission) is not None) == told

@@ -119,3 +119,14 @@ def test_a_drive_that_keeps_the_speed_it_was_told_has_no_wrong_unit() -> None:
     for one in assess_tracking(v, asked, DT, LIMITS, NAMES):
         assert one.findings == ()
         assert "wrong unit" not in one.reasons[State.NOT_ASSESSED]
+
+
+@pytest.mark.parametrize("lag", [0, 10])
+def test_what_is_left_of_a_motion_at_the_end_is_no_wrong_unit(lag: int) -> None:
+    asked = command()
+    asked[-100:], asked[-50:] = 0.0, 0.1
+    v = np.r_[np.zeros(lag), asked[: N - lag]] + 0.02 * np.random.default_rng(1).normal(size=N)
+    v[-50:] = 0.01
+    for one in assess_tracking(v, asked, DT, LIMITS, NAMES):
+        assert one.findings == ()
+        assert "wrong unit" not in one.reasons[State.NOT_ASSESSED]

@@ -216,6 +216,44 @@ def test_a_slow_column_loses_its_empty_cells_and_a_silent_one_keeps_them() -> No
     assert len(found["wheel.FR.v"].stamps) == 100
 
 
+def merged(seed: int, periods: tuple[float, ...] = (0.05, 0.04, 0.07)) -> tuple[list[np.ndarray], np.ndarray]:
+    """Stamps [s] of several recorders and, in their union, which of them each row is of, shape (n,)."""
+    rng = np.random.default_rng(seed)
+    stamps = [np.cumsum(p * rng.uniform(0.4, 1.6, 400)) for p in periods]
+    of = np.repeat(np.arange(len(stamps)), [s.size for s in stamps])
+    return stamps, of[np.argsort(np.concatenate(stamps), kind="stable")]
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_table_merged_of_several_loses_the_empty_cells_of_each(seed: int) -> None:
+    stamps, of = merged(seed)
+    at = (np.sort(np.concatenate(stamps)) * 1e9).astype(np.int64)
+    names = ("wheel.FR.v", "imu.yaw_rate", "odom.v")
+    columns = [np.where(of == k, 0.5 + 0.01 * k, np.nan) for k in range(3)]
+    found = mapped(*(channel(n, c, stamps=at) for n, c in zip(names, columns, strict=True))).items
+    for k, name in enumerate(names):
+        assert len(found[name].stamps) == 400
+        assert np.isfinite(found[name].values).all()
+        np.testing.assert_array_equal(found[name].stamps, at[of == k])
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_lost_channel_of_a_merged_table_keeps_the_empty_cells_of_its_own_rows(seed: int) -> None:
+    stamps, of = merged(seed)
+    at = (np.sort(np.concatenate(stamps)) * 1e9).astype(np.int64)
+    whole = np.where(of == 0, 0.5, np.nan)
+    lost = np.where(np.random.default_rng(seed).random(of.size) < 0.5, whole, np.nan)
+    other = np.where(of > 0, 0.5, np.nan)
+    found = mapped(
+        channel("wheel.FR.v", lost, stamps=at),
+        channel("wheel.FL.v", whole, stamps=at),
+        channel("imu.yaw_rate", other, stamps=at),
+    ).items
+    assert len(found["wheel.FL.v"].stamps) == 400
+    assert len(found["wheel.FR.v"].stamps) == 400
+    assert np.isfinite(found["wheel.FR.v"].values).mean() == pytest.approx(0.5, abs=0.1)
+
+
 def given(**signals: SignalSource) -> Machine:
     return replace(MACHINE, signals={k.replace("__", "."): v for k, v in signals.items()})
 
