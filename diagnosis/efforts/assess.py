@@ -13,7 +13,7 @@ from diagnosis.efforts.inputs import is_asked, wheels_with_efforts
 from diagnosis.efforts.relation import Shares
 from diagnosis.efforts.windows import EffortSteps, steps_of
 from diagnosis.evidence import ACTUATOR, SENSOR, MissionView, Part
-from diagnosis.results.assessment import CODE, Assessment, Finding
+from diagnosis.results.assessment import CODE, Assessment, Finding, Reason
 from diagnosis.results.detectability import Deviation, Power, Powers
 from diagnosis.results.result import Epsilon, Hypothesis
 from diagnosis.results.sentence import About, Sentence
@@ -27,7 +27,10 @@ from replay.signals.timeline import Timeline
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
-_BEYOND, _LEAST = 2.0, 0.03  # times what healthy missions showed, and the least share, from which on a drive is not called healthy
+_BEYOND, _LEAST = (
+    2.0,
+    0.03,
+)  # times what healthy missions showed, and the least share, from which on a drive is not called healthy
 _FOUND, _FOUND_LEAST = 3.0, 0.2  # the same, from which on it is named
 _RIVAL = 0.5  # of the share of a drive that is named, up to which another one's may be
 _SURE = 0.95  # of the places
@@ -36,9 +39,7 @@ _FASTER = 1.15  # than healthy missions, from where on nothing is known
 _P = 0.9  # by what was right on tuning missions; set by hand
 _TRACED = 1  # of `LENGTHS_S`
 
-HIDDEN_BY_LOOP = (
-    "its effort is the torque or current that it gives, and a loop around the speed makes up for what is lost before that; log its duty or voltage as well"
-)
+HIDDEN_BY_LOOP = "its effort is the torque or current that it gives, and a loop around the speed makes up for what is lost before that; log its duty or voltage as well"
 NO_LOOP = "no loop with memory is seen to hold its speed, so that the other {wheels} would carry what it loses"
 WOULD_HIDE = "a loss of a quarter of its torque would not always have shown in its effort"
 DIFFERS = "its effort is off what healthy missions took by more than they differed, and too little to be named"
@@ -120,12 +121,26 @@ def _named(efforts: Efforts) -> dict[int, list[tuple[int, int, float]]]:
         for k, runs in every.items():
             least = max(_FOUND_LEAST, _FOUND * model.off[k])
             for share, a, b in zip(*runs[i], strict=True):
-                if abs(share) > least and all(_beside(runs[j], int(a), int(b)) < _RIVAL * abs(share) for j in range(len(runs)) if j != i):
+                if abs(share) > least and all(
+                    _beside(runs[j], int(a), int(b)) < _RIVAL * abs(share) for j in range(len(runs)) if j != i
+                ):
                     part = off[a:b]
                     off[a:b] = np.where(np.abs(part) > abs(share), part, share)
-        spans = [(a, b, float(np.median(off[a:b]))) for a, b in runs_of(off != 0.0)]
-        found[i] = [(a, b, x) for a, b, x in spans if abs(x) > _FOUND_LEAST]
+        spans = [
+            (*_trimmed(efforts.shares, i, a, b, float(np.median(off[a:b]))), float(np.median(off[a:b])))
+            for a, b in runs_of(off != 0.0)
+        ]
+        found[i] = [(a, b, x) for a, b, x in spans if b > a and abs(x) > _FOUND_LEAST]
     return found
+
+
+def _trimmed(shares: Shares, wheel: int, start: int, stop: int, share: float) -> tuple[int, int]:
+    """A span from the first to the last of its steps that by itself is off the same way, by half as much."""
+    way = np.sign(share) * np.sign(shares.expected[start:stop, wheel]) * shares.rest[start:stop, wheel]
+    own = np.flatnonzero(
+        way > 0.5 * abs(share) * np.maximum(np.abs(shares.expected[start:stop, wheel]), 0.5 * shares.usual[wheel])
+    )
+    return (start + int(own[0]), start + int(own[-1]) + 1) if own.size else (start, stop)
 
 
 def _beside(runs: tuple[Array, NDArray[np.intp], NDArray[np.intp]], start: int, stop: int) -> float:
@@ -136,7 +151,12 @@ def _beside(runs: tuple[Array, NDArray[np.intp], NDArray[np.intp]], start: int, 
 
 
 def _judged(
-    drive: Assessment, sensor: Assessment, efforts: Efforts, i: int, spans: list[tuple[int, int, float]], mission: MissionView
+    drive: Assessment,
+    sensor: Assessment,
+    efforts: Efforts,
+    i: int,
+    spans: list[tuple[int, int, float]],
+    mission: MissionView,
 ) -> Assessment:
     """A drive with what its effort shows."""
     length, size = efforts.steps.length, drive.states.size
@@ -151,16 +171,15 @@ def _judged(
         states[start:stop] = CODE[State(more[-1].mode.value)]
     powers = _powers(efforts, i, mission)
     why = _why_not(efforts, i, powers, mission, open_=bool(more))
-    healthy = np.repeat(efforts.steps.use[:, i], length)
+    healthy = np.repeat(_seen(efforts, i, mission.machine), length)
     healthy = np.r_[healthy, np.zeros(size - healthy.size, bool)]
     told = replace(drive, findings=tuple(sorted((*drive.findings, *more), key=lambda f: f.start)), states=states)
     if why:
         reason = drive.reasons.get(State.NOT_ASSESSED, "")
         return replace(told, reasons={**told.reasons, State.NOT_ASSESSED: why if not reason or not more else reason})
-    driven = states == CODE[State.NOT_ASSESSED]
-    covered = np.mean(healthy[driven]) if driven.any() else 0.0
-    states[driven & (healthy | (covered > 0.5))] = CODE[State.HEALTHY]
-    return replace(told, states=states, powers=powers, notes=(*told.notes, _note(efforts, i)))
+    states[(states == CODE[State.NOT_ASSESSED]) & healthy] = CODE[State.HEALTHY]
+    told = replace(told, states=states, powers=powers, notes=(*told.notes, _note(efforts, i)))
+    return told.reasoned(State.NOT_ASSESSED, Reason(WOULD_HIDE))
 
 
 def _why_not(efforts: Efforts, i: int, powers: Powers, mission: MissionView, *, open_: bool) -> str:
@@ -173,10 +192,8 @@ def _why_not(efforts: Efforts, i: int, powers: Powers, mission: MissionView, *, 
     off = [np.max(np.abs(efforts.shares.over(i, n)[0]), initial=0.0) for n in (*LENGTHS_S[:-1], None)]
     if not open_ and any(x > limit_of(model, k) for k, x in enumerate(off)):
         return DIFFERS
-    shown = [r for r in powers.rows if r.for_s != LENGTHS_S[0]]
-    if any(r.size is None or r.size > mission.machine.limits.clear_at for r in shown):
-        return WOULD_HIDE
-    return ""
+    whole = powers.rows[-1].size
+    return WOULD_HIDE if whole is None or whole > mission.machine.limits.clear_at else ""
 
 
 def _note(efforts: Efforts, i: int) -> str:
@@ -187,28 +204,55 @@ def _note(efforts: Efforts, i: int) -> str:
     )
 
 
+def _pulls(efforts: Efforts, i: int, least_speed: float) -> Array:
+    """The part of its effort that pulls in each step [unit of effort], shape (steps,)."""
+    model, steps = efforts.models[i], efforts.steps
+    terms = steps.terms(i, least_speed) @ np.array(model.terms)
+    return np.asarray(np.nan_to_num(terms - model.viscous * steps.speed[:, i] - model.offset))
+
+
+def _seen(efforts: Efforts, i: int, machine: Machine) -> Flags:
+    """Steps within any stretch of driving over which a loss that counts would have shown, shape (steps,)."""
+    loss = machine.limits.clear_at / (1.0 - machine.limits.clear_at)
+    added = loss * _pulls(efforts, i, machine.limits.driving_speed)
+    shares, first, last = efforts.shares.over(i, LENGTHS_S[_TRACED], added)
+    seen = np.zeros(len(efforts.steps.use), bool)
+    for a, b in zip(
+        first[shares > limit_of(efforts.models[i], _TRACED)],
+        last[shares > limit_of(efforts.models[i], _TRACED)],
+        strict=True,
+    ):
+        seen[a:b] = True
+    return seen
+
+
 def _powers(efforts: Efforts, i: int, mission: MissionView) -> Powers:
     """Smallest loss of torque that its effort would have shown.
 
     A loss ε takes 1/(1 − ε) of the part of the effort that pulls: friction, acceleration and turning, not the part that grows with the speed, which for a
     duty or voltage is mostly the motor's own (e = R·i + K·ω, Krishnan, Electric Motor Drives, 2001, eq. 2.1).
     """
-    model, steps = efforts.models[i], efforts.steps
-    least = mission.machine.limits.driving_speed
-    terms = steps.terms(i, least) @ np.array(model.terms)
-    pulls = terms - model.viscous * steps.speed[:, i] - model.offset
+    model = efforts.models[i]
+    pulls = _pulls(efforts, i, mission.machine.limits.driving_speed)
     rows = []
     for k, n in enumerate((*LENGTHS_S[:-1], None)):
         need = limit_of(model, k)
         smallest = np.array([])
         for loss in (0.6, 0.5, 0.4, 0.3, 0.25, 0.2, 0.15, 0.1):
-            shares = efforts.shares.over(i, n, np.nan_to_num(loss / (1.0 - loss) * pulls))[0]
+            shares = efforts.shares.over(i, n, loss / (1.0 - loss) * pulls)[0]
             smallest = np.full(shares.size, np.inf) if not smallest.size else smallest
             smallest[shares > need] = loss
         size = float(np.quantile(smallest, _SURE, method="higher")) if smallest.size else np.inf
         share = float(np.mean(smallest <= mission.machine.limits.clear_at)) if smallest.size else None
         rows.append(
-            Power(Deviation.INEFFICIENT, None if n is None else float(n), size if np.isfinite(size) else None, "1", share, int(smallest.size))
+            Power(
+                Deviation.INEFFICIENT,
+                None if n is None else float(n),
+                size if np.isfinite(size) else None,
+                "1",
+                share,
+                int(smallest.size),
+            )
         )
     return Powers(tuple(rows), Side.ACTUATOR)
 

@@ -13,7 +13,11 @@ _ASKED = ("1", "fraction", "%", "V")  # units of what a bridge is told to put on
 
 def wheels_with_efforts(timeline: Timeline, machine: Machine) -> tuple[str, ...]:
     """Wheels with a drive of which speed and effort are logged, and the effort is not nothing."""
-    return tuple(w for w in machine.wheels if w not in machine.unpowered and _moves(timeline, f"wheel.{w}.v") and _moves(timeline, f"wheel.{w}.effort"))
+    return tuple(
+        w
+        for w in machine.wheels
+        if w not in machine.unpowered and _moves(timeline, f"wheel.{w}.v") and _moves(timeline, f"wheel.{w}.effort")
+    )
 
 
 def _moves(timeline: Timeline, name: str) -> bool:

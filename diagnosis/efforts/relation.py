@@ -78,7 +78,9 @@ def held_share(effort: Array, command: Array, speed: Array, use: Flags) -> float
     before = np.r_[np.nan, np.nan, command[:-2]]
     size = float(np.nanmax(np.abs(command), initial=0.0))
     last = np.r_[np.nan, command[:-1]]
-    steady = use & np.isfinite(command) & (np.abs(command - last) < 0.01 * size) & (np.abs(command - before) < 0.01 * size)
+    steady = (
+        use & np.isfinite(command) & (np.abs(command - last) < 0.01 * size) & (np.abs(command - before) < 0.01 * size)
+    )
     if np.count_nonzero(steady) < _LEAST_STEPS:
         return 0.0
     terms = np.column_stack([np.ones(command.size), np.sign(command), command, command - speed])
@@ -107,7 +109,9 @@ class Shares:
         self.rest, self.expected, self.use, self.usual = rest, expected, use, np.asarray(usual)
         self.wheels = rest.shape[1]
 
-    def over(self, wheel: int, length: int | None, added: Array | None = None) -> tuple[Array, NDArray[np.intp], NDArray[np.intp]]:
+    def over(
+        self, wheel: int, length: int | None, added: Array | None = None
+    ) -> tuple[Array, NDArray[np.intp], NDArray[np.intp]]:
         """Shares of a wheel over runs of `length` driven steps, with their first step and the one behind their last.
 
         What any of the other wheels shows as well, for its usual size, is no wheel's own, and what the wheel's motion alone explains is nothing:

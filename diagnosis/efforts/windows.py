@@ -88,7 +88,11 @@ def steps_of(timeline: Timeline, machine: Machine, wheels: Sequence[str], v_ref:
     same = np.column_stack([np.abs(_mean(np.sign(x))) > 0.999 for x in speeds])
     known = np.isfinite(v) & np.isfinite(e)
     places = [machine.wheels.index(w) for w in wheels]
-    asked = np.full(v.shape, np.nan) if v_ref is None else np.column_stack([_mean(v_ref[: count * length, i].reshape(count, length)) for i in places])
+    asked = (
+        np.full(v.shape, np.nan)
+        if v_ref is None
+        else np.column_stack([_mean(v_ref[: count * length, i].reshape(count, length)) for i in places])
+    )
     return EffortSteps(e, v, rate, v - _mean(v)[:, np.newaxis], one_way & same & known, length, asked)
 
 

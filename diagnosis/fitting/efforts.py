@@ -19,7 +19,9 @@ from replay.signals.timeline import Timeline
 _LEAST_MISSIONS = 3
 
 
-def fit_efforts(timelines: Sequence[Timeline], machine: Machine, replays: Sequence[Replay] = ()) -> dict[str, EffortModel]:
+def fit_efforts(
+    timelines: Sequence[Timeline], machine: Machine, replays: Sequence[Replay] = ()
+) -> dict[str, EffortModel]:
     """Effort models of a machine's drives, by wheel; none where fewer than two wheels have efforts, or three missions enough driving.
 
     Parameters
@@ -55,7 +57,9 @@ def fit_efforts(timelines: Sequence[Timeline], machine: Machine, replays: Sequen
     for i, w in enumerate(wheels):
         fastest = max(float(np.max(np.abs(s.speed[s.use[:, i], i]))) for s in missions)
         quickest = max(float(np.max(np.abs(np.nan_to_num(s.rate[s.use[:, i], i])))) for s in missions)
-        out[w] = EffortModel(*(float(x) for x in theta[i]), usual[i], pooled, fastest, quickest, _held(missions, i), float(len(missions)))
+        out[w] = EffortModel(
+            *(float(x) for x in theta[i]), usual[i], pooled, fastest, quickest, _held(missions, i), float(len(missions))
+        )
     return out
 
 
@@ -117,8 +121,22 @@ def with_efforts(
         before, count = machine.efforts.get(wheel), int(model.missions)
         for name, unit in _UNITS:
             old = None if before is None else float(getattr(before, name))
-            constants.append(Constant(f"effort.{wheel}.{name}", float(getattr(model, name)), None, unit, old, 0, count, written=True))
+            constants.append(
+                Constant(f"effort.{wheel}.{name}", float(getattr(model, name)), None, unit, old, 0, count, written=True)
+            )
         for seconds, off in zip(LENGTHS_S[:-1], model.off, strict=False):
             why = "the largest of missions that were left out"
-            constants.append(Constant(f"effort.{wheel}.off ({seconds} s)", off, None, "of the effort", None, 0, count, written=True, why=why))
+            constants.append(
+                Constant(
+                    f"effort.{wheel}.off ({seconds} s)",
+                    off,
+                    None,
+                    "of the effort",
+                    None,
+                    0,
+                    count,
+                    written=True,
+                    why=why,
+                )
+            )
     return replace(out, efforts={**machine.efforts, **efforts})

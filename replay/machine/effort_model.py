@@ -52,7 +52,9 @@ class EffortModel:
         """Check values."""
         check_range("effort.usual", self.usual, 1e-12, 1e12, "unit of effort")
         if len(self.off) != len(LENGTHS_S):
-            raise ConfigError(f"effort.off = {list(self.off)!r}; expected {len(LENGTHS_S)} numbers, as `mfhca fit` writes them")
+            raise ConfigError(
+                f"effort.off = {list(self.off)!r}; expected {len(LENGTHS_S)} numbers, as `mfhca fit` writes them"
+            )
         for x in self.off:
             check_range("effort.off", x, 0.0, 1e6, "")
 
@@ -95,6 +97,8 @@ def effort_from_table(key: str, table: Any) -> EffortModel:
         given = table[name]
         values = given if name == "off" and isinstance(given, list) else [given]
         if any(isinstance(v, bool) or not isinstance(v, int | float) for v in values):
-            raise ConfigError(f"{key}.{name} = {given!r}; expected {'a list of numbers' if name == 'off' else 'a number'}")
+            raise ConfigError(
+                f"{key}.{name} = {given!r}; expected {'a list of numbers' if name == 'off' else 'a number'}"
+            )
         out[name] = tuple(map(float, values)) if name == "off" else float(values[0])
     return EffortModel(**out)
