@@ -161,7 +161,7 @@ def _judged(
     """A drive with what its effort shows."""
     length, size = efforts.steps.length, drive.states.size
     states = drive.states.copy()
-    there = [f for f in (*drive.findings, *sensor.findings)]
+    there = (*drive.findings, *sensor.findings)
     more = []
     for a, b, share in spans:
         start, stop = a * length, min(b * length, size)
