@@ -258,6 +258,9 @@ class Machine:
         for name in self.drives:
             if name not in self.wheels:
                 raise ConfigError(f"[drive] {name!r}: no such wheel; machine.wheels has {list(self.wheels)}")
+        for name in self.efforts:
+            if name not in self.wheels:
+                raise ConfigError(f"[effort] {name!r}: no such wheel; machine.wheels has {list(self.wheels)}")
         for name in self.steering:
             if name not in self.axles:
                 raise ConfigError(f"[steering] {name!r}: no such axle; the geometry has {list(self.axles)}")
