@@ -53,7 +53,7 @@ class EffortSteps(NamedTuple):
         """
         v, d = self.speed[:, wheel], self.apart[:, wheel]
         columns = [np.ones(v.size), np.sign(v), v, self.rate[:, wheel], d, d / (np.abs(d) + least_speed)]
-        return np.nan_to_num(np.column_stack(columns))
+        return np.asarray(np.nan_to_num(np.column_stack(columns)), dtype=np.float64)
 
 
 def steps_of(timeline: Timeline, machine: Machine, wheels: Sequence[str], v_ref: Array | None = None) -> EffortSteps:

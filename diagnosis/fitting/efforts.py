@@ -89,7 +89,19 @@ def _fitted(missions: Sequence[EffortSteps], least: float) -> list[np.ndarray] |
 
 
 def shares_of(steps: EffortSteps, theta: Sequence[np.ndarray], usual: Sequence[float], least: float) -> Shares:
-    """By which shares the efforts of a mission are off coefficients `theta`, one array for each wheel; `least` is the driving speed [m/s]."""
+    """By which shares the efforts of a mission are off coefficients.
+
+    Parameters
+    ----------
+    steps : EffortSteps
+        The mission.
+    theta : Sequence[np.ndarray], each of shape (len(TERMS),)
+        Of each wheel [unit of effort and that by m/s and m/s²].
+    usual : Sequence[float]
+        Usual size of each effort [unit of effort].
+    least : float
+        The driving speed [m/s].
+    """
     expected = np.column_stack([steps.terms(i, least) @ t for i, t in enumerate(theta)])
     return Shares(np.where(steps.use, steps.effort - expected, 0.0), expected, steps.use, usual)
 
