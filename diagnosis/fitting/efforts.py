@@ -9,7 +9,7 @@ import numpy as np
 
 from diagnosis.efforts.inputs import wheels_with_efforts
 from diagnosis.efforts.relation import Shares, fitted, held_share, largest_off, usual_of
-from diagnosis.efforts.windows import EffortSteps, steps_of
+from diagnosis.efforts.windows import TERMS, EffortSteps, steps_of
 from diagnosis.fitting.machine import Constant
 from replay.control.loop import Replay
 from replay.machine.config import Machine
@@ -37,7 +37,7 @@ def fit_efforts(
     if len(wheels) < 2 or len(timelines) < _LEAST_MISSIONS:
         return {}
     least = machine.limits.driving_speed
-    commands = [r.v_ref for r in replays] or [None] * len(timelines)
+    commands: Sequence[np.ndarray | None] = [r.v_ref for r in replays] or [None] * len(timelines)
     found = [steps_of(t, machine, wheels, c) for t, c in zip(timelines, commands, strict=True)]
     missions = [s for s in found if s.use.sum(axis=0).min() >= LENGTHS_S[1]]
     if len(missions) < _LEAST_MISSIONS:
@@ -57,8 +57,15 @@ def fit_efforts(
     for i, w in enumerate(wheels):
         fastest = max(float(np.max(np.abs(s.speed[s.use[:, i], i]))) for s in missions)
         quickest = max(float(np.max(np.abs(np.nan_to_num(s.rate[s.use[:, i], i])))) for s in missions)
+        terms = dict(zip(TERMS, (float(x) for x in theta[i]), strict=True))
         out[w] = EffortModel(
-            *(float(x) for x in theta[i]), usual[i], pooled, fastest, quickest, _held(missions, i), float(len(missions))
+            **terms,
+            usual=usual[i],
+            off=pooled,
+            fastest=fastest,
+            quickest=quickest,
+            held=_held(missions, i),
+            missions=float(len(missions)),
         )
     return out
 
