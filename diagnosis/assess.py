@@ -7,6 +7,7 @@ from collections.abc import Collection
 from dataclasses import dataclass, replace
 
 from diagnosis.channels.liveness import alive_sources
+from diagnosis.efforts.assess import judged_by_efforts
 from diagnosis.evidence import ACTUATOR, SENSOR, MissionView, Part
 from diagnosis.families import AXLES, SINGLE, whole
 from diagnosis.response.unquiet import left_open
@@ -70,6 +71,7 @@ def assess_components(
     ]
     found = {part: mission.known.get(part) or _without_evidence(mission, *part) for part in parts}
     found |= _no_louder(found, mission)
+    found |= judged_by_efforts(found, mission)
     found = {part: only_rolls(a) if part[0] in machine.unpowered else a for part, a in found.items()}
     words = machine_words(machine, timeline.signals if logged is None else logged)
     return ComponentResult(

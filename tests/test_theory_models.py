@@ -14,6 +14,8 @@ from diagnosis.drives.effort_map import EffortMap
 from diagnosis.drives.inverse_controller import high_passed
 from diagnosis.drives.load import LoadTrack
 from diagnosis.drives.power import added_noise, least_load, load_powers, noncentrality
+from diagnosis.efforts.relation import Shares, held_share
+from diagnosis.efforts.windows import EffortSteps
 from diagnosis.estimation.fault_models import CONSTANT, EXACT, ZERO, ModeModel
 from diagnosis.estimation.row_probability import row_probabilities
 from diagnosis.estimation.samples import Samples
@@ -224,6 +226,49 @@ def test_t14_command_and_effort_give_back_the_speed_that_the_controller_saw() ->
     seen = r + (0.7 - 1) * high_passed(r, memory, dt) - high_passed(u, memory, dt) / 0.2
     left = (seen - v)[:1]
     assert seen - v == pytest.approx(left * np.exp(-np.arange(n) * dt / memory), abs=5e-3)
+
+
+def test_t20_the_balance_at_the_rim_is_linear_in_what_is_measured() -> None:
+    k, J, F, b, v, a, m, c, w = sp.symbols("k J F_c b v a m c w", positive=True)
+    effort = (
+        J * a + F + b * v + m * a + c
+    ) / k  # the tyre carries the wheel's part of the body: m·v̇ and its resistance c
+    assert sp.expand(effort - ((F + c) / k + b / k * v + (J + m) / k * a)) == 0
+    pulls = effort - b / k * v
+    lost = effort.subs(k, k * (1 - w)) - b * v / (k * (1 - w))
+    assert sp.simplify(lost - pulls / (1 - w)) == 0
+
+
+def test_t20_the_code_has_these_terms_and_the_share() -> None:
+    rng, n = np.random.default_rng(3), 60
+    v = np.repeat(rng.uniform(0.5, 1.0, (n // 5, 2)), 5, axis=0)
+    rate, d = rng.normal(0.0, 0.2, (n, 2)), v - v.mean(axis=1, keepdims=True)
+    steps = EffortSteps(v, v, rate, d, np.ones((n, 2), bool), 1, v)
+    x = steps.terms(0, 0.05)
+    assert x == pytest.approx(
+        np.column_stack([np.ones(n), np.sign(v[:, 0]), v[:, 0], rate[:, 0], d[:, 0], d[:, 0] / (abs(d[:, 0]) + 0.05)])
+    )
+    m, r, usual = rng.normal(2.0, 1.0, (n, 2)), np.zeros((n, 2)), 2.0
+    r[:, 0] = 0.5 * m[:, 0]
+    share = Shares(r, m, steps.use, (usual, usual)).over(0, None)[0]
+    expected = (r[:, 0] @ m[:, 0]) / (m[:, 0] @ m[:, 0] + n * usual**2 / 4)
+    assert share == pytest.approx([expected])
+    r[:, 1] = r[:, 0]  # what another wheel shows as well
+    assert Shares(r, m, steps.use, (usual, usual)).over(0, None)[0] == pytest.approx([0.0])
+
+
+def test_t20_without_an_integral_part_the_effort_is_a_function_of_command_and_error() -> None:
+    rng, n = np.random.default_rng(4), 400
+    r, load = np.repeat(rng.uniform(0.4, 1.0, n // 20), 20), np.repeat(rng.normal(0.0, 1.0, n // 40), 40)
+    gain, integral = 8.0, 0.0
+    for with_memory in (False, True):
+        e, v = np.zeros(n), np.zeros(n)
+        for i in range(n):  # at rest: e = load + r; v is what makes the loop ask for it
+            e[i] = 3.0 * r[i] + load[i]
+            integral = load[i] if with_memory else 0.0
+            v[i] = r[i] - (e[i] - 3.0 * r[i] - integral) / gain
+        held = held_share(e, r, v, np.ones(n, bool))
+        assert held > 0.1 if with_memory else held < 0.01
 
 
 def blocks(mean: float) -> Blocks:

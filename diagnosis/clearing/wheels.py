@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from diagnosis.channels.echo import repeats_its_command
 from diagnosis.clearing.cells import Array, Cells
+from diagnosis.clearing.efforts import effort_checks
 from diagnosis.clearing.limits import Limits, long_limit, measured_twice, response_limits
 from diagnosis.clearing.longer import around, longer
 from diagnosis.clearing.measure import alone, compared, lasts, late, times, worst
@@ -85,6 +86,7 @@ def wheel_checks(cells: Cells, clear_at: float) -> Iterator[Checked]:
     most_off = [float(x) for x in largest(offsets[0])], [float(x) for x in offsets[1]]
     delays, made = late(speed, reference, cells.dt), made_of_commands(cells, speed, reference)
     powered = len(cells.driven)
+    by_effort = effort_checks(cells)
     top = cells.machine.max_speed
     slow_off = [compared(cells, y, x, CREEPING * top).off for y, x in zip(speed.T, second.T, strict=True)]
     creeping = less_at_starts(np.column_stack(slow_off))
@@ -148,6 +150,8 @@ def wheel_checks(cells: Cells, clear_at: float) -> Iterator[Checked]:
                     lasts(cells, about_opening, float(offsets[1][i]), usual),
                     key=times,
                 )
+        if _known(used[:, i]) and wheel in by_effort:
+            yield by_effort[wheel]
         # nothing tells what lies behind such a drive, and less where its own opening is all that is measured of it
         if _known(used[:, i]) and enough and not tells and twice[i][0]:
             yield Checked(*about, either, Check.BEHIND, None, limits[i].below)

@@ -47,6 +47,10 @@ def act_of(check: Checked, twice: Collection[str]) -> str:
             f"log wheel.*.u_applied (the {words.drive}'s own measurement), or lift the machine, give every {words.part} the same "
             "command for 10 s, and diagnose that log"
         )
+    if check.check is Check.EFFORT:
+        return words.fill(
+            "lift the machine, give every {wheel} the same command for 10 s, and compare the currents of their {valve}s; then turn every {wheel} by hand with the brakes released"
+        )
     if check.check is Check.BEHIND:
         return (
             f"lift the machine, release the brakes and turn every {words.part} by hand; no log of these "

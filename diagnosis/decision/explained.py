@@ -45,6 +45,7 @@ _BESIDE_WHEELS = (
     Check.LASTING_EXCESS,
     Check.SAME_SIDE,
     Check.OPENING_OFFSET,
+    Check.EFFORT,
     Check.TRACKING,
     Check.DELAY,
 )

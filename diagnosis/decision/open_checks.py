@@ -15,6 +15,7 @@ _BESIDE_OTHERS = (
     Check.LASTING_EXCESS,
     Check.SAME_SIDE,
     Check.OPENING_OFFSET,
+    Check.EFFORT,
 )
 
 

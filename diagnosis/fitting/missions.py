@@ -10,6 +10,7 @@ import numpy as np
 from diagnosis.drives.inputs import drive_data
 from diagnosis.fitting.control import ControlFit, fit_control, lambda_doubt
 from diagnosis.fitting.drives import fit_drives
+from diagnosis.fitting.efforts import fit_efforts, with_efforts
 from diagnosis.fitting.geometry import fit_offset
 from diagnosis.fitting.machine import Constant, with_control, with_drives, with_noise, with_offset, with_plants
 from diagnosis.fitting.noise import fit_noise
@@ -97,12 +98,13 @@ def fit_missions(missions: Sequence[Mission], machine: Machine, *, progress: Sub
     progress(Progress(Stage.FITTING_LAW))
     control, doubt = _law(timelines, replays, machine, errors)
     bad = {s for e in errors for s in e.signals}
-    if not errors and not any(f"wheel.{w}.u" in t.signals for t in timelines for w in machine.wheels):
+    efforts = fit_efforts(timelines, machine, replays)
+    if not errors and not efforts and not any(f"wheel.{w}.u" in t.signals for t in timelines for w in machine.wheels):
         raise NotJudged(
             f"{', '.join(names) or 'no mission'}: no command of a valve or drive (wheel.*.u: opening, duty, torque) is logged beside "
             "the speeds, and what `mfhca fit` finds is how speeds answer it; machines that follow commanded speeds are diagnosed without it"
         )
-    if driving < _LEAST_SECONDS and not errors:
+    if driving < _LEAST_SECONDS and not errors and not efforts:
         raise NotJudged(
             f"{', '.join(names) or 'no mission'}: {driving:.1f} s in which a wheel is commanded to move, {_LEAST_SECONDS:g} s "
             "are needed; give missions that drive"
@@ -121,6 +123,7 @@ def fit_missions(missions: Sequence[Mission], machine: Machine, *, progress: Sub
     if len(machine.wheels) == 1 or machine.geometry is None:
         progress(Progress(Stage.FITTING_DRIVES))
         out = _with_drives(out, machine, list(zip(timelines, replays, strict=True)), spoiled, constants)
+    out = with_efforts(out, machine, efforts, constants)
     out = with_steering(out, machine, fit_steering(timelines, machine, bad), len(timelines), constants)
     out = with_noise(out, fit_noise(timelines, machine), bad, constants)
     return FitResult(

@@ -26,6 +26,7 @@ class Check(StrEnum):
     PLANT_RESPONSE = "plant_response"
     SAME_SIDE = "same_side"
     OPENING_OFFSET = "opening_offset"
+    EFFORT = "effort"
     CARRIED = "carried"
     BEHIND = "behind"
     TRACKING = "tracking"
@@ -83,6 +84,10 @@ CHECK_WORDS: dict[Check, tuple[str, str]] = {
     Check.OPENING_OFFSET: (
         "{unit_command} at a speed against the other {wheels}'",
         "{part} is told {value} of full {unit_command} more or less than the other {wheels} at the same speed",
+    ),
+    Check.EFFORT: (
+        "effort against what the motion takes, beside the other {wheels}'",
+        "the effort of {part} is off what its motion takes, beside the other {wheels}', by {value} of it",
     ),
     Check.CARRIED: (
         "share of the speed that the ground gives a {wheel} whose {valve} is dead",

@@ -28,6 +28,8 @@ Mover = Literal["valve", "motor", "drive"]
 _PERCENT = {"valve": " % of opening", "motor": " % of full command", "drive": " % of full command"}
 _SHARE = {"valve": OPENING, "motor": "of full command", "drive": "of full command"}
 _COMMAND = re.compile(r"wheel\.[^.]+\.(u|u_applied|pressure_a|pressure_b)|steer\.[^.]+\.(u|u_applied)")
+_MOTORS = re.compile(r"duty|pwm|torque|drehmoment|couple|inverter|umrichter|(?<!hydro)(?<!hydro_)motor|servo|vesc")
+_VALVES = re.compile(r"valve|ventil|vanne|spool|schieber|tiroir|pump|swash|hydr|oil|(^|_)press")
 _EFFORT = re.compile(r"wheel\.[^.]+\.effort")
 
 
@@ -202,11 +204,26 @@ def machine_words(machine: Machine, logged: Collection[str] = ()) -> MachineWord
     return MachineWords(_drive(machine, logged), machine.part, machine.speed_unit)
 
 
+def _named_mover(machine: Machine, group: str) -> Mover:
+    """What the names of a machine's commands say of what they move: of ``wheel`` or ``steer``."""
+    said = " ".join(
+        s.label.lower() for n, s in machine.signals.items() if n.startswith(f"{group}.") and _COMMAND.fullmatch(n)
+    )
+    motor, valve = _MOTORS.search(said) is not None, _VALVES.search(said) is not None
+    return "drive" if motor is valve else "motor" if motor else "valve"
+
+
 def _drive(machine: Machine, logged: Collection[str]) -> Mover:
     if machine.drive != "auto":
         return machine.drive
-    if machine.drives:  # what effort a speed takes
+    if machine.drives or machine.efforts:  # what effort a speed takes
         return "motor"
+    wheels, axles = (_named_mover(machine, group) for group in ("wheel", "steer"))
+    if wheels == "motor":  # a steering of which nothing says what moves it has one word with them: neither
+        steered = any(name.startswith("steer.") and _COMMAND.fullmatch(name) for name in logged) or bool(
+            machine.steering
+        )
+        return "motor" if axles == "motor" or not steered else "drive"
     efforts = any(_EFFORT.fullmatch(name) for name in logged)
     opened = {name.partition(".")[0] for name in logged if _COMMAND.fullmatch(name)}
     if efforts and not machine.plant.wheels and "wheel" not in opened and ("steer" in opened or machine.steering):

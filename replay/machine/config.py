@@ -13,6 +13,7 @@ from replay.errors import ConfigError, check_range
 from replay.log.source_options import SignalSource, SourceOptions
 from replay.machine.axle_plant import AxlePlant
 from replay.machine.drive_model import DriveModel
+from replay.machine.effort_model import EffortModel
 from replay.machine.geometry import Geometry, four_wheel_geometry
 from replay.machine.plant import Coupling as Coupling
 from replay.machine.plant import Plant as Plant
@@ -187,6 +188,8 @@ class Machine:
         Options per source, keyed by file name pattern.
     drives : Mapping[str, DriveModel]
         How single drives answer, by wheel; from healthy missions.
+    efforts : Mapping[str, EffortModel]
+        What effort the motion of each of several drives takes, by wheel; from healthy missions.
     steering : Mapping[str, AxlePlant]
         Valve, cylinder and sensor by steering axle; from healthy missions.
     assumed : tuple[str, ...]
@@ -209,6 +212,7 @@ class Machine:
     sources: Mapping[str, SourceOptions] = field(default_factory=dict)
     signals: Mapping[str, SignalSource] = field(default_factory=dict)
     drives: Mapping[str, DriveModel] = field(default_factory=dict)
+    efforts: Mapping[str, EffortModel] = field(default_factory=dict)
     steering: Mapping[str, AxlePlant] = field(default_factory=dict)
     drive: Drive = "auto"
     part: MovedPart = "wheel"
@@ -254,6 +258,9 @@ class Machine:
         for name in self.drives:
             if name not in self.wheels:
                 raise ConfigError(f"[drive] {name!r}: no such wheel; machine.wheels has {list(self.wheels)}")
+        for name in self.efforts:
+            if name not in self.wheels:
+                raise ConfigError(f"[effort] {name!r}: no such wheel; machine.wheels has {list(self.wheels)}")
         for name in self.steering:
             if name not in self.axles:
                 raise ConfigError(f"[steering] {name!r}: no such axle; the geometry has {list(self.axles)}")

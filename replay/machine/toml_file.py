@@ -16,6 +16,7 @@ from replay.log.source_options import SignalSource, SourceOptions
 from replay.machine.axle_plant import AxlePlant
 from replay.machine.config import ASSUMABLE, Control, Limits, Machine, Noise, Plant, WheelPlant, haulotte
 from replay.machine.drive_model import drive_from_table
+from replay.machine.effort_model import effort_from_table
 from replay.machine.geometry import Geometry, WheelGeometry, four_wheel_geometry, own_axle
 from replay.machine.quantities import UNITS
 from replay.machine.questions import questions_of
@@ -25,7 +26,7 @@ from replay.toml_text import MAX_BYTES, TomlError, parse_toml
 
 _T = TypeVar("_T")
 _SECTIONS = {
-    "machine", "geometry", "control", "plant", "drive", "steering", "noise", "limits", "sources", "signals", "advice",
+    "machine", "geometry", "control", "plant", "drive", "effort", "steering", "noise", "limits", "sources", "signals", "advice",
 }  # fmt: skip
 _HEAD = {"name", "id", "wheels", "unpowered", "drive", "part", "speed_unit"}
 _STANDARD = ("wheelbase", "joint_spacing", "wheel_offset")
@@ -110,6 +111,7 @@ def _machine(data: Mapping[str, Any]) -> Machine:
         limits=_build(Limits, "limits", limits),
         sources={k: _build(SourceOptions, f"sources.{k}", v) for k, v in data.get("sources", {}).items()},
         signals=signals,
+        efforts={k: effort_from_table(f"effort.{k}", v) for k, v in data.get("effort", {}).items()},
         drives={k: drive_from_table(f"drive.{k}", v) for k, v in data.get("drive", {}).items()},
         steering={k: _build(AxlePlant, f"steering.{k}", v) for k, v in data.get("steering", {}).items()},
         drive=head.get("drive", "auto"),

@@ -9,6 +9,7 @@ from typing import Any
 from replay.log.source_options import SignalSource, SourceOptions
 from replay.machine.config import Machine
 from replay.machine.drive_model import drive_table
+from replay.machine.effort_model import effort_table
 from replay.machine.geometry import own_axle
 from replay.machine.toml_file import MACHINE_LEVEL
 
@@ -62,6 +63,12 @@ def dump_machine(machine: Machine, notes: Mapping[str, Sequence[str]] | None = N
             "",
             *head("drive"),
             *(f"{key_text(w)} = {_inline(drive_table(d))}" for w, d in machine.drives.items()),
+        ]
+    if machine.efforts or "effort" in said:
+        lines += [
+            "",
+            *head("effort"),
+            *(f"{key_text(w)} = {_inline(effort_table(e))}" for w, e in machine.efforts.items()),
         ]
     if machine.steering or "steering" in said:
         lines += ["", *head("steering")]

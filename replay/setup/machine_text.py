@@ -13,6 +13,7 @@ from replay.machine.toml_text import key_text, real_text, signal_line, source_li
 from replay.machine.units import kept_unit
 from replay.setup.all_channels import ChannelRow
 from replay.setup.draft_notes import Draft
+from replay.setup.offered import offered_line
 from replay.setup.ranges import range_text
 from replay.signals.signal import Signal
 from replay.signals.timeline import median_period
@@ -115,8 +116,10 @@ def _unused(machine: Machine, rows: Sequence[ChannelRow]) -> list[str]:
         return []
     out = ["", "# Also in the log, and not used (`mfhca channels LOG --all` has rates and more):"]
     for r in rest[:_LISTED]:
+        offered = offered_line(machine, r)
         could = f"; could be {', '.join(r.could_be)}" if r.could_be else ""
         unit = f" {r.unit}{'?' if r.guessed else ''}" if r.unit else ""
         where = f"topic = {text_of(r.topic)}, field = {text_of(r.field)}" if r.topic else f"column = {text_of(r.name)}"
         out.append(f"#   {where}   {r.low:.4g} … {r.high:.4g}{unit}{could}")
+        out += [f"#     if it is so: {offered}"] if offered else []
     return out + ([f"#   and {len(rest) - _LISTED} more"] if len(rest) > _LISTED else [])

@@ -16,6 +16,7 @@ from replay.setup.motion import WheelMotion, held, wheel_motion
 from replay.setup.structure import Structure
 from replay.signals.signal import Signals
 from replay.signals.to_si import peak_of
+from replay.signals.unit_doubts import per_minute
 
 DIFFERS = 0.15  # share, from which a length is another one
 _AGREE = 1.33
@@ -73,7 +74,8 @@ def unit_of_speeds(
             origins[n] = replace(origins[n], unit="mm/s")
         draft.ask("signals", f"are {labels} in mm/s? None is stated; {how}.")
         return None
-    for unit, turn in (("rad/s", 1.0), ("rpm", 2 * math.pi / 60)):
+    turns = all(per_minute(origins[n].label) for n in names)  # n_ist, Drehzahl: hardly anybody counts these in rad/s
+    for unit, turn in (("rad/s", 1.0), ("rpm", 2 * math.pi / 60))[1 if turns else 0 :]:
         radius = 1 / (gain * turn)
         if structure.places is not None and WHEEL_SIZES[0] <= radius <= WHEEL_SIZES[1]:
             for n in (*names, *_alike(found, names, origins)):

@@ -37,7 +37,9 @@ _ROTATIONS, _TURNING = ("rad/s", "rpm", "deg/s"), ("rad/s", "rpm", "deg/s", "rev
 _ANGLES, _LENGTHS = ("rad", "deg"), ("m", "mm")  # of positions, whose slopes are speeds
 _LINEAR = re.compile(r"(^|\.)linear\.[xyz]$")  # of a Twist, which is in m/s by definition
 _JOINT = re.compile(r"(^|\.)velocit\w*\[")  # of a JointState, which is no speed over ground
-_PER_MINUTE = re.compile(r"drehzahl|rpm|umdr|u_?min|tr_?min", re.IGNORECASE)  # of a name: turns per minute
+_PER_MINUTE = re.compile(
+    r"drehzahl|rpm|umdr|u_?min|tr_?min|(?<![a-z])n_?(soll|ist|set|act|ref|cmd)(?![a-z])", re.IGNORECASE
+)  # of a name: turns per minute
 _SPEED_UNITS = ("m/s", "km/h", "mm/s", "cm/s")
 
 

@@ -18,7 +18,9 @@ BODY = ("gyro_dead", "gyro_frozen", "gyro_scaled", "gyro_offset", "odometry_froz
 #: All through the log, and shorter than the others; behind the others, since the place in the list is part of the seed.
 ALL_THROUGH = ("encoder_off", "gyro_off", "motor_gone")
 SHORT = ("encoder_dropped",)
-FAULTS = (*SENSORS, *DRIVES, *EVENTS, *BODY, *ALL_THROUGH, *SHORT)
+#: Of a drive whose loop makes up for them: torque that is lost behind its current, a brake that drags; for a time, and all through.
+HIDDEN, HIDDEN_ALL = ("torque_lost", "brake_drags"), ("motor_faint", "torque_gone", "brake_on")
+FAULTS = (*SENSORS, *DRIVES, *EVENTS, *BODY, *ALL_THROUGH, *SHORT, *HIDDEN, *HIDDEN_ALL)
 
 
 @dataclass(frozen=True)
@@ -47,7 +49,7 @@ class Fault:
     @property
     def side(self) -> str:
         """Side of the wheel, or ``machine`` where no wheel has a fault."""
-        sensors, drives = (*SENSORS, "encoder_off", "encoder_dropped"), (*DRIVES, "motor_gone")
+        sensors, drives = (*SENSORS, "encoder_off", "encoder_dropped"), (*DRIVES, "motor_gone", *HIDDEN, *HIDDEN_ALL)
         return "sensor" if self.kind in sensors else "actuator" if self.kind in drives else "machine"
 
 
@@ -72,7 +74,7 @@ def fault_of(kind: str, wheels: int, moving: NDArray[np.bool_], step: float, rng
     places = places[places > 0.2 * n]
     first = int(rng.choice(places))
     last = n if rng.random() < 0.25 else min(n, first + round(rng.uniform(6.0, 20.0) / step))
-    if kind in ALL_THROUGH:
+    if kind in (*ALL_THROUGH, *HIDDEN_ALL):
         first, last = 0, n
     if kind in SHORT:
         last = min(n, first + round(1.5 / step))
@@ -83,6 +85,11 @@ def fault_of(kind: str, wheels: int, moving: NDArray[np.bool_], step: float, rng
         "encoder_late": float(rng.uniform(0.3, 1.0)),
         "jammed": float(rng.uniform(0.02, 0.15)),
         "motor_weak": float(rng.uniform(0.2, 0.5)),
+        "torque_lost": float(rng.uniform(0.25, 0.6)),
+        "torque_gone": float(rng.uniform(0.25, 0.6)),
+        "brake_drags": float(rng.uniform(0.1, 0.3)),
+        "brake_on": float(rng.uniform(0.1, 0.3)),
+        "motor_faint": float(rng.uniform(0.3, 0.6)),
         "motor_on": float(rng.choice([-1, 1]) * rng.uniform(0.4, 0.9)),
         "gyro_scaled": float(rng.choice([rng.uniform(0.3, 0.7), rng.uniform(1.4, 2.2)])),
         "odometry_scaled": float(rng.choice([rng.uniform(0.3, 0.7), rng.uniform(1.4, 2.2)])),

@@ -96,8 +96,8 @@ def _joints(
     mirrored = robot.described is False and robot.counts > 2e4  # motors of one side are mounted the other way round
     sign = np.array([-1.0 if mirrored and w.y < 0 else 1.0 for w in robot.wheels])
     names = [w.joint for w in robot.wheels]
-    effort = sign * _sampled(driven.torque, t)
-    effort = effort + rng.normal(0.0, 0.02 * robot.rail * robot.radius, effort.shape)
+    effort = sign * _sampled(driven.duty if robot.duties else driven.torque, t)
+    effort = effort + rng.normal(0.0, 0.002 if robot.duties else 0.02 * robot.rail * robot.radius, effort.shape)
     turned, steering = _steering_joints(robot), _sampled(driven.steer, t)
     made, kind = STORE.types["sensor_msgs/msg/JointState"], "sensor_msgs/msg/JointState"
     rows: list[tuple[float, str, str, Any]] = []

@@ -52,6 +52,8 @@ class Robot:
         Whether /robot_description, positions and efforts of joints are logged; whether commands carry stamps.
     odometry : str
         ``wheels``, ``own`` (independent of the wheels) or ``none``.
+    duties : bool
+        Whether the efforts are duties instead of torques.
     """
 
     kind: str
@@ -74,6 +76,7 @@ class Robot:
     efforts: bool
     stamped: bool
     odometry: str
+    duties: bool = False
 
 
 @dataclass(frozen=True)

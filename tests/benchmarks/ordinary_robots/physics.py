@@ -22,7 +22,9 @@ class Driven(NamedTuple):
     wheel, seen : Array, shape (n, wheels)
         True speed, and that of the encoder [rad/s].
     torque : Array, shape (n, wheels)
-        Of each motor at its wheel [N·m].
+        Of each motor at its wheel, as its current tells it [N·m].
+    duty : Array, shape (n, wheels)
+        What its controller asks of it [1], be it done or not.
     body : Array, shape (n, 3)
         Forward, lateral [m/s] and yaw rate [rad/s].
     steer : Array, shape (n,)
@@ -32,6 +34,7 @@ class Driven(NamedTuple):
     wheel: Array
     seen: Array
     torque: Array
+    duty: Array
     body: Array
     steer: Array
 
@@ -60,7 +63,10 @@ def drive(robot: Robot, course: Course, fault: Fault | None, rng: np.random.Gene
     if fault is not None:
         if fault.kind == "estop":
             stop[fault.first : fault.last] = True
-        codes = {"motor_dead": 1, "motor_gone": 1, "motor_weak": 2, "motor_on": 3, "jammed": 4}
+        codes = {
+            "motor_dead": 1, "motor_gone": 1, "motor_weak": 2, "motor_on": 3, "jammed": 4, "torque_lost": 6, "brake_drags": 7,
+            "motor_faint": 2, "torque_gone": 6, "brake_on": 7,
+        }  # fmt: skip
         if fault.kind in codes:
             effect[fault.first : fault.last, fault.wheel] = codes[fault.kind]
             scale[fault.first : fault.last, fault.wheel] = fault.size
@@ -107,7 +113,8 @@ def _scan(target: Any, steer: Any, heading: Any, effect: Any, scale: Any, stop: 
     radius, mass, rail, lag, accel, deadband, free, grip, base, closed = numbers
     n, m = target.shape
     wheel, seen, pull, body = np.zeros((n, m)), np.zeros((n, m)), np.zeros((n, m)), np.zeros((n, 3))
-    ref, total, u, speed = np.zeros(m), np.zeros(m), np.zeros(m), np.zeros(m)
+    duty = np.zeros((n, m))
+    ref, total, u, speed, asked = np.zeros(m), np.zeros(m), np.zeros(m), np.zeros(m), np.zeros(m)
     vx = vy = wz = 0.0
     own = 0.15 * mass / m  # a wheel's and motor's own mass at the rim [kg]
     gain = (own + mass / m) / lag / rail
@@ -131,6 +138,7 @@ def _scan(target: Any, steer: Any, heading: Any, effect: Any, scale: Any, stop: 
                 else:
                     value = 1.25 * ref[i] / free
                 value = min(max(value, -1.0), 1.0)
+                asked[i] = 0.0 if stop[k] else value
                 if code == 1:
                     value = 0.0
                 elif code == 2:
@@ -143,8 +151,10 @@ def _scan(target: Any, steer: Any, heading: Any, effect: Any, scale: Any, stop: 
             torque = bias[i] * rail * (live - speed[i] / free)
             if code == 1:
                 torque = 0.0  # without power
-            pull[k, i] = torque * radius
-            torque -= rail * 0.03 * np.tanh(speed[i] / 0.02)
+            pull[k, i], duty[k, i] = torque * radius, asked[i]
+            if code == 6:
+                torque *= scale[k, i]  # the current is there, and makes less of a torque
+            torque -= rail * (0.03 + (scale[k, i] if code == 7 else 0.0)) * np.tanh(speed[i] / 0.02)
             along = (vx - ys[i] * wz) / heading[k, i]
             across = vy + xs[i] * wz
             slip = speed[i] - (along - roller[i] * across) if roller[i] != 0.0 else speed[i] - along
@@ -171,4 +181,4 @@ def _scan(target: Any, steer: Any, heading: Any, effect: Any, scale: Any, stop: 
             wz += 1e-3 * (moment / inertia - 0.2 * wz)
             vy += 1e-3 * push_y / heavy
         body[k, 0], body[k, 1], body[k, 2] = vx, vy, wz
-    return wheel, seen, pull, body
+    return wheel, seen, pull, duty, body

@@ -10,9 +10,16 @@ from diagnosis.results.machine_words import HYDRAULIC, MachineWords, machine_wor
 from diagnosis.results.sizes import amount, times_as_probable
 from diagnosis.results.vocabulary import Kind, Tier
 from replay.faults import Side
+from replay.log.source_options import SignalSource
 from replay.machine.config import Machine, haulotte
 
 _ROBOT = Machine("robot", "", ("R", "L"), None)
+
+
+def _named(topic: str, field: str) -> Machine:
+    return replace(_ROBOT, signals={"wheel.R.u": SignalSource(topic=topic, field=field, unit="1")})
+
+
 _ARM = Machine("arm", "", ("m1", "m2"), None, part="joint", speed_unit="rad/s")
 
 
@@ -26,6 +33,10 @@ _ARM = Machine("arm", "", ("m1", "m2"), None, part="joint", speed_unit="rad/s")
         (_ROBOT, ("wheel.R.pressure_a",), "valve"),
         (_ROBOT, ("wheel.R.effort", "steer.front.u"), "drive"),  # motors at the wheels, a valve at the axle
         (_ROBOT, ("wheel.R.effort", "wheel.R.u", "steer.front.u"), "valve"),
+        (_named("/motor_duty/command", "data[0]"), ("wheel.R.effort", "wheel.R.u"), "motor"),
+        (_named("/motor_duty/command", "data[0]"), ("wheel.R.u", "steer.front.u"), "drive"),
+        (_named("/hydromotor/valve_cmd", "data[0]"), ("wheel.R.u",), "valve"),
+        (_named("/pump_duty", "data[0]"), ("wheel.R.u",), "valve"),
         (replace(_ROBOT, drive="motor"), ("wheel.R.u",), "motor"),
         (replace(_ROBOT, drive="valve"), ("wheel.R.effort",), "valve"),
         (haulotte(), (), "drive"),

@@ -1,0 +1,1 @@
+"""What each drive's effort says beside its motion and its siblings' efforts."""
