@@ -14,12 +14,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from replay.arrays.compiling import njit
-from replay.arrays.numeric import uncounted
+from diagnosis.wheels.forest_kernel import MOST_LEAVES, Bitwise, add_scores, arrange
 
 Array = NDArray[np.float64]
-
-_AT_ONCE = 32  # frames whose features stay in the processor's cache while all trees look at them
 
 
 class Forest(NamedTuple):
@@ -61,46 +58,19 @@ class Look(NamedTuple):
     actuator: Forest
 
 
-@njit(cache=True, error_model="numpy", inline="always")
-def _next(k: int, x: NDArray[np.float32], forest: Forest, after: NDArray[np.int32]) -> int:
-    """Node or leaf behind node k for one frame, x (features,)."""
-    return int(after[k, int(x[forest.feature[k]] <= forest.threshold[k])])
-
-
-@njit(cache=True, error_model="numpy", nogil=True)
-def _scores(x: NDArray[np.float32], forest: Forest, after: NDArray[np.int32], out: Array) -> None:
-    """Add the leaves of every frame of x (frames, features) to its classes' scores, `out` (frames, classes).
-
-    `after` (nodes, 2) holds the nodes to the right and to the left. Four frames go down a tree at once: each step of one waits
-    for its memory, and the others' do not wait for it.
-    """
-    x, forest, after = uncounted(x), uncounted(forest), uncounted(after)
-    frames, classes = out.shape
-    for first in range(0, frames, _AT_ONCE):
-        last = min(first + _AT_ONCE, frames)
-        for t in range(forest.root.size):
-            for n in range(first, last, 4):
-                a = b = c = d = np.int64(forest.root[t])
-                # those beyond the last frame follow it, and add nothing
-                at_b, at_c, at_d = min(n + 1, last - 1), min(n + 2, last - 1), min(n + 3, last - 1)
-                while a >= 0 and b >= 0 and c >= 0 and d >= 0:
-                    a, b = _next(a, x[n], forest, after), _next(b, x[at_b], forest, after)
-                    c, d = _next(c, x[at_c], forest, after), _next(d, x[at_d], forest, after)
-                while a >= 0:
-                    a = _next(a, x[n], forest, after)
-                while b >= 0:
-                    b = _next(b, x[at_b], forest, after)
-                while c >= 0:
-                    c = _next(c, x[at_c], forest, after)
-                while d >= 0:
-                    d = _next(d, x[at_d], forest, after)
-                out[n, t % classes] += forest.value[-1 - a]
-                if n + 1 < last:
-                    out[n + 1, t % classes] += forest.value[-1 - b]
-                if n + 2 < last:
-                    out[n + 2, t % classes] += forest.value[-1 - c]
-                if n + 3 < last:
-                    out[n + 3, t % classes] += forest.value[-1 - d]
+def _bitwise(forest: Forest) -> Bitwise:
+    """The trees by their nodes."""
+    nodes, trees = forest.feature.size, forest.root.size
+    out = Bitwise(
+        first=np.zeros(trees + 1, np.int64),
+        feature=np.zeros(nodes, np.int64),
+        threshold=np.zeros(nodes, np.float32),
+        kept=np.zeros(nodes, np.uint32),
+        value=np.zeros((trees, MOST_LEAVES), np.float32),
+    )
+    if not arrange(*forest[:6], out):
+        raise ValueError(f"a tree has more than {MOST_LEAVES} leaves")
+    return out
 
 
 def log_probabilities(x: NDArray[np.float32], forest: Forest) -> Array:
@@ -112,9 +82,14 @@ def log_probabilities(x: NDArray[np.float32], forest: Forest) -> Array:
         From `diagnosis.wheels.frames`.
     forest : Forest
         Of one side.
+
+    Raises
+    ------
+    ValueError
+        Where a tree has more than `MOST_LEAVES` leaves.
     """
     out = np.zeros((len(x), forest.prior.size))
-    _scores(np.ascontiguousarray(x, np.float32), forest, np.column_stack([forest.right, forest.left]), out)
+    add_scores(np.ascontiguousarray(x, np.float32), _bitwise(forest), out)
     out -= out.max(axis=1, keepdims=True)
     out -= np.log(np.exp(out).sum(axis=1, keepdims=True))
     return np.asarray(out)

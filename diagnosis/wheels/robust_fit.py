@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from replay.arrays.compiling import njit
 from replay.arrays.scipy_parts import part_of
 
 Array = NDArray[np.float64]
@@ -78,19 +79,34 @@ def normal_equations(x: Array, y: Array, use: NDArray[np.bool_], length: int) ->
     )
 
 
-def solve(w: Normal, penalty: Array, prior: Array | None = None) -> Array:
-    """Coefficients that are not negative, by ridge regression towards `prior`; `penalty` (p, p) per sample."""
-    A, b = _system(w, penalty, prior)
+def solve(w: Normal, penalty: Array, prior: Array | None = None, chosen: NDArray[np.intp] | None = None) -> Array:
+    """Coefficients that are not negative, by ridge regression towards `prior`; `penalty` (p, p) per sample.
+
+    `chosen` are indices of the windows to use, shape (k,); None: all.
+    """
+    A, b = _system(w, np.arange(w.samples.size) if chosen is None else chosen, penalty, prior)
     L = np.linalg.cholesky(A)
     return np.asarray(part_of("scipy.optimize", "_nnls").nnls(L.T, np.linalg.solve(L, b))[0])
 
 
-def _system(w: Normal, penalty: Array, prior: Array | None) -> tuple[Array, Array]:
-    total = w.samples.sum() * penalty
-    A, b = w.gram.sum(axis=0) + total, w.moment.sum(axis=0)
+def _system(w: Normal, chosen: NDArray[np.intp], penalty: Array, prior: Array | None) -> tuple[Array, Array]:
+    A, b = np.zeros(w.gram.shape[1:]), np.zeros(w.moment.shape[1])
+    _add_chosen(w.gram.reshape(-1, A.size), chosen, A.reshape(-1))
+    _add_chosen(w.moment, chosen, b)
+    total = w.samples[chosen].sum() * penalty
+    A += total
     if prior is not None:
         b = b + total @ prior
     return A + 1e-9 * max(float(np.trace(A)), 1e-12) * np.eye(len(A)), b
+
+
+@njit(cache=True, nogil=True)
+def _add_chosen(rows, chosen, out):  # type: ignore[no-untyped-def]
+    """Add some rows (n, k) to `out` (k,), one after another and without a copy of them."""
+    for n in chosen:
+        row = rows[n]
+        for i in range(out.size):
+            out[i] += row[i]
 
 
 def misfits(w: Normal, values: Array, floor: float) -> Array:
@@ -132,7 +148,7 @@ def trimmed(
     best: tuple[float, NDArray[np.intp]] | None = None
     for chosen in seeds:
         for _ in range(_STEPS_START):
-            values = np.asarray(np.linalg.solve(*_system(w.part(chosen), penalty, None)), np.float64)
+            values = np.asarray(np.linalg.solve(*_system(w, chosen, penalty, None)), np.float64)
             left = misfits(w, values, floor)
             chosen = np.argpartition(left, keep - 1)[:keep]
         score = float(left[chosen].mean())
@@ -141,7 +157,7 @@ def trimmed(
     assert best is not None
     chosen = best[1]
     for _ in range(_STEPS_END):
-        values = solve(w.part(chosen), penalty)
+        values = solve(w, penalty, chosen=chosen)
         left = misfits(w, values, floor)
         new = np.argpartition(left, keep - 1)[:keep]
         same = np.array_equal(np.sort(new), np.sort(chosen))

@@ -19,14 +19,24 @@ def blocks(size: int, multiple: int = 1, rows: int | None = None) -> Iterator[sl
 
 
 def framed(x: NDArray[Any], width: int) -> NDArray[Any]:
-    """Rows by block, shape (⌈n/width⌉, width, …); the last block is filled up with the last row."""
-    filled = np.pad(x, [(0, -len(x) % width)] + [(0, 0)] * (x.ndim - 1), mode="edge")
+    """Rows by block, shape (⌈n/width⌉, width, …), to be read alone; the last block is filled up with the last row."""
+    missing = -len(x) % width
+    filled = np.pad(x, [(0, missing)] + [(0, 0)] * (x.ndim - 1), mode="edge") if missing or not _in_rows(x) else x
     return filled.reshape(-1, width, *x.shape[1:])
+
+
+def _in_rows(x: NDArray[Any]) -> bool:
+    """Whether rows stand one behind the other; sums over others are rounded otherwise."""
+    return x.flags.c_contiguous
 
 
 def block_means(x: NDArray[Any], width: int) -> NDArray[np.float64]:
     """Means over blocks of `width` rows, shape (⌈n/width⌉, …), as `framed` has them."""
-    return np.asarray(framed(x, width).mean(axis=1, dtype=np.float64))
+    whole = len(x) // width * width if _in_rows(x) else len(x)
+    means = framed(x[:whole], width).mean(axis=1, dtype=np.float64)
+    if whole == len(x):
+        return np.asarray(means)
+    return np.concatenate([means, framed(x[whole:], width).mean(axis=1, dtype=np.float64)])  # no copy of all rows
 
 
 def release(*arrays: NDArray[Any] | None) -> None:

@@ -57,6 +57,40 @@ def test_scores_are_those_of_a_walk(seed: int, frames: int) -> None:
     assert_allclose(log_probabilities(x, forest), want, atol=1e-9)
 
 
+@pytest.mark.parametrize("missing", [np.nan, np.inf, -np.inf])
+def test_what_is_not_known_goes_to_the_right(missing: float) -> None:
+    forest = random_forest(1)
+    x = np.full((1, FEATURES), missing, np.float32)
+    as_known = np.full((1, FEATURES), -1e30 if missing < 0 else 1e30, np.float32)
+    assert_allclose(log_probabilities(x, forest), log_probabilities(as_known, forest))
+
+
+def chain(leaves: int) -> Forest:
+    """One tree whose nodes follow each other to the right: leaf k for numbers above k − 0.5 and up to k + 0.5."""
+    nodes = np.arange(leaves - 1)
+    right = np.where(nodes + 1 < leaves - 1, nodes + 1, -leaves)
+    return random_forest(0)._replace(
+        feature=np.zeros(leaves - 1, np.int16),
+        threshold=(nodes + 0.5).astype(np.float32),
+        left=(-1 - nodes).astype(np.int32),
+        right=right.astype(np.int32),
+        value=np.arange(leaves, dtype=np.float32),
+        root=np.zeros(1, np.int32),
+    )
+
+
+def test_every_leaf_of_the_largest_tree() -> None:
+    x = np.zeros((32, FEATURES), np.float32)
+    x[:, 0] = np.arange(32)
+    said = log_probabilities(x, chain(32))
+    assert_allclose(said[:, 0] - said[:, 1], np.arange(32))
+
+
+def test_larger_trees_are_refused() -> None:
+    with pytest.raises(ValueError, match="more than 32 leaves"):
+        log_probabilities(np.zeros((1, FEATURES), np.float32), chain(33))
+
+
 def test_share_of_features_within_the_training() -> None:
     forest = random_forest(0)
     x = np.zeros((2, FEATURES), np.float32)
