@@ -6,6 +6,7 @@ import re
 from collections.abc import Iterator, Mapping
 from typing import Any
 
+from diagnosis.comparison.losses import loss_change
 from diagnosis.comparison.words import coverage_head
 from diagnosis.report.confidence import going_out, judged
 from diagnosis.report.fault_times import times_words, when_words
@@ -77,6 +78,18 @@ def of_previous(report: Mapping[str, Any]) -> Iterator[str]:
     both = [c for c in changes if all(side is not None and side["long_enough"] for side in (c["older"], c["newer"]))]
     if both and head == "Judged long enough in one mission only":
         yield f"{head}: {both[0]['component']} {both[0]['side']} was in both"
+
+
+def of_losses(report: Mapping[str, Any]) -> Iterator[str]:
+    """A fault that is called unchanged beside the loss of its part, which grew or shrank."""
+    previous = report.get("previous", {})
+    for change in previous.get("faults", []):
+        if change["status"] != "unchanged" or change["mode"] != "inefficient":
+            continue
+        for x in previous["loss"]:
+            mine = x["component"] == change["component"] and x["side"] in _sides(change)
+            if mine and loss_change(x["older"], x["newer"]):
+                yield f"{x['component']} {x['side']} is unchanged, and its loss is {x['older']['value']:.2f} and {x['newer']['value']:.2f}"
 
 
 def of_standings(report: Mapping[str, Any]) -> Iterator[str]:
@@ -157,6 +170,7 @@ def of_page(report: Mapping[str, Any]) -> Iterator[str]:
         of_going_out,
         of_endings,
         of_previous,
+        of_losses,
         of_standings,
         of_reasons,
         of_acts,

@@ -9,6 +9,7 @@ from diagnosis.comparison.coverage import CoverageChange, coverage_changes, side
 from diagnosis.comparison.faults import FaultChange, is_worse, match_faults
 from diagnosis.comparison.found import FoundFault, found_faults
 from diagnosis.comparison.gone import Newer
+from diagnosis.comparison.losses import losses_of_both
 from diagnosis.results.comparison_document import SCHEMA, ComparisonDocument, Outcome
 from diagnosis.results.document import LimitsRow, MachineIdentity, ReportDocument
 from diagnosis.results.machine_words import words_of
@@ -135,7 +136,8 @@ def compare_reports(
     had, has = sides_of(older), sides_of(newer)
     words = words_of(newer["machine"])
     seen = Newer(has, newer["detectability"]["rows"], newer["limits"]["clear_at"], _not_later(older, newer, a, b))
-    faults = tuple(match_faults(found_faults(older, had), found_faults(newer, has), had, seen, words))
+    losses = losses_of_both(older, newer)
+    faults = tuple(match_faults(found_faults(older, had), found_faults(newer, has), had, seen, words, losses))
     gone = [c.older for c in faults if c.status == "not_seen_again" and c.older is not None]
     axles = {*older["machine"]["axles"], *newer["machine"]["axles"]}
     outcomes: list[str] = [c.trend or c.status for c in faults]

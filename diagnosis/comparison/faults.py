@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from diagnosis.comparison.found import FoundFault, Sides, keys_of
 from diagnosis.comparison.gone import Newer, why_not_resolved
+from diagnosis.comparison.losses import Losses, loss_change
 from diagnosis.decision.wording import join_words
 from diagnosis.results.candidates import unclear_words
 from diagnosis.results.comparison_document import Change, Status, Trend
@@ -16,7 +17,6 @@ from diagnosis.results.vocabulary import Kind, Severity, Tier
 from replay.faults import FaultMode, Side
 
 _LONGER, _LEAST_S = 2.0, 1.0
-_LEAST_EPSILON = 0.05  # bounds are those of one mission; the same fault differs more from mission to mission
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,8 @@ class FaultChange:
     older, newer : FoundFault or None
         The fault in either mission.
     changes : tuple[Change, ...]
-        ``row``, ``side``, ``severity``, ``epsilon``, ``duration``: what changed.
+        ``row``, ``side``, ``severity``, ``epsilon``, ``duration``, ``loss`` (that of its part over the whole mission): what
+        changed.
     note : str
         Sentence about what limits the statement; may be empty.
     """
@@ -68,6 +69,7 @@ def match_faults(
     older_sides: Sides,
     seen: Newer,
     words: MachineWords,
+    losses: Losses | None = None,
 ) -> list[FaultChange]:
     """Match faults one to one: same side and row, then same row where one side is not told apart, then same side.
 
@@ -83,6 +85,8 @@ def match_faults(
         What the newer mission could show.
     words : MachineWords
         How to speak of the machine.
+    losses : Losses or None
+        Mission-wide ε̂ [1] of the parts in both missions.
 
     Returns
     -------
@@ -99,7 +103,7 @@ def match_faults(
                 rest.append(b)
                 continue
             left.remove(a)
-            out.append(_both(a, b))
+            out.append(_both(a, b, losses or {}))
         open_ = rest
     out += [_change("new", None, b, note=_unseen_before(b, older_sides, words)) for b in open_]
     for a in left:
@@ -151,8 +155,9 @@ def _change(
     return FaultChange(status, trend, fault.component, fault.kind, fault.side, fault.mode, a, b, changes, note)
 
 
-def _both(a: FoundFault, b: FoundFault) -> FaultChange:
+def _both(a: FoundFault, b: FoundFault, losses: Losses) -> FaultChange:
     """A fault of both missions."""
+    loss = _loss(a, b, losses)
     severity, epsilon, duration = _sign(a.severity.rank, b.severity.rank), _epsilon(a, b), _duration(a, b)
     differs: dict[Change, bool] = {
         "row": not _may_be_one_row(a, b),
@@ -160,11 +165,12 @@ def _both(a: FoundFault, b: FoundFault) -> FaultChange:
         "severity": bool(severity),
         "epsilon": bool(epsilon),
         "duration": bool(duration),
+        "loss": bool(loss),
     }
     changes = tuple(name for name, is_so in differs.items() if is_so)
     if not changes:
         return _change("unchanged", a, b)
-    signs = [severity] if severity else [epsilon, duration]
+    signs = [severity] if severity else [epsilon, duration, loss]
     return _change("changed", a, b, "worse" if 1 in signs else "better" if -1 in signs else "other", changes)
 
 
@@ -173,12 +179,17 @@ def _sign(a: float, b: float) -> int:
 
 
 def _epsilon(a: FoundFault, b: FoundFault) -> int:
-    """+1 or −1 where each ε̂ lies outside the other's 95 % bounds and they differ by 0.05; 0 between different rows."""
+    """+1 or −1 where ε̂ of the fault grew or shrank; 0 between different rows."""
     x, y = a.epsilon, b.epsilon
-    if x is None or y is None or a.mode != b.mode:
+    return 0 if x is None or y is None or a.mode != b.mode else loss_change(x, y)
+
+
+def _loss(a: FoundFault, b: FoundFault, losses: Losses) -> int:
+    """+1 or −1 where the loss of the part over the whole mission grew or shrank, of a fault that is such a loss in both."""
+    if not a.mode is b.mode is FaultMode.INEFFICIENT:
         return 0
-    apart = not x["low"] <= y["value"] <= x["high"] and not y["low"] <= x["value"] <= y["high"]
-    return _sign(x["value"], y["value"]) if apart and abs(x["value"] - y["value"]) >= _LEAST_EPSILON else 0
+    signs = [loss_change(*losses[key]) for key in keys_of(b.component, b.side) if key in losses]
+    return 1 if 1 in signs else -1 if -1 in signs else 0
 
 
 def _duration(a: FoundFault, b: FoundFault) -> int:

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from diagnosis.comparison.compare import Comparison, compare_reports, comparison_json, machine_difference
+from diagnosis.comparison.losses import losses_of_both
 from diagnosis.results.comparison_document import ComparedMissionRow, LossChangeRow, OtherMissionRow, PreviousRow
 from diagnosis.results.document import MachineIdentity, ReportDocument
 from replay.errors import ConfigError
@@ -121,10 +122,7 @@ def _without_name(mission: ComparedMissionRow) -> OtherMissionRow:
 
 
 def _losses(older: ReportDocument, newer: ReportDocument) -> list[LossChangeRow]:
-    """Mission-wide ε̂ of the parts for which both missions have one; two missions are too few for those against other wheels."""
-    before = {(x["component"], x["side"]): x["epsilon"] for x in older["loss"] if not x["relative"]}
     return [
-        {"component": x["component"], "side": x["side"], "older": epsilon, "newer": x["epsilon"]}
-        for x in newer["loss"]
-        if not x["relative"] and (epsilon := before.get((x["component"], x["side"]))) is not None
+        {"component": component, "side": side, "older": before, "newer": now}
+        for (component, side), (before, now) in losses_of_both(older, newer).items()
     ]

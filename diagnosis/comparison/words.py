@@ -34,6 +34,7 @@ CHANGES: dict[Change, str] = {
     "severity": "severity",
     "epsilon": "ε̂",
     "duration": "duration",
+    "loss": "loss over the mission",
 }
 
 

@@ -33,7 +33,7 @@ from diagnosis.report.fleet_note import fleet_section, repaired_faults
 from diagnosis.report.healthy_lanes import healthy_lanes
 from diagnosis.report.machine_lane import machine_lane
 from diagnosis.report.machine_picture import axles_in_words, machine_picture, places_in_words
-from diagnosis.report.path_picture import path_picture
+from diagnosis.report.path_picture import path_picture, unnamed_words
 from diagnosis.report.plot_data import Axis, axis_of, blocks_of, channels_of, figures_of, packed_intervals, view, worst
 from diagnosis.report.plot_rows import loop_groups
 from diagnosis.report.previous import previous_section
@@ -190,7 +190,7 @@ def _pictures(
         "path": Markup("")
         if path.x is None or path.y is None
         else path_picture(path.x, path.y, *series.place, detailed),
-        "path_words": path.words,
+        "path_words": path.words + ("" if path.x is None else unnamed_words(detailed)),
         "tested": join_words(list(dict.fromkeys(row.words for row in FAULT_ROWS))),
         "path_modes": [m for m in FaultMode if any(f["mode"] == m for f in detailed)],
         "thumbs": {f["id"]: _thumbnail(f, words, series.shown, *series.place) for f in thumbs},

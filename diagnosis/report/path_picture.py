@@ -17,6 +17,15 @@ from diagnosis.results.document import IntervalRow
 _MARKS = 24
 
 
+def unnamed_words(faults: Sequence[IntervalRow]) -> str:
+    """That a path names the first faults alone, to follow the words on where it comes from; empty where it names all."""
+    left = len(faults) - _MARKS
+    if left <= 0:
+        return ""
+    more = "the other is" if left == 1 else f"the other {left} are"
+    return f". Named are the {_MARKS} most severe of {len(faults)} faults drawn; {more} coloured without a name"
+
+
 def _path_d(x: NDArray[np.floating], y: NDArray[np.floating]) -> str:
     out, pen = [], "M"
     for a, b in zip(x.tolist(), y.tolist(), strict=True):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from diagnosis.comparison.losses import loss_change
 from diagnosis.comparison.words import CHANGES, OUTCOMES, SIGNS, coverage_head, coverage_words, row_of_found, times
 from diagnosis.pages import labels
 from diagnosis.report.judged_parts import kind_of
@@ -48,8 +49,8 @@ def previous_section(report: ReportDocument) -> Context | None:
         "faults": [_row(c, words) for c in found["faults"]],
         "coverage": [_coverage(c, words) for c in found["coverage"]],
         "coverage_head": coverage_head(found["coverage"]),
-        "loss": [_loss(x, report["machine"]) for x in found["loss"] if _differs(x)],
-        "same_loss": sum(not _differs(x) for x in found["loss"]),
+        "loss": [_loss(x, report["machine"]) for x in found["loss"] if loss_change(x["older"], x["newer"])],
+        "same_loss": sum(not loss_change(x["older"], x["newer"]) for x in found["loss"]),
         "notes": found["notes"],
         "open_faults": found.get("open_faults", []),
         "open_asof": labels.utc_moment(found["open_asof_ns"])[:10] if "open_asof_ns" in found else "",
@@ -115,12 +116,6 @@ def _judged(side: SideCoverageRow | None) -> str:
     return f"{side['decided_s']:.1f} of {side['driving_s']:.1f} s driving" + (
         ", a check open" if not side["shown"] else ""
     )
-
-
-def _differs(x: LossChangeRow) -> bool:
-    """Whether each ε̂ lies outside the other's bounds."""
-    a, b = x["older"], x["newer"]
-    return not a["low"] <= b["value"] <= a["high"] and not b["low"] <= a["value"] <= b["high"]
 
 
 def _loss(x: LossChangeRow, machine: MachineRow) -> Context:

@@ -20,8 +20,8 @@ Status = Literal["new", "changed", "unchanged", "resolved", "not_seen_again"]
 Trend = Literal["worse", "better", "other", ""]
 #: What is counted: the status, of a changed fault its trend.
 Outcome = Literal["new", "worse", "other", "better", "not_seen_again", "resolved", "unchanged"]
-#: Part of a fault that changed; ``row`` is its mode.
-Change = Literal["row", "side", "severity", "epsilon", "duration"]
+#: Part of a fault that changed; ``row`` is its mode, ``loss`` its part's loss over the whole mission.
+Change = Literal["row", "side", "severity", "epsilon", "duration", "loss"]
 #: Whether a part was assessed in one of the missions alone; empty where in both or in neither.
 CoverageStep = Literal["lost", "gained", ""]
 

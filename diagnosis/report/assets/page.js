@@ -10,7 +10,7 @@
     end: (f) => [f.stop - 0.5, f.stop + 0.5],
     mission: () => [0, view.duration],
   };
-  const SHADES = 40;
+  const SHADES = 40, first = [one("#verdict .actions [data-f]")?.dataset.f, ...faults.keys()].find((id) => faults.has(id)); // of the first action
   let current = null, shared = null, loopKey = view.loop[0]?.key;
 
   // Time shown in the evidence: marked on the timeline, kept in the address, followed by the explorer where linked.
@@ -261,8 +261,8 @@
 
   function fromAddress(hash, scroll) {
     const { event, has, t, range, plots, view: shown, id } = Address.read(hash), wanted = plots ?? [], bar = event && barOf(event, range);
-    if (bar) { if (!current && faults.size) select(faults.keys().next().value); showEvent(bar, scroll); } else if (faults.has(id)) select(id, { range, scroll });
-    else if (!current && faults.size) select(faults.keys().next().value, { range });
+    if (bar) { if (!current && faults.size) select(first); showEvent(bar, scroll); } else if (faults.has(id)) select(id, { range, scroll });
+    else if (!current && faults.size) select(first, { range });
     else if (!faults.size && range) shared = range;
     if (explorer && plots) one("#signals-view").value = ["xy", "spectrum"].find((v) => v === shown) ?? "time";
     if (explorer && (plots || faults.has(id)) && JSON.stringify(wanted) !== JSON.stringify(explorer.plots)) explorer.set(wanted);

@@ -9,6 +9,7 @@ import pytest
 from diagnosis.comparison.previous import with_previous
 from diagnosis.results.document import ReportDocument
 from replay.errors import ConfigError
+from tests.page_contradictions import of_losses
 from tests.whole_documents import whole_report
 
 
@@ -94,6 +95,24 @@ def test_losses_of_both() -> None:
     got = with_previous(newer, document(loss=[loss("FR", 0.1)]))["previous"]["loss"]
     assert [(x["component"], x["older"]["value"], x["newer"]["value"]) for x in got] == [("FR", 0.1, 0.2)]
     assert with_previous(newer, document())["previous"]["loss"] == []
+
+
+@pytest.mark.parametrize(
+    ("now", "outcome"), [(0.44, "worse"), (0.26, "better"), (0.39, "unchanged"), (0.36, "unchanged")]
+)
+def test_a_loss_that_grows_is_told_of_its_fault(now: float, outcome: str) -> None:
+    def mission(value: float, start_ns: int) -> ReportDocument:
+        wide = fault("inefficient", value) | {"epsilon": {"value": value, "low": value - 0.2, "high": value + 0.2}}
+        epsilon = {"value": value, "low": value - 0.002, "high": value + 0.002}
+        row = {"component": "FR", "side": "sensor", "epsilon": epsilon, "seconds": 40.0, "relative": False}
+        return document(wide, start_ns=start_ns, loss=[row])
+
+    got = with_previous(mission(now, LATER), mission(0.35, 10**18))
+    assert outcomes(got) == [(outcome, "FR")]
+    assert not list(of_losses(got))
+    if outcome != "unchanged":
+        got["previous"]["faults"][0]["status"] = "unchanged"
+        assert list(of_losses(got))
 
 
 def test_another_machine_is_refused() -> None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from diagnosis.report.machine_picture import condition, machine_picture, places_in_words
-from diagnosis.report.path_picture import path_picture
+from diagnosis.report.path_picture import path_picture, unnamed_words
 from diagnosis.report.standing import Standing
 from diagnosis.report.thumbnail import thumbnail
 from diagnosis.results.vocabulary import Kind
@@ -128,3 +128,8 @@ def test_a_drive_to_stop_at_once_for_comes_before_a_sensor_as_among_the_actions(
     drive = samples.fault(id="F2", component="FR", side="actuator", mode="stuck", severity="high", start_s=3.0)
     assert condition("FR", Kind.WHEEL, [sensor, drive], {}).fault == "F2"
     assert condition("FR", Kind.WHEEL, [sensor, {**drive, "severity": "medium"}], {}).fault == "F1"
+
+
+def test_a_path_says_how_many_faults_it_leaves_unnamed() -> None:
+    assert unnamed_words([FAULT] * 24) == ""
+    assert "24 most severe of 34 faults drawn; the other 10 are" in unnamed_words([FAULT] * 34)
