@@ -21,6 +21,7 @@ _OPEN, _TIE = 0.9, 1e-3
 _SPREAD = 0.05  # of the probabilities of spells that is worth a word
 _AT_MOST = f"{100 * MOST_CLAIMED:.0f} %, the most that any one kind of fault is given"
 _NOTHING, _MOSTLY = 0.005, 0.5  # of the driving: judged for so little that it is none, and for most of it
+_SHORT = (Standing.NOT_LONG_ENOUGH, Standing.NOT_JUDGED, Standing.NOT_STEERED)
 _BESIDE = "what the {wheels} and the channels of one show beside each other"  # without any command
 _UNLIKE = 0.1  # of the driving: sides that were judged for shares so far apart are told one by one
 _ANSWERS = {Verdict.STOP: f"{Leave.MUST_NOT} before repair", Verdict.READY: "", Verdict.NOT_ASSESSED: Leave.CHECK.value}
@@ -115,13 +116,13 @@ def judged(report: ReportDocument) -> str:
     parts, words, axles = standings_of(report), words_of(report["machine"]), report["machine"]["axles"]
     if not parts:
         return ""
-    short = [part for part, s in parts.items() if s in (Standing.NOT_LONG_ENOUGH, Standing.NOT_JUDGED)]
+    short = [part for part, s in parts.items() if s in _SHORT]
     cleared = sum(s is Standing.CLEARED for s in parts.values())
     many = str(cleared) if cleared else "none"
     out = [
         f"{len(parts) - len(short)} of {len(parts)} parts judged, {many} cleared{'' if cleared else _why_none(report)}"
     ]
-    for how in (Standing.NOT_LONG_ENOUGH, Standing.NOT_JUDGED):
+    for how in _SHORT:
         told = [
             words.listed(kind, mine)
             for kind in (Kind.WHEEL, Kind.STEER)

@@ -83,6 +83,12 @@ def condition(
     open_ = {name: how for name, how in own.items() if how is not Standing.CLEARED}
     if own and not open_:
         return Condition(State.HEALTHY, ("Healthy",), "", f"{component}: no fault found")
+    if open_ and all(how is Standing.NOT_STEERED for how in open_.values()):
+        resting = (
+            [str(Standing.NOT_STEERED)] if len(open_) == len(own) else [f"{name} {how}" for name, how in open_.items()]
+        )
+        title = f"{component}: {', '.join(('no fault found', *resting))}"
+        return Condition(State.NOT_EXCITED, ("No fault found", *resting), "", title)
     if all(how is Standing.NOT_JUDGED for how in own.values()):
         return Condition(State.NOT_ASSESSED, ("Not judged",), "", f"{component}: not judged")
     alike = len(open_) == len(own) and len(set(open_.values())) == 1

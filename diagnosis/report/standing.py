@@ -11,6 +11,7 @@ from diagnosis.results.vocabulary import Severity, Tier, Verdict
 from replay.faults import Side, State
 
 _NOTHING = 0.005  # of the driving: judged for so little that it is none
+_RESTED = 0.9  # of the mission
 _WORTH_A_WORD = 0.05  # probability of an alternative
 
 #: A component and its side.
@@ -24,21 +25,35 @@ class Standing(StrEnum):
     NOT_CLEARED = "not cleared"
     NOT_LONG_ENOUGH = "not judged long enough"
     NOT_JUDGED = "not judged"
+    NOT_STEERED = "not steered"
 
 
 def standings_of(report: ReportDocument) -> dict[Part, Standing]:
     """How each component and side of a report stands."""
     sides = sides_of(report)
-    cleared = _cleared(report, sides)
+    cleared, rested = _cleared(report, sides), _not_steered(report)
     return {
         part: Standing.CLEARED
         if part in cleared
+        else Standing.NOT_STEERED
+        if part in rested and not side.long_enough
         else Standing.NOT_CLEARED
         if side.long_enough
         else Standing.NOT_LONG_ENOUGH
         if side.tier is not Tier.NONE and side.decided_s > _NOTHING * side.driving_s
         else Standing.NOT_JUDGED
         for part, side in sides.items()
+    }
+
+
+def _not_steered(report: ReportDocument) -> set[Part]:
+    """Sides of axles that were hardly asked to move in the mission, so that nothing is asked of them before the next one."""
+    axles = set(report["machine"]["axles"])
+    return {
+        (row["component"], row["side"])
+        for row in report["coverage"]
+        if row["component"] in axles
+        and row["seconds"].get(State.NOT_EXCITED, 0.0) >= _RESTED * sum(row["seconds"].values()) > 0.0
     }
 
 

@@ -179,6 +179,10 @@ def headline(
         tag = f"{count(len(damaged), 'machine')}: {'files left out' if apart else 'damaged logs'}"
     leaves = [leave_of(m.verdict, m.cleared, m.unjudged, lost=x) for m, x in zip(machines, lost, strict=True)]
     title = _leave_words(leaves)
+    if status is Verdict.WATCH and (unsure := leaves.count(Leave.CHECK)) > verdicts.count(Verdict.WATCH):
+        tag = (
+            f"{count(unsure, 'machine')} to check"  # as the title has it, which counts those that were not judged, too
+        )
     if status is Verdict.READY and any(lost):
         status, tag = Verdict.WATCH, "a loss beyond its limit"
     if unknown and status is Verdict.READY:

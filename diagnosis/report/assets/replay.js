@@ -62,7 +62,7 @@ class Replay {
     this.one("#stage-figure").hidden = !rows.length;
     if (rows.length) await this.figure.draw(rows, Data.view.faults.slice(0, 40).map((f) => ({ ...f, main: false })), [0, Data.view.duration]);
     const found = [];
-    for (const part of this.parts) found.push(...await this.crossings(part));
+    for (const part of this.parts) found.push(...(await this.crossings(part)).map((e) => ({ ...e, part })));
     // Those of probabilities, and those beside a fault; where there are none, all, up to some.
     const all = found.length, rank = (e) => (e.sure ? 2 : e.near ? 1 : 0), most = found.some(rank) ? found.filter(rank).length : all;
     found.sort((a, b) => rank(b) - rank(a) || a.t - b.t);
@@ -153,14 +153,17 @@ class Replay {
     one("#scrub").value = t;
     one("#scrub").setAttribute("aria-valuetext", `${t.toFixed(2)} seconds`);
     one("#clock").textContent = `${t.toFixed(2)} s`;
-    let last = null;
-    for (const e of this.events) { if (e.t <= t + 1e-9) last = e; e.item.removeAttribute("aria-current"); }
+    // The last crossing of a part whose fault lasts here, else the last of all.
+    const here = Data.view.faults.filter((f) => f.start <= t && t < f.stop), before = this.events.filter((e) => e.t <= t + 1e-9);
+    for (const e of this.events) e.item.removeAttribute("aria-current");
+    const last = before.findLast((e) => here.some((f) => Replay.of(f, e.part))) ?? before.at(-1) ?? null;
     if (last) {
       last.item.setAttribute("aria-current", "true");
       const box = one("#events"), y = last.item.offsetTop;
       if (y < box.scrollTop || y > box.scrollTop + box.clientHeight - 40) box.scrollTop = y - 30;
     }
-    const why = last?.words ?? (this.looked ? "Nothing has passed a threshold up to here." : "Looking for what passes its threshold.");
+    const earlier = last && t - last.t > Replay.BESIDE && !here.some((f) => Replay.of(f, last.part)) ? "Last before: " : "";
+    const why = last ? earlier + last.words : (this.looked ? "Nothing has passed a threshold up to here." : "Looking for what passes its threshold.");
     if (one("#why").textContent !== why) one("#why").textContent = why;
     for (const part of this.parts) {
       if (!part.modes.length) {

@@ -47,6 +47,16 @@ def test_part_that_was_never_judged_is_not_called_healthy() -> None:
     assert (none.state, none.lines) == ("not_assessed", ("Not judged",))
 
 
+def test_an_axle_that_was_not_steered_is_told_so_and_is_no_question() -> None:
+    both = condition("rear", Kind.STEER, [], {("rear", side): Standing.NOT_STEERED for side in ("sensor", "actuator")})
+    assert (both.state, both.lines) == ("not_excited", ("No fault found", "not steered"))
+    parts = {("rear", "sensor"): Standing.CLEARED, ("rear", "actuator"): Standing.NOT_STEERED}
+    one = condition("rear", Kind.STEER, [], parts)
+    assert (one.state, one.title) == ("not_excited", "rear: no fault found, steering valve not steered")
+    parts[("rear", "sensor")] = Standing.NOT_JUDGED
+    assert condition("rear", Kind.STEER, [], parts).state == "not_assessed"
+
+
 def test_what_was_not_judged_of_a_faulty_wheel_is_said_too() -> None:
     found = condition("FR", Kind.WHEEL, [FAULT], CLEARED | {("FR", "actuator"): Standing.NOT_JUDGED})
     assert found.lines[-1] == "drive valve not judged"

@@ -5,16 +5,19 @@ from __future__ import annotations
 import json
 import re
 from pathlib import Path
-from typing import Any
+from types import SimpleNamespace
+from typing import Any, cast
 
 import pytest
 
 from diagnosis.audit.fleet.listed import listed_machines
+from diagnosis.audit.fleet.machines import Machine
 from diagnosis.audit.fleet.page.figures import of_faults
 from diagnosis.audit.fleet.page.matrix import matrix
 from diagnosis.audit.fleet.page.page import build_fleet_page
-from diagnosis.audit.fleet.words import found_in
+from diagnosis.audit.fleet.words import found_in, headline
 from diagnosis.audit.fleet_files import fleet_json, load_fleet
+from diagnosis.results.vocabulary import Verdict
 from tests import fleet_samples as samples
 from tests.fleet_samples import DAY_NS, START_NS, Fault, Sample
 
@@ -273,6 +276,21 @@ def test_the_headline_counts_machines_as_the_lists_do(tmp_path: Path, verdicts: 
         *(Sample(f"{k}", f"M{k}", verdict=v, faults=stuck if v == "stop" else []) for k, v in enumerate(verdicts)),
     )
     assert d["verdict"]["title"] == title
+
+
+@pytest.mark.parametrize(
+    ("verdicts", "tag"),
+    [
+        (["watch", "ready", "ready"], "1 machine: faults to watch"),
+        (["watch", "not_assessed"], "2 machines to check"),
+        (["stop", "not_assessed"], "1 machine: stop and repair"),
+    ],
+)
+def test_the_few_words_above_the_headline_count_as_it_does(verdicts: list[str], tag: str) -> None:
+    apart = {"unjudged": False, "newest": [], "faults": [SimpleNamespace(standing=True)]}
+    sure = "not_assessed" not in verdicts
+    machines = [cast(Machine, SimpleNamespace(verdict=Verdict(v), cleared=sure, **apart)) for v in verdicts]
+    assert headline(machines)[1] == tag
 
 
 def test_missions_that_count_are_told_from_all(tmp_path: Path) -> None:
