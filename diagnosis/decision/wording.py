@@ -251,12 +251,19 @@ def _was(faults: Sequence[FaultInterval], words: MachineWords, endings: Mapping[
     ending = _course_of(faults, endings)
     if ending is Ending.ENDED:
         return f"was {_summary(faults, words)}"
-    return f"has been {_summary(faults, words)}, {'to the end of the log' if ending is Ending.LASTS else 'and was not seen to end'}"
+    last, open_ = fault_words(_last(faults)), ending is not Ending.LASTS
+    which = f"the last, {last}, " if 1 < len(_kinds(faults)) <= _KINDS else "and " if open_ else ""
+    return f"has been {_summary(faults, words)}, {which}{'was not seen to end' if open_ else 'to the end of the log'}"
 
 
 def _course_of(faults: Sequence[FaultInterval], endings: Mapping[str, Ending]) -> Ending:
     """How the last of one part's faults ends."""
-    return endings.get(max(faults, key=lambda f: f.stop_s).id, Ending.ENDED)
+    return endings.get(_last(faults).id, Ending.ENDED)
+
+
+def _last(faults: Sequence[FaultInterval]) -> FaultInterval:
+    """The one that ends last."""
+    return max(faults, key=lambda f: f.stop_s)
 
 
 def count_words(n: int, word: str) -> str:

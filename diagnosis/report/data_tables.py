@@ -43,10 +43,30 @@ def coverage_rows(report: ReportDocument) -> list[Context]:
                 "open": total - healthy - faulty,
                 "driving": row["decided_driving_s"],
                 "loss": loss.get(key, ""),
-                "why": [*why.get(key, []), *_unseen(report["intervals"], key, faulty)],
+                "why": [
+                    *why.get(key, []),
+                    *_unseen(report["intervals"], key, faulty),
+                    *_of_remarks(report["intervals"], key, faulty),
+                ],
             }
         )
     return rows
+
+
+def _of_remarks(faults: Sequence[IntervalRow], part: tuple[str, str], faulty: float) -> list[str]:
+    """How much of a part's faulty time [s] is of remarks, which count for none on the timeline; empty where none is."""
+    component, side = part
+    own = [
+        f["stop_s"] - f["start_s"]
+        for f in faults
+        if f["severity"] == Severity.INFO and f["component"] == component and side in Side(f["side"]).sides
+    ]
+    time = min(sum(own), faulty)
+    return (
+        [f"{time:.1f} s of its faulty time are remarks, which count for none on the timeline"]
+        if time >= _TOLD_S
+        else []
+    )
 
 
 def _meanwhile(report: ReportDocument, check: ClearingRow) -> str:

@@ -179,7 +179,10 @@ def headline(
         tag = f"{count(len(damaged), 'machine')}: {'files left out' if apart else 'damaged logs'}"
     leaves = [leave_of(m.verdict, m.cleared, m.unjudged, lost=x) for m, x in zip(machines, lost, strict=True)]
     title = _leave_words(leaves)
-    if status is Verdict.WATCH and (unsure := leaves.count(Leave.CHECK)) > verdicts.count(Verdict.WATCH):
+    unsure = leaves.count(Leave.CHECK)
+    if status is Verdict.WATCH and any(
+        a is Leave.CHECK and v is not status for a, v in zip(leaves, verdicts, strict=True)
+    ):
         tag = (
             f"{count(unsure, 'machine')} to check"  # as the title has it, which counts those that were not judged, too
         )

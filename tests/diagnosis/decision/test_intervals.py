@@ -8,8 +8,9 @@ from itertools import pairwise
 import pytest
 
 from diagnosis.decision.intervals import intervals_of, spans_of
-from diagnosis.decision.wording import fault_words
+from diagnosis.decision.wording import fault_words, sentence_of
 from diagnosis.results.assessment import unassessed
+from diagnosis.results.ending import Ending
 from diagnosis.results.machine_words import HYDRAULIC
 from diagnosis.results.result import Epsilon, Hypothesis, Sat
 from diagnosis.results.vocabulary import Tier
@@ -37,6 +38,19 @@ def test_intervals_are_numbered_worst_first_then_by_time() -> None:
     ]
     assert [f.kind for f in got] == ["wheel", "wheel", "steer", "wheel", "wheel"]
     assert (got[0].start_ns, got[0].stop_ns) == (8_000_000_000, 9_000_000_000)
+
+
+def test_what_lasts_to_the_end_is_the_fault_that_does() -> None:
+    parts = machine(
+        FR_actuator=assessed(
+            finding(Side.ACTUATOR, FaultMode.NO_SIGNAL, 3000, 8400), finding(Side.ACTUATOR, FaultMode.STUCK, 25_200, N)
+        )
+    )
+    faults = intervals_of(parts, MACHINE, HYDRAULIC, 0, STEP)
+    said = sentence_of(faults, HYDRAULIC, {faults[1].id: Ending.LASTS})
+    assert said.endswith("for 4.8 s, the last, stuck, to the end of the log.")
+    alone = sentence_of(faults[1:], HYDRAULIC, {faults[1].id: Ending.LASTS})
+    assert alone.endswith("stuck for 4.8 s, to the end of the log.")
 
 
 def test_time_of_detection_is_the_samples() -> None:

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from diagnosis.report.data_tables import check_rows
+from diagnosis.report.data_tables import check_rows, coverage_rows
 from diagnosis.report.page import build_page
 from tests import report_samples as samples
 
@@ -32,3 +32,12 @@ def test_checks_that_show_less_than_is_asked_are_told() -> None:
     for shows, told in ((0.2, False), (0.45, True)):
         page = build_page({**report, "clearing": [{**CHECK, "shows": shows}]}, columns)  # type: ignore[typeddict-item]
         assert ("A check that shows only more than" in page) is told
+
+
+@pytest.mark.parametrize(("severity", "told"), [("info", True), ("low", False)])
+def test_faulty_time_of_remarks_is_told_apart_as_the_timeline_counts_none(severity: str, told: bool) -> None:
+    report, _ = samples.one_wheel()
+    (fault, *_) = report["intervals"]
+    report["intervals"] = [fault | {"severity": severity}]
+    (row,) = [r for r in coverage_rows(report) if r["faulty"] > 0.0][:1]
+    assert any("of its faulty time are remarks" in why for why in row["why"]) is told

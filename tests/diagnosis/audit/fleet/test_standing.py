@@ -279,16 +279,16 @@ def test_the_headline_counts_machines_as_the_lists_do(tmp_path: Path, verdicts: 
 
 
 @pytest.mark.parametrize(
-    ("verdicts", "tag"),
+    ("verdicts", "sure", "tag"),
     [
-        (["watch", "ready", "ready"], "1 machine: faults to watch"),
-        (["watch", "not_assessed"], "2 machines to check"),
-        (["stop", "not_assessed"], "1 machine: stop and repair"),
+        (["watch", "ready", "ready"], True, "1 machine: faults to watch"),
+        (["watch", "not_assessed"], False, "2 machines to check"),
+        (["watch", "not_assessed"], True, "1 machine to check"),
+        (["stop", "not_assessed"], False, "1 machine: stop and repair"),
     ],
 )
-def test_the_few_words_above_the_headline_count_as_it_does(verdicts: list[str], tag: str) -> None:
+def test_the_few_words_above_the_headline_count_as_it_does(verdicts: list[str], sure: bool, tag: str) -> None:
     apart = {"unjudged": False, "newest": [], "faults": [SimpleNamespace(standing=True)]}
-    sure = "not_assessed" not in verdicts
     machines = [cast(Machine, SimpleNamespace(verdict=Verdict(v), cleared=sure, **apart)) for v in verdicts]
     assert headline(machines)[1] == tag
 
