@@ -23,7 +23,7 @@ _OF_COMMANDS = (OPENING, "fraction")
 EPSILON = ("epsilon", "epsilon_low", "epsilon_high")
 SAT = ("sat", "sat_low", "sat_high")
 
-_HARDLY = 0.1  # of a fault's probability: columns whose mean is less do not show it
+_EVEN = 0.5  # columns that show a fault as less probable than that, or than it is stated, rest on other evidence than it does
 
 
 def size_columns(
@@ -103,7 +103,7 @@ def known_probability(
     """The columns ``evidence.<component>.<side>.probability`` without what was not decided, which is NaN; see `size_columns`.
 
     A fault that shows in stretches has none between them, where nothing was decided either. A fault of either side, which may rest on other
-    evidence than these columns, has half of its probability on each at least; one that these columns hardly show rests on other evidence as
+    evidence than these columns, has half of its probability on each at least; one that these columns call improbable rests on other evidence as
     well, and has its own.
 
     Columns and `t` [s] of shape (n,).
@@ -126,7 +126,7 @@ def known_probability(
                 faulty = 1.0 - sum(h["p"] for h in fault["hypotheses"] if h["mode"] == State.HEALTHY)
                 if fault["side"] == Side.SENSOR_OR_ACTUATOR:
                     values[rows] = np.fmax(values[rows], 0.5 * faulty)
-                elif _least_half(np.nan_to_num(values[rows][told])) < _HARDLY * faulty:
+                elif _least_half(np.nan_to_num(values[rows][told])) < min(_EVEN, faulty):
                     values[rows] = np.fmax(values[rows], faulty)
         out[name] = np.where(known, values, values.dtype.type(np.nan))
     return out
