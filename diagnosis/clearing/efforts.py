@@ -12,7 +12,7 @@ from diagnosis.clearing.cells import Cells
 from diagnosis.clearing.measure import alone, lasts
 from diagnosis.efforts.assess import efforts_of, limit_of
 from diagnosis.efforts.inputs import wheels_with_efforts
-from diagnosis.efforts.relation import Shares, fitted, usual_of
+from diagnosis.efforts.relation import fitted, shares_of, usual_of
 from diagnosis.efforts.windows import steps_of
 from diagnosis.results.clearing import Check, Checked
 from diagnosis.results.vocabulary import Kind
@@ -30,13 +30,16 @@ _LEAST_LEARNED = 0.2  # a share, from which on an effort that healthy missions k
 
 
 def effort_checks(cells: Cells) -> dict[str, Checked]:
-    """The check of each wheel whose effort tells, by wheel.
+    """The check of each wheel whose effort tells, by wheel; of one that hardly drives it does not.
 
     Healthy missions of a field robot (eleven, a user's) changed by 0.35 at most where the next wheel had 0.18, and else by 0.2; motors with a half and a
     quarter of their torque by 0.30 beside 0.06 and 0.54 beside 0.17.
     """
-    learned = _learned(cells)
-    found = _changes(cells)
+    return cells.once("efforts", lambda: _checks(cells))
+
+
+def _checks(cells: Cells) -> dict[str, Checked]:
+    learned, found = _learned(cells), _changes(cells)
     out = {}
     for wheel in {*found, *learned}:
         checks = [x for x in (found.get(wheel), learned.get(wheel)) if x is not None]
@@ -54,8 +57,9 @@ def _learned(cells: Cells) -> dict[str, Checked]:
         return {}
     out = {}
     for i, (wheel, model) in enumerate(zip(efforts.wheels, efforts.models, strict=True)):
-        off = float(np.max(np.abs(efforts.shares.over(i, _RUN_S)[0]), initial=0.0))
-        out[wheel] = _check(cells, wheel, off, max(_LEAST_LEARNED, limit_of(model, _LEARNED)))
+        off = np.abs(efforts.shares.over(i, _RUN_S)[0])
+        if off.size:
+            out[wheel] = _check(cells, wheel, float(off.max()), max(_LEAST_LEARNED, limit_of(model, _LEARNED)))
     return out
 
 
@@ -66,16 +70,17 @@ def _changes(cells: Cells) -> dict[str, Checked]:
     if len(wheels) < _WHEELS:
         return {}
     steps, least = steps_of(cells.timeline, machine, wheels), machine.limits.driving_speed
-    terms = [steps.terms(i, least) for i in range(len(wheels))]
     efforts = np.nan_to_num(steps.effort)
-    theta = [fitted(x, efforts[:, i], steps.use[:, i]) for i, x in enumerate(terms)]
-    if any(t is None for t in theta):
+    theta = [fitted(steps.terms(i, least), efforts[:, i], steps.use[:, i]) for i in range(len(wheels))]
+    known = [t for t in theta if t is not None]
+    if len(known) < len(wheels):
         return {}
-    expected = np.column_stack([x @ t for x, t in zip(terms, theta, strict=True) if t is not None])
     usual = [max(usual_of(efforts[:, i], steps.use[:, i]), 1e-12) for i in range(len(wheels))]
-    shares = Shares(np.where(steps.use, efforts - expected, 0.0), expected, steps.use, usual)
-    changes: list[float] = []
-    for i in range(len(wheels)):
-        runs = shares.over(i, _RUN_S)[0]
-        changes.append(float(np.ptp(runs)) if runs.size else 0.0)
-    return {w: _check(cells, w, changes[i], alone(changes, i, _MOST, _LEAST, _ALONE)) for i, w in enumerate(wheels)}
+    shares = shares_of(steps, known, usual, least)
+    runs = [shares.over(i, _RUN_S)[0] for i in range(len(wheels))]
+    changes = [float(np.ptp(x)) if x.size else None for x in runs]
+    return {
+        w: _check(cells, w, change, alone(changes, i, _MOST, _LEAST, _ALONE))
+        for i, (w, change) in enumerate(zip(wheels, changes, strict=True))
+        if change is not None
+    }

@@ -175,7 +175,8 @@ def body_motion(timeline: Timeline, replay: Replay, machine: Machine) -> tuple[A
         def by_angles(speed: Array, asked: Array, read: Array) -> Array:
             return speed * rotation(np.where(np.isfinite(asked), asked, read), geometry)[0]
 
-        return v, timeline.map(by_angles, v, replay.phi_ref, phi)
+        if any_finite(phi).all():
+            return v, timeline.map(by_angles, v, replay.phi_ref, phi)
     measured = timeline.get("imu.yaw_rate")
     return v, np.broadcast_to(0.0, v.shape) if measured is None else measured
 

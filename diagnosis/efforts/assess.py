@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.efforts.inputs import is_asked, wheels_with_efforts
-from diagnosis.efforts.relation import Shares
+from diagnosis.efforts.relation import Shares, shares_of
 from diagnosis.efforts.windows import EffortSteps, steps_of
 from diagnosis.evidence import ACTUATOR, SENSOR, MissionView, Part
 from diagnosis.results.assessment import CODE, Assessment, Finding, Reason
@@ -80,13 +80,12 @@ def efforts_of(timeline: Timeline, machine: Machine) -> Efforts | None:
     steps = steps._replace(use=steps.use & within)
     if steps.use.sum(axis=0).min() < LENGTHS_S[0]:
         return None
-    least = machine.limits.driving_speed
-    expected = np.column_stack([steps.terms(i, least) @ np.array(m.terms) for i, m in enumerate(models)])
-    rest = np.where(steps.use, steps.effort - expected, 0.0)
-    off = [np.median(np.abs(rest[steps.use[:, i], i])) / m.usual for i, m in enumerate(models)]
+    theta, usual = [np.array(m.terms) for m in models], [m.usual for m in models]
+    shares = shares_of(steps, theta, usual, machine.limits.driving_speed)
+    off = [np.median(np.abs(shares.rest[steps.use[:, i], i])) / x for i, x in enumerate(usual)]
     if np.median(off) > _FITS:
         return None  # another unit, load or ground, or no measurement at all: nothing that one drive does
-    return Efforts(wheels, steps, Shares(rest, expected, steps.use, [m.usual for m in models]), models)
+    return Efforts(wheels, steps, shares, models)
 
 
 def limit_of(model: EffortModel, length: int) -> float:

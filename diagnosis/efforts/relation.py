@@ -18,6 +18,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from diagnosis.efforts.windows import EffortSteps
+
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
@@ -165,3 +167,21 @@ def largest_off(shares: Shares, lengths: Sequence[int]) -> Array:
             found = shares.over(i, None if k == len(lengths) - 1 else n)[0]
             out[i, k] = np.max(np.abs(found), initial=0.0)
     return out
+
+
+def shares_of(steps: EffortSteps, theta: Sequence[Array], usual: Sequence[float], least: float) -> Shares:
+    """By which shares the efforts of a mission are off coefficients.
+
+    Parameters
+    ----------
+    steps : EffortSteps
+        The mission.
+    theta : Sequence[Array], each of shape (len(TERMS),)
+        Of each wheel [unit of effort and that by m/s and m/s²].
+    usual : Sequence[float]
+        Usual size of each effort [unit of effort].
+    least : float
+        The driving speed [m/s].
+    """
+    expected = np.column_stack([steps.terms(i, least) @ t for i, t in enumerate(theta)])
+    return Shares(np.where(steps.use, steps.effort - expected, 0.0), expected, steps.use, usual)

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from diagnosis.efforts.inputs import wheels_with_efforts
-from diagnosis.efforts.relation import Shares, fitted, held_share, largest_off, usual_of
+from diagnosis.efforts.relation import fitted, held_share, largest_off, shares_of, usual_of
 from diagnosis.efforts.windows import TERMS, EffortSteps, steps_of
 from diagnosis.fitting.machine import Constant
 from replay.control.loop import Replay
@@ -93,24 +93,6 @@ def _fitted(missions: Sequence[EffortSteps], least: float) -> list[np.ndarray] |
             return None
         out.append(found)
     return out
-
-
-def shares_of(steps: EffortSteps, theta: Sequence[np.ndarray], usual: Sequence[float], least: float) -> Shares:
-    """By which shares the efforts of a mission are off coefficients.
-
-    Parameters
-    ----------
-    steps : EffortSteps
-        The mission.
-    theta : Sequence[np.ndarray], each of shape (len(TERMS),)
-        Of each wheel [unit of effort and that by m/s and m/s²].
-    usual : Sequence[float]
-        Usual size of each effort [unit of effort].
-    least : float
-        The driving speed [m/s].
-    """
-    expected = np.column_stack([steps.terms(i, least) @ t for i, t in enumerate(theta)])
-    return Shares(np.where(steps.use, steps.effort - expected, 0.0), expected, steps.use, usual)
 
 
 _UNITS = (

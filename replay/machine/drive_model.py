@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from replay.errors import ConfigError, check_range
+from replay.machine.number_tables import numbers_of
 
 _NEARLY = 0.05  # of a speed: means over a second scatter about the one that is commanded
 
@@ -132,7 +133,7 @@ def drive_from_table(key: str, table: Mapping[str, Any]) -> DriveModel:
     Raises
     ------
     ConfigError
-        Where a key is missing, unknown or no number.
+        Where a key is missing, unknown or no finite number.
     """
     unknown = sorted(set(table) - {"echo", "effort"})
     if unknown:
@@ -146,24 +147,9 @@ def drive_from_table(key: str, table: Mapping[str, Any]) -> DriveModel:
 
 def _numbers(key: str, table: Any, kind: type) -> dict[str, Any]:
     """Fields of one part, each a number (``gains``: a list of them, ``first``: a whole one)."""
-    if not isinstance(table, Mapping):
-        raise ConfigError(f"{key} = {table!r} is no table; expected the constants that `mfhca fit` writes")
-    names = [f.name for f in fields(kind)]
-    for name in table:
-        if name not in names:
-            raise ConfigError(f"{key}.{name} is not known; expected {', '.join(names)}")
-    out: dict[str, Any] = {}
-    for name in names:
-        if name not in table:
-            raise ConfigError(f"{key}.{name} is missing; run `mfhca fit` again, or leave [{key}] out")
-        values = table[name] if name == "gains" else [table[name]]
-        if not isinstance(values, list) or any(isinstance(v, bool) or not isinstance(v, int | float) for v in values):
-            raise ConfigError(
-                f"{key}.{name} = {table[name]!r}; expected {'a list of numbers' if name == 'gains' else 'a number'}"
-            )
-        if name == "first" and not float(values[0]).is_integer():
-            raise ConfigError(f"{key}.first = {values[0]!r}; expected a whole number of steps")
-        out[name] = (
-            tuple(map(float, values)) if name == "gains" else (int(values[0]) if name == "first" else float(values[0]))
-        )
+    out = numbers_of(key, table, kind, ("gains",))
+    if "first" in out:
+        if not out["first"].is_integer():
+            raise ConfigError(f"{key}.first = {out['first']!r}; expected a whole number of steps")
+        out["first"] = int(out["first"])
     return out

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass
 from typing import Any
 
 from replay.errors import ConfigError, check_range
+from replay.machine.number_tables import numbers_of
 
 #: Lengths over which an effort is held against its motion [driven s]; the last one stands for the whole mission.
 LENGTHS_S = (6, 15, 60)
@@ -82,23 +82,6 @@ def effort_from_table(key: str, table: Any) -> EffortModel:
     Raises
     ------
     ConfigError
-        Where a key is missing, unknown or no number.
+        Where a key is missing, unknown or no finite number.
     """
-    if not isinstance(table, Mapping):
-        raise ConfigError(f"{key} = {table!r} is no table; expected the constants that `mfhca fit` writes")
-    names = [f.name for f in fields(EffortModel)]
-    for name in table:
-        if name not in names:
-            raise ConfigError(f"{key}.{name} is not known; expected {', '.join(names)}")
-    out: dict[str, Any] = {}
-    for name in names:
-        if name not in table:
-            raise ConfigError(f"{key}.{name} is missing; run `mfhca fit` again, or leave [{key}] out")
-        given = table[name]
-        values = given if name == "off" and isinstance(given, list) else [given]
-        if any(isinstance(v, bool) or not isinstance(v, int | float) for v in values):
-            raise ConfigError(
-                f"{key}.{name} = {given!r}; expected {'a list of numbers' if name == 'off' else 'a number'}"
-            )
-        out[name] = tuple(map(float, values)) if name == "off" else float(values[0])
-    return EffortModel(**out)
+    return EffortModel(**numbers_of(key, table, EffortModel, ("off",)))

@@ -27,7 +27,9 @@ def cells_of(wheels: tuple[str, ...] = WHEELS, lost: float = 0.0) -> Any:
             e[N // 2 :] /= 1.0 - lost
         signals[f"wheel.{w}.v"], signals[f"wheel.{w}.effort"] = v + rng.normal(0.0, 0.001, N), e
     timeline = SimpleNamespace(get=signals.get, size=N, dt=DT)
-    return SimpleNamespace(timeline=timeline, machine=haulotte(), mostly_explained=lambda name: False)
+    return SimpleNamespace(
+        timeline=timeline, machine=haulotte(), once=lambda _, found: found(), mostly_explained=lambda name: False
+    )
 
 
 def test_healthy_efforts_pass() -> None:
@@ -45,3 +47,9 @@ def test_a_wheel_that_comes_to_take_more_is_not_cleared(lost: float) -> None:
 
 def test_two_wheels_are_each_others_measure() -> None:
     assert effort_checks(cells_of(("FR", "FL"), lost=0.6)) == {}
+
+
+def test_a_wheel_that_hardly_drives_is_not_said_to_pass() -> None:
+    cells = cells_of()
+    cells.timeline.get("wheel.FL.effort")[: N - 10 * 10] = np.nan  # ten driven seconds are left
+    assert "FL" not in effort_checks(cells)

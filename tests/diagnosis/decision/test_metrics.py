@@ -185,6 +185,8 @@ def test_body_motion_without_a_commanded_yaw_rate_follows_from_the_angles() -> N
 def test_body_motion_of_a_machine_without_axles_takes_the_gyro() -> None:
     line = timeline(cmd__v=[0.5, 0.5], imu__yaw_rate=[0.1, np.nan])
     assert_array_equal(body_motion(line, loop(line), MACHINE)[1], [0.1, np.nan])
+    steered = haulotte()  # whose angles are not logged
+    assert_array_equal(body_motion(line, loop(line, steered), steered)[1], [0.1, np.nan])
 
 
 def test_a_drive_that_is_commanded_to_rest_is_not_asked_for_anything() -> None:

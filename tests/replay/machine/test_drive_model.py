@@ -42,7 +42,7 @@ def test_without_drives_nothing_is_written() -> None:
         ("M = { effort = { ofset = 1.0 } }", r"drive\.M\.effort\.ofset is not known; expected offset"),
         (
             'M = { effort = { offset = "1", slope = 1, between = 1, drift = 1, noise = 1 } }',
-            r"drive\.M\.effort\.offset = '1'; expected a number",
+            r"drive\.M\.effort\.offset = '1'; expected a finite number",
         ),
         (
             "M = { effort = { offset = 1, slope = 1, between = -1, drift = 1, noise = 1, slowest = 1, fastest = 2 } }",
@@ -50,7 +50,7 @@ def test_without_drives_nothing_is_written() -> None:
         ),
         (
             "M = { echo = { gains = 3, first = 0, memory_s = 1, memory_std_s = 0, setpoint = 0, noise = 1, exact = 1, core = 1, step_s = 1 } }",
-            r"drive\.M\.echo\.gains = 3; expected a list of numbers",
+            r"drive\.M\.echo\.gains = 3; expected a list of finite numbers",
         ),
         (
             "M = { echo = { gains = [3], first = 0.5, memory_s = 1, memory_std_s = 0, setpoint = 0, noise = 1, exact = 1, core = 1, step_s = 1 } }",
