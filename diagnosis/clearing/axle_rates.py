@@ -33,7 +33,7 @@ class Rates(NamedTuple):
     frame : Frame
         Windows of `_RATE_S`.
     off : Array, shape (windows, axles)
-        Against the axle's usual one.
+        Against the axle's usual one; of each side where it is steered to both for a while in both halves of the mission.
     whole : Array, shape (axles,)
         Over the mission; NaN where an axle is hardly steered.
     apart : list[float | None]
@@ -86,11 +86,12 @@ def rates_of(cells: Cells, rate: Array, opening: Array) -> Rates:
         if np.isfinite(whole[a]) and np.isfinite(whole[b]) and not one:
             between = _between(rate[:, [a, b]], opening[:, [a, b]], use[:, [a, b]], dead[[a, b]])
             apart[a], apart[b] = max(apart[a] or 0.0, between), max(apart[b] or 0.0, between)
-    changes = [_changes(cells, frame, off, j) for j in range(len(whole))]
     ways = [
         np.where(enough, _off(frame, cells.dt, rate, opening, use, band, by_way=True), np.nan)
         for band in (dead - unsure, dead, most)
     ]
+    off = np.where(_both_ways(opened, opening, cells.dt), _nearest(ways), off)
+    changes = [_changes(cells, frame, off, j) for j in range(len(whole))]
     as_they_are, by_side = _parted(tried), _parted(ways)
     parted = [a if b is None else b if a is None else min(a, b) for a, b in zip(as_they_are, by_side, strict=True)]
     return Rates(frame, off, whole, apart, ahead, changes, parted)
@@ -182,6 +183,21 @@ def _evened(ahead: Array, opened: Array, opening: Array, dt: float) -> Array:
             usual = sum(moved) / float(opened[:, j].sum())
             for some, way in zip(sides, moved, strict=True):
                 out[some, j] *= way / (float(opened[some, j].sum()) * usual)
+    return out
+
+
+def _both_ways(opened: Array, opening: Array, dt: float) -> Flags:
+    """Whether each axle is steered to either side for a while in both halves of the time it is steered in, shape (axles,).
+
+    Where it is steered to one side first and to the other later, what its usual rates hide may be a fault. Arrays (cells, axles).
+    """
+    out = np.zeros(opened.shape[1], dtype=np.bool_)
+    for j in range(opened.shape[1]):
+        at = np.flatnonzero(opened[:, j] > 0.0)
+        left = opening[at, j] > 0.0
+        half = np.searchsorted(at, at[0] + (at[-1] - at[0]) / 2.0) if at.size else 0
+        times = [np.count_nonzero(part) * dt for x in (left[:half], left[half:]) for part in (x, ~x)]
+        out[j] = min(times) >= _FEW_S
     return out
 
 
