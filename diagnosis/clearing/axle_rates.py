@@ -33,7 +33,8 @@ class Rates(NamedTuple):
     frame : Frame
         Windows of `_RATE_S`.
     off : Array, shape (windows, axles)
-        Against the axle's usual one; of each side where it is steered to both for a while in both halves of the mission.
+        Against the axle's usual one, and no more than against that of each side where it is steered to both for a while in both halves of
+        the mission.
     whole : Array, shape (axles,)
         Over the mission; NaN where an axle is hardly steered.
     apart : list[float | None]
@@ -90,8 +91,8 @@ def rates_of(cells: Cells, rate: Array, opening: Array) -> Rates:
         np.where(enough, _off(frame, cells.dt, rate, opening, use, band, by_way=True), np.nan)
         for band in (dead - unsure, dead, most)
     ]
-    off = np.where(_both_ways(opened, opening, cells.dt), _nearest(ways), off)
-    changes = [_changes(cells, frame, off, j) for j in range(len(whole))]
+    evened = np.where(_both_ways(opened, opening, cells.dt), _nearest(ways), off)
+    changes, off = [_changes(cells, frame, evened, j) for j in range(len(whole))], _nearest([off, evened])
     as_they_are, by_side = _parted(tried), _parted(ways)
     parted = [a if b is None else b if a is None else min(a, b) for a, b in zip(as_they_are, by_side, strict=True)]
     return Rates(frame, off, whole, apart, ahead, changes, parted)
@@ -202,7 +203,7 @@ def _both_ways(opened: Array, opening: Array, dt: float) -> Flags:
 
 
 def _nearest(off: Sequence[Array]) -> Array:
-    """The smallest deviation of those that different dead bands give, 0 where they do not agree on its sign."""
+    """The smallest deviation of those that different ways to take it give, 0 where they do not agree on its sign."""
     every = np.stack(off)
     low, high = every.min(axis=0), every.max(axis=0)
     return np.asarray(np.where(low > 0.0, low, np.where(high < 0.0, high, 0.0 * low)))
