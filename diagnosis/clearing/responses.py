@@ -58,8 +58,8 @@ class Responses(NamedTuple):
     changes, grown : list[float | None]
         By how much each wheel's usual one changes in the mission at most, and over half of it at its usual pace; None where it is not
         known.
-    own : Array, shape (windows, wheels)
-        ln of the speed per opening itself [ln of m/s].
+    own, evened : Array, shape (windows, wheels)
+        ln of the speed per opening itself, and less what turns make of it [ln of m/s].
     """
 
     windows: Array
@@ -70,6 +70,7 @@ class Responses(NamedTuple):
     changes: list[float | None]
     grown: list[float | None]
     own: Array
+    evened: Array
 
 
 def responses_of(
@@ -110,7 +111,8 @@ def _in_turns(found: Responses, evened: Responses) -> Responses:
         [None if a is None or b is None else min(a, b) for a, b in zip(x, y, strict=True)]
         for x, y in ((found.changes, evened.changes), (found.grown, evened.grown))
     )
-    return found._replace(windows=_nearer(found.windows, evened.windows), changes=changes, grown=grown)
+    windows = _nearer(found.windows, evened.windows)
+    return found._replace(windows=windows, changes=changes, grown=grown, evened=evened.evened)
 
 
 def _nearer(a: Array, b: Array) -> Array:
@@ -164,7 +166,8 @@ def _beside(cells: Cells, sums: _Sums, opened: Array, *, over_time: bool, slope:
     with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
         log = np.log(np.maximum(ratio, 1e-3) / others_at(ratio, cells.driven))
         alone = np.log(np.maximum(ratio, 1e-3))
-    log = log - slope * np.nan_to_num(sums.turn)
+    by_turn = slope * np.nan_to_num(sums.turn)
+    log = log - by_turn
     off = np.full(log.shape, np.nan)
     lasting: list[Usual] = []
     changes: list[float | None] = []
@@ -195,7 +198,7 @@ def _beside(cells: Cells, sums: _Sums, opened: Array, *, over_time: bool, slope:
             if usual
             else Usual()
         )
-    return Responses(off, log, lasting, sums.weight, ahead, changes, grown, alone)
+    return Responses(off, log, lasting, sums.weight, ahead, changes, grown, alone, alone - by_turn)
 
 
 def largest_change(log: Array, ways: Sequence[NDArray[np.bool_]]) -> float:
