@@ -107,12 +107,11 @@ def responses_of(
 
 def _in_turns(found: Responses, evened: Responses) -> Responses:
     """What deviates and changes as it is and with turns evened out: a wheel that turns far, or is on its way there, follows no straight line."""
-    changes, grown = (
-        [None if a is None or b is None else min(a, b) for a, b in zip(x, y, strict=True)]
-        for x, y in ((found.changes, evened.changes), (found.grown, evened.grown))
-    )
+    changes = [
+        None if a is None or b is None else min(a, b) for a, b in zip(found.changes, evened.changes, strict=True)
+    ]
     windows = _nearer(found.windows, evened.windows)
-    return found._replace(windows=windows, changes=changes, grown=grown, evened=evened.evened)
+    return found._replace(windows=windows, changes=changes, evened=evened.evened)
 
 
 def _nearer(a: Array, b: Array) -> Array:
