@@ -378,7 +378,16 @@ def test_real_simulated_robot(reference_data: Path) -> None:
 def test_real_husky(reference_data: Path) -> None:
     log = read_log(reference_data / "reference_logs" / "robot_localization" / "test1.bag", SourceOptions())
     found = map_signals([log], MACHINE).items
-    assert {"imu.yaw_rate", "gnss.lat", "gnss.lon", "odom.x", "odom.y", "odom.yaw", "odom.v"} == set(found)
+    assert {
+        "imu.yaw_rate",
+        "imu.acceleration",
+        "gnss.lat",
+        "gnss.lon",
+        "odom.x",
+        "odom.y",
+        "odom.yaw",
+        "odom.v",
+    } == set(found)
     assert np.abs(np.diff(found["odom.yaw"].values)).max() < 0.5
 
 
