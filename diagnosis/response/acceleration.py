@@ -34,13 +34,14 @@ _GAINS = 0.3, 3.0  # what κ may be: another one is another axis, or another uni
 _KEPT, _ROUNDS = 0.9, 6
 _NORMAL_90 = 1.645
 _SMALL, _LARGE = 0.5, 0.95  # quantiles of |y| up to which x is noise, and from which its share of y shows
+_ABOVE = 4.0  # times the noise, from which on it does
 _LEAST_SPREAD = 0.1  # of the share
 ENOUGH = 2.3  # nats of one change where two tell together: ten times as probable each
 _CAP = 5.0  # of what one change says, for noise has longer tails than a normal one
 
 
-class Acceleration(NamedTuple):
-    """What the mission shows of the two.
+class Relation(NamedTuple):
+    """How the changes of one series follow those of another, in a mission; units of speed and acceleration stand for any.
 
     Attributes
     ----------
@@ -112,7 +113,7 @@ def changes(value: Array, reach: int) -> Array:
     return out
 
 
-def acceleration_of(speed: Array, acceleration: Array, aside: Flags, cell_s: float) -> Acceleration | None:
+def acceleration_of(speed: Array, acceleration: Array, aside: Flags, cell_s: float) -> Relation | None:
     """Relate the two; None where nothing does.
 
     Parameters
@@ -129,19 +130,36 @@ def acceleration_of(speed: Array, acceleration: Array, aside: Flags, cell_s: flo
     total = np.cumsum(np.nan_to_num(acceleration)) * cell_s
     integral = total - 0.5 * np.nan_to_num(acceleration) * cell_s  # up to the middle of each cell
     integral[~np.isfinite(acceleration)] = np.nan
-    best: Acceleration | None = None
+    return relation(speed, integral, aside, cell_s, _GAINS)
+
+
+def relation(value: Array, other: Array, aside: Flags, cell_s: float, gains: tuple[float, float]) -> Relation | None:
+    """Relate the changes of two series in one band; None where those of the second do not follow those of the first.
+
+    Parameters
+    ----------
+    value, other : Array, shape (cells,)
+        The series; NaN where unknown.
+    aside : Flags, shape (cells,)
+        Cells of changes that are in question: they are no example.
+    cell_s : float
+        Length of a cell [s].
+    gains : tuple[float, float]
+        What the size of κ may be.
+    """
+    best: Relation | None = None
     reaches = dict.fromkeys(max(1, round(t / cell_s)) for t in _WINDOWS_S)
     most = round(_DELAYS_S / cell_s)
     for reach in reaches:
-        y = changes(speed, reach)
+        y = changes(value, reach)
         near = np.convolve(aside, np.ones(3 * reach + 2 * most + 1), mode="same")[: y.size] > 0.0
-        unshifted = changes(integral, reach)
+        unshifted = changes(other, reach)
         aside_y = np.where(near, np.nan, y)
         delay = max(range(-most, most + 1), key=lambda d: _alike(aside_y, _later(unshifted, d)))
-        r = _related(aside_y, _later(unshifted, delay), reach)
+        r = _related(aside_y, _later(unshifted, delay), reach, gains)
         if r is None:
             continue
-        found = Acceleration(r.gain, delay, reach, r.noise, r.spread, r.usual, y, _later(unshifted, delay))
+        found = Relation(r.gain, delay, reach, r.noise, r.spread, r.usual, y, _later(unshifted, delay))
         if best is None or found.least < best.least:
             best = found
     return best
@@ -164,7 +182,7 @@ def _alike(y: Array, x: Array) -> float:
     return abs(float(y[known] @ x[known])) / np.sqrt(size) if size > 0.0 else 0.0
 
 
-def _related(y: Array, x: Array, reach: int) -> _Related | None:
+def _related(y: Array, x: Array, reach: int, gains: tuple[float, float]) -> _Related | None:
     """How x follows y; None where it does not."""
     known = np.isfinite(y) & np.isfinite(x)
     if np.count_nonzero(known) < _LEAST * reach:
@@ -178,11 +196,13 @@ def _related(y: Array, x: Array, reach: int) -> _Related | None:
         gain = float(x[kept] @ y[kept]) / max(float(y[kept] @ y[kept]), 1e-12)
         off = np.abs(x - gain * y)
         kept = off <= np.quantile(off, _KEPT)
-    if not _GAINS[0] <= abs(gain) <= _GAINS[1]:
+    if not gains[0] <= abs(gain) <= gains[1]:
         return None
     size = np.abs(y)
-    small, large = size <= np.quantile(size, _SMALL), size >= np.quantile(size, _LARGE)
-    noise = max(float(np.quantile(off[small], _KEPT)) / _NORMAL_90, 1e-6)
+    noise = max(float(np.quantile(off[size <= np.quantile(size, _SMALL)], _KEPT)) / _NORMAL_90, 1e-6)
+    large = size >= max(float(np.quantile(size, _LARGE)), _ABOVE * noise / abs(gain))
+    if np.count_nonzero(large) < reach:  # no change of the mission shows how closely x follows
+        return None
     share = np.sqrt(np.maximum(off[large] ** 2 - noise**2, 0.0)) / (abs(gain) * size[large])
     apart = float(np.quantile(share, _KEPT)) / _NORMAL_90
     usual = float(np.quantile(size, _KEPT)) / _NORMAL_90

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from diagnosis.response.body import BodySpeed
 from diagnosis.response.by_acceleration import with_the_acceleration
+from diagnosis.response.by_both import by_both_motions
 from diagnosis.response.doubts import sides_of_all
 from diagnosis.response.drive_faults import drive_faults
 from diagnosis.response.encoder_scale import scaled_sides
@@ -142,9 +143,9 @@ def _unexplained(drives: Drives, given: Given) -> tuple[str, ...]:
 def _beside_the_unit(
     parts: Mapping[str, tuple[Assessment, Assessment]], drives: Drives, given: Given
 ) -> dict[str, tuple[Assessment, Assessment]]:
-    """Both sides of each wheel, of an only drive with what the inertial unit shows besides."""
+    """Both sides of each wheel, of an only drive, or one of two, with what the inertial unit shows besides."""
     if len(drives.data) > 1:
-        return dict(parts)
+        return by_both_motions(parts, drives.data, given.yaw, given.unit, given.dt)
     return {w: with_the_acceleration(both, drives.data[w], given.unit, given.dt) for w, both in parts.items()}
 
 

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnosis.response.acceleration import ENOUGH, Acceleration, acceleration_of
+from diagnosis.response.acceleration import ENOUGH, Relation, acceleration_of
 from diagnosis.response.inputs import FollowerData, cell_of, cells
 from diagnosis.response.vibration import Unit, Vibration, vibration_of
 from diagnosis.response.wheel import SENSOR_SHARE, sensor_finding
@@ -31,6 +31,7 @@ _LEVEL = 3  # readings to each side of a jump
 _STEADY = 0.35  # of a jump, by which the readings next to it differ from their levels
 _BACK = 0.25  # by which the product of both jumps may differ from 1
 _LEAST_S = 1.0
+_MOST = 12  # such times: more are the habit of a channel
 _GOES_ON_S = (
     2.0  # for which the unit shakes on after a speed that does not come back at once: a locked wheel slides for less
 )
@@ -41,7 +42,7 @@ _ALIVE = 0.5  # of what it shakes by in slow motion
 _TOLD = 0.5  # of a finding's time
 
 
-class _Jump(NamedTuple):
+class Jump(NamedTuple):
     """A change of a speed from one reading to the next: its step, and the levels before and behind it [m/s]."""
 
     step: int
@@ -63,19 +64,19 @@ def beside_the_acceleration(data: FollowerData, unit: Unit | None, dt: float) ->
     """
     if unit is None:
         return ()
-    jumps = _jumps(data)
+    jumps = jumps_of(data)
     spans = _between(jumps, round(_LEAST_S / dt), data.y.size)
-    if not spans:
+    if not spans or len(spans) > _MOST:
         return ()
     width = cell_of(dt)
-    y, a = cells(data.y, width), cells(unit.acceleration, width)
-    aside = np.zeros(y.size, np.bool_)
-    for jump in jumps:
-        aside[min(jump.step // width, y.size - 1)] = True
-    related = acceleration_of(_filled(y), _filled(a), aside, width * dt)
-    nothing = [(s, e) for s, e, *_ in spans]
-    shaking = vibration_of(unit, np.abs(data.y), nothing, dt)
-    found = (_finding(data, span, related, shaking, width, dt) for span in spans)
+    y, a = filled(cells(data.y, width)), filled(cells(unit.acceleration, width))
+    shaking = vibration_of(unit, np.abs(data.y), [(s, e) for s, e, *_ in spans], dt)
+    found = []
+    for span in spans:  # what other jumps of this channel are beside the body is its habit
+        aside = np.zeros(y.size, np.bool_)
+        aside[span[0] // width : span[1] // width + 1] = True
+        related = acceleration_of(y, a, aside, width * dt)
+        found.append(_finding(data, span, related, shaking, width, dt))
     return tuple(f for f in found if f is not None)
 
 
@@ -124,7 +125,7 @@ def _same(one: Finding, other: Finding) -> bool:
     return both > _TOLD * min(one.stop - one.start, other.stop - other.start)
 
 
-def _filled(x: Array) -> Array:
+def filled(x: Array) -> Array:
     """A series of cells, shape (cells,), in which single ones without a reading have that of the one before."""
     out = x.copy()
     gap = np.isnan(out[1:]) & np.isfinite(out[:-1])
@@ -132,14 +133,14 @@ def _filled(x: Array) -> Array:
     return out
 
 
-def _jumps(data: FollowerData) -> list[_Jump]:
+def jumps_of(data: FollowerData) -> list[Jump]:
     """Where a speed changes by much from one reading to the next, or over one in between, from one level to another of the same sign or to nothing."""
     step = np.flatnonzero(data.fresh & np.isfinite(data.y))
     value = data.y[step]
     if step.size < 4 * _LEVEL:
         return []
     usual = float(np.quantile(np.abs(value[value != 0.0]), 0.9)) if np.any(value) else 0.0
-    out: list[_Jump] = []
+    out: list[Jump] = []
     for k in (np.flatnonzero(np.abs(np.diff(value[:-1])) > 0.5 * _JUMP * usual) + 1).tolist():
         before, behind = (
             float(np.median(value[max(0, k - _LEVEL) : k])),
@@ -155,13 +156,13 @@ def _jumps(data: FollowerData) -> list[_Jump]:
             continue
         if out and step[k] - out[-1].step <= step[k] - step[k - 1]:  # one jump over two readings
             continue
-        out.append(_Jump(int(step[k]), before, behind))
+        out.append(Jump(int(step[k]), before, behind))
     return out
 
 
-def _between(jumps: Sequence[_Jump], least: int, size: int) -> list[tuple[int, int, float, tuple[_Jump, ...]]]:
+def _between(jumps: Sequence[Jump], least: int, size: int) -> list[tuple[int, int, float, tuple[Jump, ...]]]:
     """Steps [start, stop), share of the speed, and the jumps that bound them, of times in which a reading is nothing or a share of itself."""
-    out: list[tuple[int, int, float, tuple[_Jump, ...]]] = []
+    out: list[tuple[int, int, float, tuple[Jump, ...]]] = []
     k = 0
     while k < len(jumps):
         one, other = jumps[k], jumps[k + 1] if k + 1 < len(jumps) else None
@@ -196,8 +197,8 @@ def _alike(share: float, back: float) -> bool:
 
 def _finding(
     data: FollowerData,
-    span: tuple[int, int, float, tuple[_Jump, ...]],
-    related: Acceleration | None,
+    span: tuple[int, int, float, tuple[Jump, ...]],
+    related: Relation | None,
     shaking: Vibration | None,
     width: int,
     dt: float,
@@ -208,7 +209,7 @@ def _finding(
         stop = _goes_on_until(data.y, shaking, start, stop, abs(jumps[0].before), dt)
         if (stop - start) * dt < _GOES_ON_S:
             return None
-    said = [] if related is None else [related.says(j.step // width) for j in jumps if _lives(shaking, j.step, dt)]
+    said = [] if related is None else [related.says(j.step // width) for j in jumps if lives_about(shaking, j.step, dt)]
     nats = [s[0] for s in said if np.isfinite(s[1])]
     by_change = len(nats) == len(jumps) and sum(nats) >= 2.0 * ENOUGH and min(nats) >= 0.0
     by_shaking = (
@@ -251,7 +252,7 @@ def _goes_on_until(y: Array, shaking: Vibration | None, start: int, stop: int, s
     return min(stop, (first + (int(quiet[0]) if quiet.size else level.size)) * shaking.width)
 
 
-def _lives(shaking: Vibration | None, step: int, dt: float) -> bool:
+def lives_about(shaking: Vibration | None, step: int, dt: float) -> bool:
     """Whether the unit shakes about a jump as that of a body that goes on."""
     if shaking is None:
         return False

@@ -7,7 +7,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.stats import norm
 
-from diagnosis.response.acceleration import ENOUGH, Acceleration, acceleration_of, changes
+from diagnosis.response.acceleration import ENOUGH, Relation, acceleration_of, changes
 
 Array = NDArray[np.float64]
 
@@ -78,7 +78,7 @@ def test_what_is_of_something_else_is_not_related(seed: int, unit: str) -> None:
 
 def test_what_a_change_says_is_the_ratio_of_two_normal_laws() -> None:
     y, x = np.full(9, 1.5), np.full(9, 0.9)
-    one = Acceleration(0.9, 0, 2, 0.2, 0.3, 0.4, y, x)
+    one = Relation(0.9, 0, 2, 0.2, 0.3, 0.4, y, x)
     own, body = norm(0.0, np.hypot(0.2, 0.9 * 0.4)), norm(0.9 * 1.5, np.hypot(0.2, 0.3 * 0.9 * 1.5))
     peaks = own.logpdf(0.0) - body.logpdf(0.9 * 1.5)  # what their widths make of it does not count
     assert one.says(4) == pytest.approx((own.logpdf(0.9) - body.logpdf(0.9) - peaks, 1.5, 1.0))
@@ -86,7 +86,7 @@ def test_what_a_change_says_is_the_ratio_of_two_normal_laws() -> None:
 
 
 def test_the_smallest_change_that_shows_does_so_and_a_smaller_one_does_not() -> None:
-    one = Acceleration(1.0, 0, 2, 0.1, 0.2, 0.1, np.zeros(9), np.zeros(9))
+    one = Relation(1.0, 0, 2, 0.1, 0.2, 0.1, np.zeros(9), np.zeros(9))
     for share, shows in ((1.01, True), (0.99, False)):
         nats = one._replace(y=np.full(9, share * one.least)).says(4)[0]
         assert (nats > ENOUGH) is shows

@@ -91,6 +91,17 @@ def test_a_machine_that_really_stops_at_once_is_not_told(seed: int) -> None:
         assert told(v, unit) == ()
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_wheels_that_spin_and_lock_at_every_start_and_stop_are_not_told(seed: int) -> None:
+    """They reach their speed from one reading to the next, the body by its tyres' grip."""
+    rng = np.random.default_rng(seed)
+    y = np.repeat(rng.choice([0.0, 1.0, 1.6], N // 75), 75)
+    v = np.zeros(N)
+    for k in range(1, N):
+        v[k] = v[k - 1] + np.clip(y[k] - v[k - 1], -0.1, 0.1)
+    assert told(y, unit_of(v, seed)) == ()
+
+
 @pytest.mark.parametrize("fails", ["dead", "frozen", "lost"])
 @pytest.mark.parametrize("seed", range(3))
 def test_a_unit_that_fails_while_the_machine_stops_accuses_nobody(seed: int, fails: str) -> None:
