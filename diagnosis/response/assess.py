@@ -24,6 +24,7 @@ from diagnosis.response.scene import Drives, Given, drives_of, scene_of
 from diagnosis.response.shaken import told_shaken
 from diagnosis.response.share_findings import told_share
 from diagnosis.response.turning import track_of, wrong_yaw_rate
+from diagnosis.response.unit_note import noted
 from diagnosis.response.vibration import Unit
 from diagnosis.response.weighed import settled, weighed
 from diagnosis.response.witness import witnessed
@@ -146,7 +147,11 @@ def _beside_the_unit(
     """Both sides of each wheel, of an only drive, or one of two, with what the inertial unit shows besides."""
     if len(drives.data) > 1:
         return by_both_motions(parts, drives.data, given.yaw, given.unit, given.dt)
-    return {w: with_the_acceleration(both, drives.data[w], given.unit, given.dt) for w, both in parts.items()}
+    dt, unit = given.dt, given.unit
+    return {
+        w: noted(with_the_acceleration(both, drives.data[w], unit, dt), drives.data[w], unit, dt)
+        for w, both in parts.items()
+    }
 
 
 def _stood(drives: Drives, parts: Mapping[str, tuple[Assessment, Assessment]], given: Given) -> tuple[Said, ...]:

@@ -39,7 +39,7 @@ _AGAINST = -1.0  # nats by which one end may say the body's
 _P = 0.85, 0.94  # that the speed is wrong, by one end and by both
 _AROUND_S = 0.75  # of a jump, in which the unit has to be alive
 _ALIVE = 0.5  # of what it shakes by in slow motion
-_TOLD = 0.5  # of a finding's time
+_TOLD = 0.5  # of a finding's time; of the speed before, that is asked for in so much of it
 
 
 class Jump(NamedTuple):
@@ -212,9 +212,13 @@ def _finding(
     said = [] if related is None else [related.says(j.step // width) for j in jumps if lives_about(shaking, j.step, dt)]
     nats = [s[0] for s in said if np.isfinite(s[1])]
     by_change = len(nats) == len(jumps) and sum(nats) >= 2.0 * ENOUGH and min(nats) >= 0.0
-    by_shaking = (
-        share == 0.0 and shaking is not None and shaking.moves(start, stop) and min(nats, default=0.0) > _AGAINST
-    )
+    asked = np.abs(data.asked[start:stop])
+    told = bool(np.mean(np.nan_to_num(asked) > _TOLD * abs(jumps[0].before)) > _TOLD)
+    goes_on = (
+        told if np.isfinite(asked).any() else bool(nats) and sum(nats) >= ENOUGH
+    )  # what works at rest shakes it, too
+    shakes = share == 0.0 and shaking is not None and shaking.moves(start, stop)
+    by_shaking = shakes and goes_on and min(nats, default=0.0) > _AGAINST
     if not by_change and not by_shaking:
         return None
     mode = FaultMode.NO_SIGNAL if share == 0.0 else FaultMode.INEFFICIENT if share < 1.0 else FaultMode.OUTSIDE_TABLE

@@ -18,6 +18,7 @@ from diagnosis.response.lone import by_its_channel, not_shared
 from diagnosis.response.models import BLOCK_S
 from diagnosis.response.sides import without_doubles
 from diagnosis.response.tracking import assess_channel, assess_tracking
+from diagnosis.response.unit_note import noted
 from diagnosis.response.vibration import Unit
 from diagnosis.results.assessment import Assessment, Finding, Reason
 from diagnosis.results.machine_event import (
@@ -115,6 +116,7 @@ class TrackingEvidence:
                 both = assess_tracking(data.y, command, dt, limits, (data.name, "its command"), found[wheel])
             else:
                 both = assess_channel(data.y, dt, limits, data.name, found[wheel])
+            both = noted(both, data, _unit(mission), dt) if len(mission.machine.wheels) == 1 else both
             parts[wheel, SENSOR], parts[wheel, ACTUATOR] = both
         return Contribution(parts)
 

@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 _WINDOW_S = 0.5
-_RESTS, _MOVES = 0.02, 0.2  # of the usual speed: below it stands, above it moves
+_RESTS, _MOVES = 0.05, 0.2  # of the usual speed: below it stands, above it moves
 _AROUND = 1  # windows beside a change, which are neither
 _LEAST_REST, _LEAST_MOTION = 4, 20  # windows of either that show how it shakes
 _LOW, _HIGH = 0.05, 0.95  # quantiles of a usual window

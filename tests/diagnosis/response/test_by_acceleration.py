@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from diagnosis.response.by_acceleration import beside_the_acceleration
 from diagnosis.response.inputs import FollowerData, cell_of, cells
+from diagnosis.response.unit_note import unit_note
 from diagnosis.response.vibration import Unit
 from diagnosis.results.assessment import Finding
 from replay.faults import FaultMode, Side
@@ -43,8 +44,8 @@ def unit_of(v: Array, seed: int, gain: float = 1.0, noise: float = 0.25, rest: f
     return Unit(np.asarray(a), np.ones(N, np.bool_))
 
 
-def told(y: Array, unit: Unit | None) -> tuple[Finding, ...]:
-    silent = np.full(N, np.nan)
+def told(y: Array, unit: Unit | None, asked: Array | None = None) -> tuple[Finding, ...]:
+    silent = np.full(N, np.nan) if asked is None else asked
     noisy = y + np.where(y == 0.0, 0.0, np.random.default_rng(5).normal(0.0, 0.01, N))
     data = FollowerData(noisy, np.isfinite(y), cells(silent, cell_of(DT))[:, None], silent, "wheel.D.v")
     return beside_the_acceleration(data, unit, DT)
@@ -124,6 +125,17 @@ def test_a_speed_that_falls_for_good_is_dead_where_the_unit_shakes_on(seed: int)
     assert "shakes on" in found.evidence[0]
 
 
+@pytest.mark.parametrize("asked", ["to go", "to stand", "nothing known"])
+def test_what_shakes_a_machine_at_rest_makes_no_dead_sensor(asked: str) -> None:
+    """It stops and starts at once, and an arm works meanwhile. By shaking alone the sensor is dead where the machine was told to go."""
+    v = driven(1)
+    y = faulty(v, 0.0)
+    a = np.random.default_rng(4).normal(0.0, 0.2, N) * np.where(v > 0.02, 1.0, 0.05)
+    told_to = {"to go": v, "to stand": y, "nothing known": None}[asked]
+    found = told(y, Unit(np.asarray(a), np.ones(N, np.bool_)), told_to)
+    assert [f.mode for f in found] == ([FaultMode.NO_SIGNAL] if asked == "to go" else [])
+
+
 def test_wheels_that_lock_and_slide_are_not_told() -> None:
     """The reading falls at once, the body in a second and a half, and is quiet then."""
     v = driven(1)
@@ -136,3 +148,12 @@ def test_wheels_that_lock_and_slide_are_not_told() -> None:
 
 def test_without_a_unit_nothing_is_told() -> None:
     assert told(faulty(driven(1), 0.0), None) == ()
+
+
+@pytest.mark.parametrize(("unit", "says"), [("right", "would show"), ("another axis", "does not follow")])
+def test_what_the_unit_could_have_shown_is_noted(unit: str, says: str) -> None:
+    v = driven(2)
+    made = unit_of(v if unit == "right" else driven(400), 2)
+    silent = np.full(N, np.nan)
+    data = FollowerData(v, np.ones(N, np.bool_), silent[:, None], silent, "wheel.D.v")
+    assert says in unit_note(data, made, (), DT)
