@@ -37,6 +37,7 @@ _SMALL, _LARGE = 0.5, 0.95  # quantiles of |y| up to which x is noise, and from 
 _ABOVE = 4.0  # times the noise, from which on it does
 _LEAST_SPREAD = 0.1  # of the share
 ENOUGH = 2.3  # nats of one change where two tell together: ten times as probable each
+_MOST = 0.5  # of a change that the body has where it is the sensor's
 _CAP = 5.0  # of what one change says, for noise has longer tails than a normal one
 
 
@@ -83,6 +84,8 @@ class Relation(NamedTuple):
         body = self.noise**2 + (self.spread * self.gain * y) ** 2
         own = self.noise**2 + (self.gain * self.usual) ** 2
         nats = 0.5 * ((x - self.gain * y) ** 2 / body - x * x / own)
+        if x * self.gain * y > _MOST * (self.gain * y) ** 2:  # the body does it, or more than that
+            nats = min(nats, -ENOUGH)
         return float(np.clip(nats, -_CAP, _CAP)), y, x / self.gain
 
     @property
@@ -147,7 +150,7 @@ def relation(value: Array, other: Array, aside: Flags, cell_s: float, gains: tup
     gains : tuple[float, float]
         What the size of κ may be.
     """
-    best: Relation | None = None
+    found: list[Relation] = []
     reaches = dict.fromkeys(max(1, round(t / cell_s)) for t in _WINDOWS_S)
     most = round(_DELAYS_S / cell_s)
     for reach in reaches:
@@ -159,10 +162,12 @@ def relation(value: Array, other: Array, aside: Flags, cell_s: float, gains: tup
         r = _related(aside_y, _later(unshifted, delay), reach, gains)
         if r is None:
             continue
-        found = Relation(r.gain, delay, reach, r.noise, r.spread, r.usual, y, _later(unshifted, delay))
-        if best is None or found.least < best.least:
-            best = found
-    return best
+        found.append(Relation(r.gain, delay, reach, r.noise, r.spread, r.usual, y, _later(unshifted, delay)))
+    if any(
+        np.isinf(r.least) for r in found
+    ):  # what leaps ahead of the body, as wheels that slip, does so within one of the windows
+        found = [r for r in found if np.isinf(r.least)]
+    return min(found, key=lambda r: r.least, default=None)
 
 
 def _later(x: Array, delay: int) -> Array:

@@ -77,12 +77,20 @@ def test_what_is_of_something_else_is_not_related(seed: int, unit: str) -> None:
 
 
 def test_what_a_change_says_is_the_ratio_of_two_normal_laws() -> None:
-    y, x = np.full(9, 1.5), np.full(9, 0.9)
+    y, x = np.full(9, 1.5), np.full(9, 0.6)
     one = Relation(0.9, 0, 2, 0.2, 0.3, 0.4, y, x)
     own, body = norm(0.0, np.hypot(0.2, 0.9 * 0.4)), norm(0.9 * 1.5, np.hypot(0.2, 0.3 * 0.9 * 1.5))
     peaks = own.logpdf(0.0) - body.logpdf(0.9 * 1.5)  # what their widths make of it does not count
-    assert one.says(4) == pytest.approx((own.logpdf(0.9) - body.logpdf(0.9) - peaks, 1.5, 1.0))
+    assert one.says(4) == pytest.approx((own.logpdf(0.6) - body.logpdf(0.6) - peaks, 1.5, 0.6 / 0.9))
     assert one._replace(x=np.full(9, np.nan)).says(4)[0] == 0.0
+
+
+@pytest.mark.parametrize("share", [0.6, 1.0, 2.0, 4.0])
+def test_a_body_that_does_more_than_half_of_a_change_or_more_than_all_of_it_is_none_for_the_sensor(
+    share: float,
+) -> None:
+    one = Relation(0.9, 0, 2, 0.02, 0.1, 0.4, np.full(9, 1.5), np.full(9, share * 0.9 * 1.5))
+    assert one.says(4)[0] <= -ENOUGH
 
 
 def test_the_smallest_change_that_shows_does_so_and_a_smaller_one_does_not() -> None:
