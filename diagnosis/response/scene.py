@@ -165,7 +165,8 @@ def drives_of(data: Mapping[str, FollowerData], given: Given) -> Drives:
     witness = witness_of(given.speeds, list(data.values()), width, limits, dt)
     seen = [span for span in idle if witness.saw(*span, width)]
     idle = [span for span in idle if span not in seen]
-    shaking = shaking_of(given.unit, list(data.values()), idle, dt)
+    unit = given.unit if idle or len(data) == 1 else None  # nothing else asks for it
+    shaking = shaking_of(unit, list(data.values()), idle, dt)
     several = len(data) > 1  # of one the speed itself is wrong
     shaken = [
         span for span in idle if several and shaking is not None and shakes_on(span, list(data.values()), shaking, dt)
