@@ -21,6 +21,7 @@ from diagnosis.estimation.row_probability import row_probabilities
 from diagnosis.estimation.samples import Samples
 from diagnosis.estimation.viterbi import forward, initial_state
 from diagnosis.response import models as response
+from diagnosis.response.acceleration import Relation, changes
 from diagnosis.response.kernel import posterior
 from diagnosis.response.models import Beside, Blocks
 from diagnosis.results.detectability import Deviation
@@ -371,6 +372,35 @@ def test_t18_added_noise_against_the_chi_square_law() -> None:
     k2 = float(added_noise(np.array([n]), needed)[0]) ** 2
     least = 2 * (needed + 0.5 * n * np.log1p(k2)) / k2  # χ²_n from which the evidence is enough
     assert chi2.sf(least, n) == pytest.approx(0.95, abs=0.02)
+
+
+def test_t21_a_constant_and_a_ramp_of_the_acceleration_vanish_and_a_step_stays() -> None:
+    t, (T, b, r, J) = sp.symbols("t", real=True), sp.symbols("T b r J", positive=True)
+
+    def d(f: sp.Expr) -> sp.Expr:
+        delta = f.subs(t, t + T / 2) - f.subs(t, t - T / 2)
+        return sp.simplify(delta - (delta.subs(t, t - T) + delta.subs(t, t + T)) / 2)
+
+    assert d(b * t + r * t**2 / 2) == 0
+    assert sp.simplify(d(J * sp.Heaviside(t)).subs(t, 0) - J) == 0
+    h, reach = 0.05, 10
+    way = 0.3 * np.arange(200) * h + 0.1 * (np.arange(200) * h) ** 2 + 1.7 * (np.arange(200) >= 100)
+    found = changes(way, reach)
+    assert found[np.nanargmax(np.abs(found))] == pytest.approx(1.7)
+    assert np.nanmin(np.abs(found)) == pytest.approx(0.0, abs=1e-12)
+
+
+def test_t22_the_smallest_change_that_shows() -> None:
+    gain, noise, spread, usual = 0.9, 0.05, 0.2, 0.03
+    one = Relation(gain, 0, 5, noise, spread, usual, np.zeros(3), np.zeros(3))
+    y = one.least
+    assert y == pytest.approx(noise / gain / np.sqrt(1 / 4.6 - spread**2))
+    assert 0.5 * (gain * y) ** 2 / (noise**2 + (spread * gain * y) ** 2) == pytest.approx(2.3)
+    x = 0.04
+    said = one._replace(y=np.full(11, y), x=np.full(11, x)).says(5)[0]
+    body, own = noise**2 + (spread * gain * y) ** 2, noise**2 + (gain * usual) ** 2
+    assert said == pytest.approx(0.5 * ((x - gain * y) ** 2 / body - x**2 / own))
+    assert one._replace(spread=0.47).least == np.inf
 
 
 @pytest.mark.parametrize("seconds", [2.0, 10.0, None])

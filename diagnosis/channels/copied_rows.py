@@ -112,6 +112,8 @@ def _sources(timeline: Timeline) -> list[list[str]]:
     """Names of the channels of each source that logs wheels or steering."""
     found: dict[str, list[str]] = {}
     for name in timeline.signals:
+        if name == "imu.acceleration":  # of another device, whose readings go on where rows of the drives are copied
+            continue
         source = timeline.groups.get(name, timeline.sources.get(name, ""))
         found.setdefault(source.removesuffix(quantity_kind(name)), []).append(name)  # a table's rows are one source
     return [names for names in found.values() if any(n.startswith(("wheel.", "steer.")) for n in names)]

@@ -27,6 +27,7 @@ _COSTS = {
     "cmd.v": "without recorded v_c,i no {wheel} has a command: no tracking error, and driving time by measured speeds",
     "cmd.omega": "commands of the {wheels} follow from the steering angles, unless v_c,i is recorded; where no axle is steered they are unknown, but on the middle line",
     "cmd.lateral": "{wheels} with rollers have no expected speed while the machine is to move sideways",
+    "imu.acceleration": "a speed that falls at once beside a body that goes on, and a machine that shakes though all speeds stand, are not seen by it",
     "imu.yaw_rate": "how the machine turns is known by commands, {wheels} and steering angles alone",
     "gnss.lat": "no speed of the body by GNSS to judge the {wheels} by; the path is drawn from odometry, if at all",
     "gnss.lon": "no speed of the body by GNSS to judge the {wheels} by; the path is drawn from odometry, if at all",
@@ -52,7 +53,7 @@ def is_commanded(names: Container[str], wheels: Sequence[str]) -> bool:
 def applies(name: str, words: MachineWords) -> bool:
     """Whether a machine of this kind can have a canonical signal at all: no motor has pressures or a spool, no valve an effort, no arm an odometry."""
     leaf, group = name.rpartition(".")[2], name.partition(".")[0]
-    if name == "cmd.lateral":  # of few machines; nobody misses what no other one can do
+    if name in ("cmd.lateral", "imu.acceleration"):  # of few machines; nobody misses what tells most others nothing
         return False
     if words.drive != "valve" and leaf in ("pressure_a", "pressure_b", "psi"):
         return False

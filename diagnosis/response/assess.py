@@ -9,6 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.response.body import BodySpeed
+from diagnosis.response.by_acceleration import with_the_acceleration
+from diagnosis.response.by_both import by_both_motions
 from diagnosis.response.doubts import sides_of_all
 from diagnosis.response.drive_faults import drive_faults
 from diagnosis.response.encoder_scale import scaled_sides
@@ -16,11 +18,14 @@ from diagnosis.response.encoder_scale_words import by_the_gyro, told
 from diagnosis.response.gyro import wrong_gyro
 from diagnosis.response.inputs import FollowerData
 from diagnosis.response.joint_gain import told_gain
-from diagnosis.response.machine import paused, standstills, unexplained
+from diagnosis.response.machine import paused, pauses, standstills, unexplained
 from diagnosis.response.reversed_sign import reversed_spans, told_reversed
 from diagnosis.response.scene import Drives, Given, drives_of, scene_of
+from diagnosis.response.shaken import told_shaken
 from diagnosis.response.share_findings import told_share
 from diagnosis.response.turning import track_of, wrong_yaw_rate
+from diagnosis.response.unit_note import noted
+from diagnosis.response.vibration import Unit
 from diagnosis.response.weighed import settled, weighed
 from diagnosis.response.witness import witnessed
 from diagnosis.results.assessment import Assessment
@@ -55,6 +60,7 @@ def assess_response(
     dt: float,
     speeds: tuple[BodySpeed, ...] = (),
     heading: Array | None = None,
+    unit: Unit | None = None,
 ) -> Judgement:
     """Judge drives by their response.
 
@@ -74,10 +80,12 @@ def assess_response(
         The body's speed by its own sensors, in blocks of `BLOCK_S`.
     heading : Array or None, shape (b,)
         Yaw rate by the heading of odometry in such blocks [rad/s].
+    unit : Unit or None
+        The inertial unit's forward acceleration.
     """
     if not data:
         return Judgement({}, ())
-    given = Given(geometry, yaw, limits, dt, speeds, heading)
+    given = Given(geometry, yaw, limits, dt, speeds, heading, unit)
     drives = drives_of(data, given)
     if not drives.found:
         return _none_answers(drives, given)
@@ -98,7 +106,8 @@ def assess_response(
     }
     ignored = () if any(j.response.answered for j in judged.values()) else _unexplained(drives, given)
     ignored, said = witnessed(ignored, drives.witness, drives.seen, drives.all, speeds, (width, limits, dt))
-    stood = _stood(drives, parts, dt)
+    parts = _beside_the_unit(parts, drives, given)
+    stood = _stood(drives, parts, given)
     other_sign = reversed_spans(judged, block_s)
     for w, both in parts.items():
         both = told_reversed(told_share(both, judged[w]), judged[w], other_sign.get(w, []))
@@ -107,7 +116,7 @@ def assess_response(
         parts,
         events=(*stood, *(sides.astray if sides.lasts else ())),
         gyro=tuple(x.said for x in gyro),
-        unshown=said,
+        unshown=(*said, *told_shaken(drives.shaken, drives.all, given.dt)),
         unrelated=ignored,
         scaled=told(sought, apart.turning, block_s),
         apart=sides.apart,
@@ -116,18 +125,38 @@ def assess_response(
 
 def _none_answers(drives: Drives, given: Given) -> Judgement:
     """What can be said where no drive answers enough to be judged."""
-    stood = _stood(drives, {}, given.dt)
-    ignored = () if stood or drives.seen else _unexplained(drives, given)
+    stood = _stood(drives, {}, given)
+    ignored = () if stood or drives.seen or drives.shaken else _unexplained(drives, given)
     steps = given.width, given.limits, given.dt
     ignored, said = witnessed(ignored, drives.witness, drives.seen, drives.all, given.speeds, steps)
-    return Judgement({}, stood, unshown=said, unrelated=() if stood else ignored)
+    return Judgement(
+        {},
+        stood,
+        unshown=(*said, *told_shaken(drives.shaken, drives.all, given.dt)),
+        unrelated=() if stood else ignored,
+    )
 
 
 def _unexplained(drives: Drives, given: Given) -> tuple[str, ...]:
     return unexplained(drives.all, given.limits, given.dt)
 
 
-def _stood(drives: Drives, parts: Mapping[str, tuple[Assessment, Assessment]], dt: float) -> tuple[Said, ...]:
+def _beside_the_unit(
+    parts: Mapping[str, tuple[Assessment, Assessment]], drives: Drives, given: Given
+) -> dict[str, tuple[Assessment, Assessment]]:
+    """Both sides of each wheel, of an only drive, or one of two, with what the inertial unit shows besides."""
+    if len(drives.data) > 1:
+        return by_both_motions(parts, drives.data, given.yaw, given.unit, given.dt)
+    dt, unit = given.dt, given.unit
+    return {
+        w: noted(with_the_acceleration(both, drives.data[w], unit, dt), drives.data[w], unit, dt)
+        for w, both in parts.items()
+    }
+
+
+def _stood(drives: Drives, parts: Mapping[str, tuple[Assessment, Assessment]], given: Given) -> tuple[Said, ...]:
     """What is said where the machine stood though it was told to move, or its only drive paused."""
     of_one = [f for side in parts.values() for f in side[0].findings] if len(drives.data) == 1 else []
-    return standstills(drives.idle, dt) or paused(of_one, dt)
+    paused_spans = [(f.start, f.stop) for f in pauses(of_one)]
+    still = drives.still
+    return standstills(drives.idle, given.dt, still(drives.idle)) or paused(of_one, given.dt, still(paused_spans))

@@ -9,15 +9,18 @@ from diagnosis.channels.standstill import STILL, together_idle
 from diagnosis.evidence import ACTUATOR, SENSOR, Contribution, MissionView, Part
 from diagnosis.response.assess import Judgement, assess_response
 from diagnosis.response.body import body_speeds
+from diagnosis.response.by_acceleration import beside_the_acceleration, merged
 from diagnosis.response.by_body import beside_the_body
 from diagnosis.response.disputed import doubted
 from diagnosis.response.heading import Contradiction, contradictions, odometry_rate
-from diagnosis.response.inputs import cells, followers
+from diagnosis.response.inputs import FollowerData, cells, followers
 from diagnosis.response.lone import by_its_channel, not_shared
 from diagnosis.response.models import BLOCK_S
 from diagnosis.response.sides import without_doubles
 from diagnosis.response.tracking import assess_channel, assess_tracking
-from diagnosis.results.assessment import Assessment, Reason
+from diagnosis.response.unit_note import noted
+from diagnosis.response.vibration import Unit
+from diagnosis.results.assessment import Assessment, Finding, Reason
 from diagnosis.results.machine_event import (
     gyro_or_slip,
     not_following,
@@ -52,7 +55,7 @@ class ResponseEvidence:
         width = max(1, round(BLOCK_S / dt))
         speeds = body_speeds(mission.timeline, width) if data else ()
         heading = odometry_rate(mission.timeline, width) if yaw is not None and data else None
-        judged = assess_response(data, machine.geometry, yaw, machine.limits, dt, speeds, heading)
+        judged = assess_response(data, machine.geometry, yaw, machine.limits, dt, speeds, heading, _unit(mission))
         parts: dict[Part, Assessment] = {}
         for wheel in mission.wheels:
             if wheel in judged.parts:
@@ -104,6 +107,7 @@ class TrackingEvidence:
         if len(mission.machine.wheels) == 1:  # of several each is another one's rival
             speeds = body_speeds(mission.timeline, max(1, round(BLOCK_S / dt))) if drives else ()
             found = {w: tuple(without_doubles([*found[w], *beside_the_body(d, speeds, dt)])) for w, d in drives.items()}
+            found = {w: _beside_the_unit(found[w], d, _unit(mission), dt) for w, d in drives.items()}
         for wheel, data in drives.items():
             if wheel not in mission.wheels:
                 continue
@@ -112,8 +116,23 @@ class TrackingEvidence:
                 both = assess_tracking(data.y, command, dt, limits, (data.name, "its command"), found[wheel])
             else:
                 both = assess_channel(data.y, dt, limits, data.name, found[wheel])
+            both = noted(both, data, _unit(mission), dt) if len(mission.machine.wheels) == 1 else both
             parts[wheel, SENSOR], parts[wheel, ACTUATOR] = both
         return Contribution(parts)
+
+
+def _unit(mission: MissionView) -> Unit | None:
+    """The inertial unit's forward acceleration, where it is logged."""
+    name = "imu.acceleration"
+    return Unit(mission.values(name), mission.timeline.fresh[name]) if mission.logged(name) else None
+
+
+def _beside_the_unit(
+    known: tuple[Finding, ...], data: FollowerData, unit: Unit | None, dt: float
+) -> tuple[Finding, ...]:
+    """Findings of the only drive with what an inertial unit shows besides, in order of time."""
+    new, gone = merged(known, beside_the_acceleration(data, unit, dt))
+    return tuple(sorted((*(f for f in known if f not in gone), *new), key=lambda f: f.start))
 
 
 def _is_odometry(machine: Machine, wheel: str) -> bool:

@@ -12,6 +12,7 @@ from diagnosis.response.identification import Response
 from diagnosis.response.inputs import FollowerData, cells
 from diagnosis.response.joint import Joint
 from diagnosis.response.models import Beside
+from diagnosis.response.shaken import quiet_meanwhile
 from diagnosis.response.spells import Spell
 from diagnosis.response.wheel import Wheel
 from diagnosis.results.assessment import Finding, Lack, Reason
@@ -87,15 +88,18 @@ class Judged(NamedTuple):
     view: Beside | None = None
 
 
-def standstills(idle: Sequence[tuple[int, int]], dt: float) -> tuple[Said, ...]:
-    """What is said where all drives stood still together, in steps [start, stop), although they were commanded to move; `dt` in s."""
+def standstills(idle: Sequence[tuple[int, int]], dt: float, quiet: Sequence[tuple[int, int]] = ()) -> tuple[Said, ...]:
+    """What is said where all drives stood still together, in steps [start, stop), although they were commanded to move; `dt` in s.
+
+    `quiet`: those of these times in which an inertial unit shows that the machine stood.
+    """
     if not idle:
         return ()
     total, (start, stop) = sum(b - a for a, b in idle) * dt, max(idle, key=lambda s: s[1] - s[0])
     text = (
         f"For {total:.1f} s all drives stood still together, one that reads wrong perhaps excepted, while they were commanded to move (longest {Stated.of(start * dt, stop * dt)}): "
         "disabled, stopped by an emergency stop, or driven by another source of commands; no {wheel} is blamed for it."
-    )
+    ) + quiet_meanwhile(quiet, dt)
     return (Said(text, tuple((a * dt, b * dt) for a, b in idle)),)
 
 
@@ -104,8 +108,8 @@ def pauses(findings: Sequence[Finding]) -> list[Finding]:
     return [f for f in findings if f.mode is FaultMode.NO_SIGNAL and f.side is Side.SENSOR_OR_ACTUATOR]
 
 
-def paused(findings: Sequence[Finding], dt: float) -> tuple[Said, ...]:
-    """What is said where the only drive stood still for a time although it was commanded to move, by what was found of it; `dt` in s."""
+def paused(findings: Sequence[Finding], dt: float, quiet: Sequence[tuple[int, int]] = ()) -> tuple[Said, ...]:
+    """What is said where the only drive stood still for a time although it was commanded to move, by what was found of it; `dt` in s, `quiet` as for `standstills`."""
     spans = pauses(findings)
     if not spans:
         return ()
@@ -114,7 +118,7 @@ def paused(findings: Sequence[Finding], dt: float) -> tuple[Said, ...]:
         f"For {sum(f.stop - f.start for f in spans) * dt:.1f} s the only drive stood still, or read 0, while it was commanded to move (longest "
         f"{Stated.of(longest.start * dt, longest.stop * dt)}): disabled, stopped by an emergency stop, driven by another source of commands, "
         "or faulty; with a single drive these look the same."
-    )
+    ) + quiet_meanwhile(quiet, dt)
     return (Said(text, tuple((f.start * dt, f.stop * dt) for f in spans)),)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -22,10 +22,12 @@ from diagnosis.response.machine import Judged
 from diagnosis.response.models import BLOCK_S, Beside
 from diagnosis.response.pairs import by_leaps
 from diagnosis.response.rivals import by_each_other
+from diagnosis.response.shaken import shakes_on, shaking_of
 from diagnosis.response.sideways import crossed, goes_sideways
 from diagnosis.response.spells import spans_of
 from diagnosis.response.states import judge
 from diagnosis.response.usual_times import as_usual, shares_by_commands, shares_by_positions
+from diagnosis.response.vibration import Unit, Vibration
 from diagnosis.response.witness import Witness, witness_of
 from replay.machine.config import Limits
 from replay.machine.geometry import Geometry
@@ -45,6 +47,7 @@ class Given(NamedTuple):
     dt: float
     speeds: tuple[BodySpeed, ...] = ()
     heading: Array | None = None
+    unit: Unit | None = None
 
     @property
     def width(self) -> int:
@@ -79,6 +82,10 @@ class Drives(NamedTuple):
         The same where one did.
     witness : Witness
         Sensors of the body.
+    shaken : list[tuple[int, int]]
+        Samples in which all stand from one reading to the next, or start so, while an inertial unit shakes on as in motion.
+    shaking : Vibration or None
+        How that unit shakes.
     found : dict[str, Judged]
         Those that answer enough to be judged.
     """
@@ -89,12 +96,18 @@ class Drives(NamedTuple):
     idle: list[tuple[int, int]]
     seen: list[tuple[int, int]]
     witness: Witness
+    shaken: list[tuple[int, int]]
+    shaking: Vibration | None
     found: dict[str, Judged]
 
     @property
     def all(self) -> list[FollowerData]:
         """Channels of all drives."""
         return list(self.data.values())
+
+    def still(self, spans: Sequence[tuple[int, int]]) -> list[tuple[int, int]]:
+        """Those of some samples [start, stop) in which an inertial unit shows that the machine stands."""
+        return [span for span in spans if self.shaking is not None and self.shaking.stands(*span)]
 
 
 class Scene(NamedTuple):
@@ -152,7 +165,14 @@ def drives_of(data: Mapping[str, FollowerData], given: Given) -> Drives:
     witness = witness_of(given.speeds, list(data.values()), width, limits, dt)
     seen = [span for span in idle if witness.saw(*span, width)]
     idle = [span for span in idle if span not in seen]
-    return Drives(data, scales, left_out, idle, seen, witness, found)
+    unit = given.unit if idle or len(data) == 1 else None  # nothing else asks for it
+    shaking = shaking_of(unit, list(data.values()), idle, dt)
+    several = len(data) > 1  # of one the speed itself is wrong
+    shaken = [
+        span for span in idle if several and shaking is not None and shakes_on(span, list(data.values()), shaking, dt)
+    ]
+    idle = [span for span in idle if span not in shaken]
+    return Drives(data, scales, left_out, idle, seen, witness, shaken, shaking, found)
 
 
 def scene_of(drives: Drives, given: Given) -> Scene:

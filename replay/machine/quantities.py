@@ -31,6 +31,7 @@ UNITS: dict[str, tuple[Quantity, float]] = {
     "bar": ("pressure", 1e5),
     "MPa": ("pressure", 1e6),
     "m/s^2": ("acceleration", 1.0),
+    "g": ("acceleration", 9.80665),
     "N·m": ("effort", 1.0),
     "Nm": ("effort", 1.0),
     "A": ("effort", 1.0),

@@ -115,6 +115,7 @@ _EFFORT = r"effort|torque|current|duty|pwm|moment$"
 _YAW_RATE = (
     r"(imu|gyro).*(yaw_?rate|gyro_?z|omega_?z|angular_velocity_z)|^gyro_(z|yaw)(_(rad|deg)_s)?$|^angular_velocity_z$"
 )
+_ACCELERATION = r"(^|_)(imu|body)_(acc|accel|acceleration)_?x(_|$)|^(lin(ear)?_)?(acc|accel|acceleration)_x$"
 _Entry = CanonicalSignal
 
 #: In reading order: group, leaf, quantity, words, rank for clocks, name in symbols.
@@ -151,6 +152,14 @@ CANONICAL: tuple[CanonicalSignal, ...] = (
     _Entry("steer", "u", "fraction", "valve command u_s", 9, _VALVE),
     _Entry("steer", "u_applied", "fraction", "measured valve position", 11, _VALVE_POSITION),
     _Entry("imu", "yaw_rate", "rotation", "measured yaw rate", 12, Named(0, _YAW_RATE)),
+    _Entry(
+        "imu",
+        "acceleration",
+        "acceleration",
+        "measured forward acceleration, with gravity",
+        None,
+        Named(6, _ACCELERATION),
+    ),
     _Entry(
         "gnss",
         "lat",

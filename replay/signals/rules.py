@@ -34,6 +34,7 @@ _EXPORTED = {
     "pose.pose.position.x": ("odom.x", "m"),
     "pose.pose.position.y": ("odom.y", "m"),
     "angular_velocity.z": ("imu.yaw_rate", "rad/s"),
+    "linear_acceleration.x": ("imu.acceleration", "m/s^2"),
 }
 _WORDS_REF = re.compile(r"ref|cmd|command|set|des|target|soll|demand")
 
@@ -114,6 +115,8 @@ def _by_message(channel: Channel, machine: Machine, others: Mapping[str, Channel
             yield Candidate("odom.yaw", whole, rank, f"quaternion of {leaf} on {topic}")
     elif leaf == "Imu" and field == "angular_velocity.z":
         yield found("imu.yaw_rate", "rad/s", 1 + ("imu" not in topic.lower()))
+    elif leaf == "Imu" and field == "linear_acceleration.x" and np.any(channel.values):
+        yield found("imu.acceleration", "m/s^2", 1 + ("imu" not in topic.lower()))
     elif leaf in ("NavSatFix", "GPSFix"):
         signal = {"latitude": "gnss.lat", "longitude": "gnss.lon", "speed": "gnss.speed"}.get(field)
         if signal is not None:

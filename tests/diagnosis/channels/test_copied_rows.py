@@ -46,6 +46,22 @@ def test_rows_repeated_as_a_whole_are_no_data() -> None:
     assert "10.0–12.5 s" in found.notes[0]
 
 
+def test_an_inertial_unit_whose_readings_go_on_does_not_hide_copied_rows() -> None:
+    """It is another device: a table has its newest reading in each row, whatever the drives' logger does."""
+    given = timeline("wheel.M.v", "wheel.M.u")
+    more = np.random.default_rng(2).normal(size=N)
+    name = "imu.acceleration"
+    beside = replace(
+        given,
+        signals={**given.signals, name: more},
+        fresh={**given.fresh, name: np.ones(N, np.bool_)},
+        sources={**given.sources, name: "log.csv"},
+        periods_ns={**given.periods_ns, name: 10 * MS},
+        groups={**given.groups, name: "log.csv t imu.acceleration"},
+    )
+    assert np.isnan(without_copied_rows(beside).signals["wheel.M.v"][HOLD.start + 2 : HOLD.stop]).all()
+
+
 def test_a_single_time_is_no_habit_however_short_the_log_is() -> None:
     long = slice(1000, 2200)
     found = without_copied_rows(timeline("wheel.M.v", "wheel.M.u", hold=long))

@@ -129,7 +129,7 @@ def test_signals_name_parts_of_the_machine(signal: str, words: list[str]) -> Non
 
 def test_canonical_signals_follow_wheels_and_axles() -> None:
     names = haulotte().canonical_signals()
-    assert len(names) == len(set(names)) == 3 + 4 * 10 + 2 * 5 + 8
+    assert len(names) == len(set(names)) == 3 + 4 * 10 + 2 * 5 + 9
     assert {"cmd.v", "wheel.RL.pressure_b", "steer.rear.phi_true", "odom.yaw"} <= set(names)
     rig = Machine(name="rig", id="", wheels=("M1",), geometry=None)
     assert rig.axles == ()

@@ -47,7 +47,17 @@ def test_names_in_reading_order() -> None:
             )
         ),
         *(f"steer.front.{x}" for x in ("phi_ref", "phi", "phi_true", "u", "u_applied")),
-        *("imu.yaw_rate", "gnss.lat", "gnss.lon", "gnss.speed", "odom.x", "odom.y", "odom.yaw", "odom.v"),
+        *(
+            "imu.yaw_rate",
+            "imu.acceleration",
+            "gnss.lat",
+            "gnss.lon",
+            "gnss.speed",
+            "odom.x",
+            "odom.y",
+            "odom.yaw",
+            "odom.v",
+        ),
     )
 
 
@@ -72,6 +82,7 @@ def test_every_name_of_a_machine_leads_to_one_entry_and_none_is_left() -> None:
         ("odom.y", "m", "m"),
         ("odom.yaw", "rad", "rad"),
         ("imu.yaw_rate", "rad/s", "rad/s"),
+        ("imu.acceleration", "m/s^2", "m/s^2"),
     ],
 )
 def test_units(name: str, unit: str, shown: str) -> None:

@@ -31,6 +31,8 @@ def factor(signal: str, unit: str, **changed: Any) -> float:
         ("cmd.omega", "deg/s", math.pi / 180),
         ("imu.yaw_rate", "°/s", math.pi / 180),
         ("imu.yaw_rate", "rev/s", 2 * math.pi),
+        ("imu.acceleration", "m/s²", 1.0),
+        ("imu.acceleration", "g", 9.80665),
         ("steer.front.phi", "deg", math.pi / 180),
         ("steer.rear.phi_true", " ° ", math.pi / 180),
         ("wheel.FR.u", "%", 0.01),

@@ -375,10 +375,31 @@ def test_real_simulated_robot(reference_data: Path) -> None:
     assert found["wheel.RL.v"].origin.field == "velocity[wheel_left_back_joint]"
 
 
+@pytest.mark.parametrize("moves", [True, False])
+def test_the_forward_acceleration_of_an_inertial_unit_unless_it_has_none(moves: bool) -> None:
+    """Drivers without an accelerometer publish zeros."""
+    values = np.sin(np.arange(50.0)) if moves else np.zeros(50)
+    columns = {"angular_velocity.z": np.ones(50), "linear_acceleration.x": values, "linear_acceleration.y": values}
+    found = mapped(*topic("/imu/data", "sensor_msgs/msg/Imu", columns)).items
+    assert ("imu.acceleration" in found) is moves
+    assert "imu.yaw_rate" in found
+    if moves:
+        assert found["imu.acceleration"].origin.field == "linear_acceleration.x"
+
+
 def test_real_husky(reference_data: Path) -> None:
     log = read_log(reference_data / "reference_logs" / "robot_localization" / "test1.bag", SourceOptions())
     found = map_signals([log], MACHINE).items
-    assert {"imu.yaw_rate", "gnss.lat", "gnss.lon", "odom.x", "odom.y", "odom.yaw", "odom.v"} == set(found)
+    assert {
+        "imu.yaw_rate",
+        "imu.acceleration",
+        "gnss.lat",
+        "gnss.lon",
+        "odom.x",
+        "odom.y",
+        "odom.yaw",
+        "odom.v",
+    } == set(found)
     assert np.abs(np.diff(found["odom.yaw"].values)).max() < 0.5
 
 
