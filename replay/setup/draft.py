@@ -182,6 +182,8 @@ def _finished(draft: Draft, logs: Sequence[RawLog]) -> Draft:
     machine = draft.machine
     draft.signals = map_signals(logs, machine)
     draft.questions += draft.signals.questions
+    used = {signal.source for signal in draft.signals.items.values()}
+    draft.idle = tuple(log.source for log in logs if log.source not in used) if used else ()
     return draft
 
 

@@ -23,7 +23,7 @@ from replay.signals.to_si import peak_of
 from replay.signals.unit_doubts import per_minute
 
 #: By quantity: the unit, from and up to which largest value it is taken, and what the values would be in SI.
-_USUAL = {
+USUAL_UNITS = {
     "fraction": ("%", 1.5, 150.0, "fractions of full opening"),
     "angle": ("deg", 3.2, 180.0, "radians"),
     "rotation": ("deg/s", 6.3, 400.0, "rad/s"),
@@ -140,7 +140,7 @@ def usual_units(draft: Draft, found: Signals) -> Mapping[str, SignalSource]:
         As found by their names, SI where no unit is stated.
     """
     out = dict(_millimetres(draft, found))
-    for quantity, (unit, least, most, si) in _USUAL.items():
+    for quantity, (unit, least, most, si) in USUAL_UNITS.items():
         bare = {
             n: s
             for n, s in found.items.items()
