@@ -22,7 +22,10 @@ _ANSWER_S = 1.0  # for which it was told to go already: drives take as long to a
 _LEAST_S, _FOLLOWS_S = 2.0, 2.0  # of standing so, and of following at other times
 _OTHERS_MOVE, _FOLLOWS = 0.7, 0.7  # of these times, in which another wheel moves, and in which it does itself
 _GAIN = (0.5, 2.0)  # of what it is told, at those times
-_MUCH = 0.1  # quantile of what it is told when it moves: less may be too little to set it going
+_LEAST_TOLD, _MUCH = (
+    0.1,
+    0.5,
+)  # quantile of what it is told when it moves, and share of that: less may be too little to set it going
 _SAME, _OTHER = (
     0.3,
     0.6,
@@ -67,7 +70,7 @@ def stays_though_told(one: Judged, driving_speed: float) -> list[Finding]:
         if not _follows(rest, moves, y, asked, dt):
             continue
         usual = float(np.median(np.abs(asked[there][told[there]])))
-        if usual < float(np.quantile(np.abs(asked[moves]), _MUCH)):
+        if usual < _MUCH * float(np.quantile(np.abs(asked[moves]), _LEAST_TOLD)):
             continue
         goes = start + np.flatnonzero(np.abs(np.nan_to_num(asked[there])) > driving_speed)
         first, stop = int(goes[0]), int(goes[-1]) + 1
