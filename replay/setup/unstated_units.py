@@ -12,6 +12,7 @@ from replay.log.source_options import SignalSource
 from replay.machine.config import Machine
 from replay.machine.quantities import DOUBTED_UNITS, UNITS
 from replay.machine.signal_table import quantity_of
+from replay.machine.units import known_unit
 from replay.setup.draft_notes import Draft
 from replay.setup.motion import correlation
 from replay.signals.candidate import source_of
@@ -181,15 +182,21 @@ def _millimetres(draft: Draft, found: Signals) -> Mapping[str, SignalSource]:
     body = {n: s for n in _BODY if (s := found.items.get(n)) is not None and not s.origin.unit}
     most = next((p for s in body.values() if _TOO_FAST < (p := peak_of(s.values)) <= _TOO_FAST * 100), 0.0)
     wheels = {n: s for n, s in found.items.items() if n.startswith("wheel.") and n.rpartition(".")[2] in _SPEEDS}
-    alike = {n: s for n, s in body.items() if _as_large(s, most)} | wheels
+    stated = bool(wheels) and all(known_unit(s.origin.unit) == "mm/s" for s in wheels.values())
+    alike = {n: s for n, s in body.items() if _as_large(s, most)} | ({} if stated else wheels)
     if not most or not wheels or any(s.origin.unit or per_minute(s.origin.label) for s in alike.values()):
         return {}
     for leaf in _SPEEDS:  # a wheel that reads a share, or nothing, is recorded as the others are
-        tops = sorted(peak_of(s.values) for n, s in wheels.items() if n.endswith(f".{leaf}"))
+        scale = 1.0 / UNITS["mm/s"][1] if stated else 1.0  # to what was recorded
+        tops = sorted(peak_of(s.values) * scale for n, s in wheels.items() if n.endswith(f".{leaf}"))
         if tops and not _LEAST_ALIKE < tops[len(tops) // 2] / most < _MOST_ALIKE:
             return {}
     named = ", ".join(s.origin.label for s in alike.values())
-    draft.ask("signals", f"are {named} in mm/s? None is stated; in m/s they would reach {most:.3g}.")
+    one = len(alike) == 1
+    draft.ask(
+        "signals",
+        f"{'is' if one else 'are'} {named} in mm/s{', as the wheels are' if stated else ''}? None is stated; in m/s {'it' if one else 'they'} would reach {most:.3g}.",
+    )
     return {n: replace(s.origin, unit="mm/s") for n, s in alike.items()}
 
 

@@ -123,6 +123,13 @@ def test_odometry_in_millimetres_has_the_unit_of_the_wheels_beside_it(tmp_path: 
         assert "cmd.v" not in signals or signals["cmd.v"].unit == ("mm/s" if command["speed_cmd"].max() > 10 else "")
 
 
+def test_odometry_that_states_no_unit_beside_wheels_in_millimetres(tmp_path: Path) -> None:
+    speeds = {f"speed_{s} [mm/s]": 1000 * x for s, x in SIDES.items()}
+    draft = drafted(tmp_path, {"speed_cmd": V, **speeds, "odom_v": 1000 * V})
+    assert [draft.machine.signals[n].unit for n in ("odom.v", "cmd.v", "wheel.L.v")] == ["mm/s", "", "mm/s"]
+    assert any("is odom_v in mm/s, as the wheels are?" in q for q in draft.questions)
+
+
 def test_a_wheel_that_reads_a_share_has_the_unit_of_the_others(tmp_path: Path) -> None:
     speeds = {"speed_left": 1000 * SIDES["left"], "speed_right": 100 * SIDES["right"]}
     signals = drafted(tmp_path, {"speed_cmd": 1000 * V, **speeds}).machine.signals
