@@ -26,6 +26,7 @@ _LEAST_TOLD, _MUCH = (
     0.1,
     0.5,
 )  # quantile of what it is told when it moves, and share of that: less may be too little to set it going
+_OF_OTHERS = 0.4  # of what another wheel does meanwhile: by a wrong track, one about which the machine turns is told to move a little
 _SAME, _OTHER = (
     0.3,
     0.6,
@@ -56,7 +57,8 @@ def stays_though_told(one: Judged, driving_speed: float) -> list[Finding]:
     asked = shifted(one.data.asked, estimate_lag(y, one.data.asked, dt))
     told = _held(np.nan_to_num(np.abs(asked)) > driving_speed, round(_ANSWER_S / dt))
     known, size = np.isfinite(y), np.abs(np.nan_to_num(y))
-    others = np.max([np.abs(np.nan_to_num(o)) for o in one.others], axis=0) > driving_speed
+    fastest = np.max([np.abs(np.nan_to_num(o)) for o in one.others], axis=0)
+    others = fastest > driving_speed
     moves = told & known & (size > driving_speed)
     out: list[Finding] = []
     for start, stop in runs_of(known & (size <= STILL * driving_speed)):
@@ -70,6 +72,8 @@ def stays_though_told(one: Judged, driving_speed: float) -> list[Finding]:
         if not _follows(rest, moves, y, asked, dt):
             continue
         usual = float(np.median(np.abs(asked[there][told[there]])))
+        if usual < _OF_OTHERS * float(np.median(fastest[there][told[there]])):
+            continue
         if usual < _MUCH * float(np.quantile(np.abs(asked[moves]), _LEAST_TOLD)):
             continue
         goes = start + np.flatnonzero(np.abs(np.nan_to_num(asked[there])) > driving_speed)

@@ -91,6 +91,18 @@ def test_a_wheel_that_is_told_to_stand_does_nothing_wrong() -> None:
     ]
 
 
+def test_a_turn_about_a_wheel_by_another_track_than_the_machine_file_has_is_none_of_its_faults() -> None:
+    """The file's track makes the wheel in the middle of the turn move a little."""
+    turning = (TIME >= 6.0) & (TIME < 16.0)
+    v, turn = np.where((TIME < 2.0) | (TIME > 20.0), 0.0, np.where(turning, 0.2, 0.12)), np.where(turning, 1.0, 0.0)
+    data = {}
+    for w in PAIR:
+        y, asked = (v + np.sign(-PLACES[w].y) * 0.5 * track * turn for track in (TRACK, 0.25))
+        data[w] = FollowerData(y, np.ones(N, np.bool_), np.column_stack([v, turn]), asked, f"wheel.{w}.v")
+    parts = assess_response(data, Geometry(PLACES, 0.1), turn, Limits(driving_speed=0.05), DT).parts
+    assert not [f for sides in parts.values() for side in sides for f in side.findings if "told to go" in f.evidence[0]]
+
+
 def test_a_wheel_that_never_follows_its_command_is_not_held_against_it() -> None:
     """Its command is another one's, or not carried out: that is no standstill under command."""
     read = {"R": np.where(TIME < 1.0, 0.0, 0.4), "L": np.where(TIME < 15.0, 0.0, 0.4)}
