@@ -87,6 +87,8 @@ def _show(terminal: Terminal, draft: Draft, name: Path, logs: Sequence[Path]) ->
     """What was found, what is open, and the next command."""
     from cli.tables.layout import bullets, section
 
+    idle = [log for log in logs if str(log) in draft.idle]  # with which a diagnosis would not begin
+    logs = [log for log in logs if log not in idle]
     words = " ".join(shlex.quote(str(log)) for log in logs) or "LOG"
     wheels, count = len(draft.machine.wheels), len(draft.machine.signals)
     many = f"{wheels} wheels" if wheels > 1 else "one drive"
@@ -95,6 +97,9 @@ def _show(terminal: Terminal, draft: Draft, name: Path, logs: Sequence[Path]) ->
         terminal.show(section("Found"), bullets(draft.found))
     if draft.questions:
         terminal.show(section("To be checked in the file"), bullets(draft.questions, "yellow"))
+    if idle:
+        left = f"Left out below, for none of its channels is used: {', '.join(str(log) for log in idle)}."
+        terminal.show(section("Not used"), bullets([left]))
     terminal.show(section("Next"))
     file = shlex.quote(str(name))
     if logs:

@@ -161,7 +161,8 @@ def behind(x: Array, dt: float, lag: float) -> Array:
 def late(speed: Array, reference: Array, dt: float) -> list[float | None]:
     """By how much each wheel's speed is later, or earlier, than the other wheels', by its changes beside the command's [s].
 
-    None where a wheel's speed does not follow its command at any delay.
+    None where a wheel's speed does not follow its command at any delay. Of two wheels the later one is: what holds readings up makes
+    them late, and none early.
 
     Both of shape (cells, wheels) in m/s, `dt` in s.
     """
@@ -173,8 +174,8 @@ def late(speed: Array, reference: Array, dt: float) -> list[float | None]:
         alike.append([_alike(changes, commanded, int(k)) for k in steps])
         best = int(np.argmax(alike[-1]))
         found.append(float(steps[best] * dt) if alike[-1][best] > 0.3 else None)
-    known = [x for x in found if x is not None]
-    middle = float(np.median(known)) if known else 0.0
+    known = sorted(x for x in found if x is not None)
+    middle = known[(len(known) - 1) // 2] if known else 0.0
     there = int(np.argmin(np.abs(steps * dt - middle)))
     # a delay at which it is no more alike than at that of the others is none of its own
     same = [a[there] >= _AS_ALIKE * max(a) for a in alike]

@@ -75,7 +75,8 @@ def wheels_of(
         if found is None and (not several or _silent(d, limits, dt)):
             found = as_a_peer(w, d.commands, answers, geometry, cell * dt)
         # wheels of one body, that is: joints which are each commanded by themselves have nothing to do with each other
-        ignored = not answers and len(data) > 1 and d.commands.shape[1] >= BODY_COMMANDS and _turns(y, limits, dt)
+        of_a_body = d.commands.shape[1] >= BODY_COMMANDS or geometry is not None
+        ignored = not answers and len(data) > 1 and of_a_body and _turns(y, limits, dt)
         if found is None and not several and not ignored and np.isfinite(d.commands).any():
             continue
         # a wheel that makes nothing of its command, alone or as all do, is judged by the others, and by its channel

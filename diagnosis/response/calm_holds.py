@@ -18,11 +18,14 @@ from diagnosis.response.spells import Spell
 from diagnosis.results.assessment import Assessment, Finding
 from diagnosis.results.result import Hypothesis
 from replay.faults import FaultMode, Side, State
+from replay.signals.resolution import rounding_step
 
 _HELD, _MOSTLY = 0.9, 0.5  # of a block's readings; of the blocks
 _MOST = 0.1, 0.85  # of what is asked: its ends may have what comes before and after
 _CHANGES = 0.05  # of the top speed, by which what is asked changes: then wheels would, too
 _NEAR = 2.5  # usual misfits off the command
+_FEW = 16.0  # counts in a sample: of more, noise makes one more or less now and then
+_ANSWER_S = 0.5  # in which a reading answers a command that is another one
 _LEAST_HOLD_S, _LONG_S = 1.0, 8.0  # of a hold that shows a habit; of what it is a share of
 _SENSOR, _DRIVE = 0.55, 0.35  # that such a time is the sensor's, or the machine's that goes on
 _JUMP, _NO_JUMP, _USUAL = 2.0, 0.25, 0.99  # times the changes of that quantile: at the end of a stuck time, and of none
@@ -32,7 +35,7 @@ _AGAIN, _AS_LONG = 3, 0.25  # other holds, of that share of its length
 def calm_hold(spell: Spell, wheel: str, judged: Mapping[str, Judged], still: float) -> bool:
     """Whether a held reading is no sign of a stuck sensor: what its command makes of it hardly changes, and all wheels hold theirs, or it often does.
 
-    A lone channel must hold what its command makes of it; its other holds may be anywhere.
+    A lone channel must hold what its command makes of it; its other holds may be anywhere. So must one of few counts, which no other one need hold.
 
     Parameters
     ----------
@@ -48,6 +51,8 @@ def calm_hold(spell: Spell, wheel: str, judged: Mapping[str, Judged], still: flo
     if spell.mode is not FaultMode.STUCK or spell.own or spell.kin:
         return False
     part, one = slice(spell.start, spell.stop), judged[wheel].wheel
+    if _on_a_count(judged[wheel], part):
+        return True
     if not _calm(one.blocks, part):
         return False
     others = [j.wheel.blocks for w, j in judged.items() if w != wheel]
@@ -111,6 +116,22 @@ def _back(f: Finding, samples: Samples) -> float:
     if not at.size or not outside.size or at[-1] + 1 >= change.size:
         return np.inf
     return float(change[at[-1] + 1]) / float(np.quantile(outside, _USUAL))
+
+
+def _on_a_count(one: Judged, part: slice) -> bool:
+    """Whether a reading of few counts is held where its command rests, at that command: at such a speed every sample has the same number of them."""
+    blocks, asked = one.wheel.blocks, one.data.asked
+    width = int(blocks.start[1]) if blocks.start.size > 1 else 1
+    steps = slice(part.start * width, part.stop * width)
+    known, told = one.wheel.samples.value, asked[steps]
+    told = told[round(_MOST[0] * told.size) : max(told.size - round(_ANSWER_S / one.wheel.dt), 1)]
+    count = rounding_step(known[np.isfinite(known)])
+    inside = (one.wheel.samples.step >= steps.start) & (one.wheel.samples.step < steps.stop)
+    if count <= 0.0 or not inside.any() or not told.size or not np.isfinite(told).all():
+        return False
+    held = float(np.nanmedian(known[inside]))
+    rests = float(np.ptp(told)) <= _CHANGES * abs(held)
+    return bool(rests and abs(held) <= _FEW * count and abs(held - float(np.median(told))) <= count)
 
 
 def _calm(blocks: Blocks, part: slice) -> bool:

@@ -15,6 +15,7 @@ from diagnosis.response.machine import Judged
 from diagnosis.response.models import HEALTHY, LEAST_P, NOISY, OTHER, SILENT
 from diagnosis.response.shaking import shaken
 from diagnosis.response.spells import Spell
+from diagnosis.response.stays import stays_though_told
 from diagnosis.response.wheel import Wheel
 from diagnosis.results.assessment import CODE, Assessment, Finding, Lack, Reason
 from diagnosis.results.evidence_columns import Pictured, steps_of
@@ -99,6 +100,9 @@ def sides_of(
             doubtful[spell.start : spell.stop] = False  # what came slowly is slip or load, no sensor's fault
     if not one.response.answered and one.speed is None:
         findings.extend(broken_off(wheel, one.others, limits.driving_speed))
+    if not one.response.answered:
+        told = stays_though_told(one, limits.driving_speed)
+        findings.extend(f for f in told if not any(f.start < g.stop and g.start < f.stop for g in (*findings, *drives)))
     there = np.isfinite(one.data.y)
     driving = np.repeat(one.driving, width)[:size]
     findings = without_doubles([*findings, *late, *lost_of(wheel, one.data.lost, driving)])

@@ -20,7 +20,7 @@ from replay.setup.contradictions import in_turn_with_commands, units_by_position
 from replay.setup.draft_notes import Draft
 from replay.setup.free_wheels import ask_about_drives
 from replay.setup.given import ask_about_odometry, given_signals, odometry, table_sources
-from replay.setup.lengths import largest_angle, limits_for, wheel_places, wheel_radius, with_speeds, without_size
+from replay.setup.lengths import largest_angle, wheel_places, wheel_radius, without_size
 from replay.setup.motion import WheelMotion, wheel_motion
 from replay.setup.numbered_wheels import ask_for_more_wheels, ask_for_numbers, ordered_by_turns
 from replay.setup.one_clock import lags
@@ -37,6 +37,7 @@ from replay.setup.structure import (
     preset_structure,
     steering_names,
 )
+from replay.setup.top_speed import limits_for, with_speeds
 from replay.setup.unstated_units import usual_units, valve_currents
 from replay.setup.unsure_signals import unsure_signals
 from replay.setup.unused_steering import ask_about_steering
@@ -182,6 +183,8 @@ def _finished(draft: Draft, logs: Sequence[RawLog]) -> Draft:
     machine = draft.machine
     draft.signals = map_signals(logs, machine)
     draft.questions += draft.signals.questions
+    used = {signal.source for signal in draft.signals.items.values()}
+    draft.idle = tuple(log.source for log in logs if log.source not in used) if used else ()
     return draft
 
 

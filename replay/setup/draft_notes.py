@@ -27,6 +27,8 @@ class Draft:
         Comments by section of the machine file.
     unpowered : tuple[str, ...]
         Wheels that may have no drive.
+    idle : tuple[str, ...]
+        Files of which no channel is used.
     """
 
     machine: Machine
@@ -35,6 +37,7 @@ class Draft:
     signals: Signals = field(default_factory=lambda: Signals({}, {}))
     notes: dict[str, list[str]] = field(default_factory=dict)
     unpowered: tuple[str, ...] = ()
+    idle: tuple[str, ...] = ()
 
     def say(self, section: str, text: str) -> None:
         """Add a sentence, also as a comment of a section."""

@@ -15,19 +15,24 @@ from replay.setup.draft_notes import Draft
 from replay.setup.odometry_frame import along_the_ground
 from replay.setup.one_clock import Lag
 from replay.setup.structure import ONE, Structure
+from replay.setup.topic_tables import odometry_column, signals_of_topics
 from replay.setup.vesc import motor_signals
 from replay.signals.candidate import message_field, source_of
 
 _DATED = 10**18  # ns; stamps before are of a clock without a date
 _TOGETHER = 5 * 10**9  # ns; tables of one recorder begin and end together
 _ALIKE = 2 * 10**8  # ns; the same of tables that count from their own start, which begin alike in any case
+_ANY = Structure(ONE, None).machine(1.0)
 _JOINT_TYPES = ("JointState", "DynamicJointState")
 
 
 def odometry(channels: Mapping[str, Channel]) -> Channel | None:
     """Speed of the body by odometry: of several topics not one whose speed is along an axis of the ground, nor one that is filtered."""
     found = [c for c in channels.values() if message_field(c) == "twist.twist.linear.x" and len(c.values) > 1]
-    return min(found, key=lambda c: (along_the_ground(c, channels), "filter" in c.topic, len(c.topic)), default=None)
+    if not found:
+        column = odometry_column(channels, _ANY)
+        return None if column is None else column[0]
+    return min(found, key=lambda c: (along_the_ground(c, channels), "filter" in c.topic, len(c.topic)))
 
 
 def ask_about_odometry(structure: Structure, channels: Mapping[str, Channel], draft: Draft) -> None:
@@ -69,33 +74,14 @@ def given_signals(
     given |= motor_signals(structure, channels)
     whole = odometry(channels)
     if structure.wheels == ONE and "odometry" in structure.how and whole is not None:
-        given["wheel.D.v"] = source_of(whole, "m/s")
-    for log in logs:
-        if len({c.topic for c in log.channels.values()}) == 1 and re.search(
-            r"cmd|command", PurePath(log.source).stem, re.I
-        ):
-            given |= _commands(log)
+        column = odometry_column(channels, _ANY)
+        given["wheel.D.v"] = column[1] if column is not None and column[0] is whole else source_of(whole, "m/s")
+    given |= {n: o for n, o in signals_of_topics(logs).items() if n not in given}
     if structure.wheels == ONE and "wheel.D.v_ref" not in given:
         asked = given.pop("cmd.v", None) or _command(channels)
         if asked is not None:
             given["wheel.D.v_ref"] = asked
     return given
-
-
-def _commands(log: RawLog) -> dict[str, SignalSource]:
-    """Commands in a table of their own, such as one topic of a bag written as CSV."""
-    words = {
-        "cmd.v": r"(linear[._]x|v|vx|speed|velocity)",
-        "cmd.omega": r"(angular[._]z|w|wz|omega|yaw_?rate)",
-    }
-    source = PurePath(log.source).name
-    found: dict[str, SignalSource] = {}
-    for signal, pattern in words.items():
-        for c in log.channels.values():
-            if not c.topic and re.fullmatch(rf"(.*\.)?{pattern}", c.name.strip(), re.I):
-                unit = "m/s" if signal == "cmd.v" else "rad/s"
-                found.setdefault(signal, SignalSource(column=c.name, unit=c.unit or unit, source=source))
-    return found
 
 
 def _command(channels: Mapping[str, Channel]) -> SignalSource | None:

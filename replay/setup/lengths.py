@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
-from replay.log.raw_log import RawLog
 from replay.log.source_options import SignalSource
-from replay.machine.config import Limits, Machine, haulotte
+from replay.machine.config import haulotte
 from replay.machine.geometry import Geometry, WheelGeometry
 from replay.machine.quantities import UNITS
 from replay.machine.units import known_unit
@@ -27,11 +25,9 @@ from replay.setup.unit_of_speeds import (
     unit_of_commanded_turns,
     unit_of_speeds,
 )
-from replay.signals.mapping import map_signals
 from replay.signals.name_words import english, tokens
-from replay.signals.signal import Signal, Signals
+from replay.signals.signal import Signals
 from replay.signals.to_si import peak_of
-from replay.signals.unit_doubts import per_minute
 
 _RADII, _TRACKS = (0.02, 2.5), (0.05, 4.0)  # m
 _BASES = 20.0  # m; the longest
@@ -241,63 +237,10 @@ def largest_angle(draft: Draft, structure: Structure, found: Signals) -> float:
         return usual
     reached = max((peak_of(s.values) for s in angles), default=0.0)
     value = float(_round(min(max(_HEADROOM * reached, 0.1), 1.6))) if reached else round(usual, 4)
-    draft.ask(
-        "geometry", f"how far do the wheels steer? max_steer = {value:g} rad is a fifth more than this log shows."
-    )
-    return value
-
-
-def with_speeds(draft: Draft, machine: Machine, logs: Sequence[RawLog]) -> Machine:
-    """The machine with the top speed that the log shows, and the limits that go with it."""
-    found = map_signals(logs, machine).items
-    measured, commanded = (
-        [s for n, s in found.items() if re.fullmatch(rf"wheel\.\w+\.{x}", n)] for x in ("v", "v_ref")
-    )
-    wheels = [*measured, *commanded]
-    reached = max(_usual_top(measured), _usual_top(commanded), _asked(found, machine))
-    top = float(_round(max(_HEADROOM * reached, _LEAST_SPEED)))
-    if reached > _ANY_MACHINE:
-        fast = [
-            s for s in (*filter(None, [found.get("cmd.v"), found.get("cmd.omega")]), *wheels) if _top(s) > _ANY_MACHINE
-        ]
-        slow = top * UNITS["mm/s"][1]
-        turns = bool(fast) and all(per_minute(s.origin.label) for s in fast)
-        by_mm = _SLOW <= slow <= _STANDS_IN and not turns and not any(s.origin.unit for s in fast)
-        stands_in = slow if by_mm else _STANDS_IN
-        hint = f" (in mm/s it would be {reached * UNITS['mm/s'][1]:.3g} m/s)" if by_mm else ""
-        if turns:  # and what they are multiplied by is a guess
-            hint += '; their names speak of turns per minute: unit = "rpm", with the size of the wheels in wheel_diameter and gear_ratio'
-        named = ", ".join(s.origin.label for s in fast) or "the speeds"
-        draft.ask(
-            "geometry",
-            f"in which unit {'is' if len(fast) == 1 else 'are'} {named}? As they are taken the machine reaches "
-            f"{reached:.3g} m/s, as none does{hint}; give it under [signals]. max_speed = {stands_in:g} m/s stands in.",
-        )
-        return replace(machine, max_speed=stands_in, limits=limits_for(stands_in), assumed=())
+    more = abs(value - _HEADROOM * reached) < 0.01 * value
+    how = "is a fifth more than" if more else "stands in, and is no measure beside"
     draft.ask(
         "geometry",
-        f"how fast can it go? max_speed = {top:g} m/s is a fifth more than this log shows; limits grow and shrink with it.",
+        f"how far do the wheels steer? max_steer = {value:g} rad {how} the {reached:.3g} rad that this log shows.",
     )
-    return replace(machine, max_speed=top, limits=limits_for(top), assumed=())
-
-
-def limits_for(top: float) -> Limits:
-    """Limits that grow and shrink with the top speed [m/s], as those of a machine file do that leaves them out."""
-    usual, share = Limits(), top / haulotte().max_speed
-    return replace(usual, driving_speed=round(usual.driving_speed * share, 9), min_sat=round(usual.min_sat * share, 9))
-
-
-def _asked(found: Mapping[str, Signal], machine: Machine) -> float:
-    v, omega = found.get("cmd.v"), found.get("cmd.omega")
-    side = max((abs(p.y) for p in machine.geometry.wheels.values()), default=0.0) if machine.geometry else 0.0
-    return (0.0 if v is None else _top(v)) + (0.0 if omega is None else side * _top(omega) / 2)
-
-
-def _usual_top(wheels: Sequence[Signal]) -> float:
-    """Top speed [m/s] of the middle one: one wheel alone is no measure, its sensor may have been wild."""
-    tops = sorted(_top(s) for s in wheels)
-    return tops[(len(tops) - 1) // 2] if tops else 0.0
-
-
-def _top(signal: Signal) -> float:
-    return peak_of(signal.values)
+    return value

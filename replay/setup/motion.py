@@ -97,6 +97,13 @@ def held(signal: Signal, at: NDArray[np.int64]) -> Array:
     return np.where(index >= 0, signal.values[np.maximum(index, 0)], np.nan)
 
 
+def correlation(one: Signal, other: Signal) -> float:
+    """Correlation of a signal with another one [1], at the stamps of the former; 0 where either hardly changes, or is too short."""
+    a, b = np.asarray(one.values, np.float64), held(other, one.stamps)
+    known = np.isfinite(a) & np.isfinite(b)
+    return _correlation(a[known], b[known]) if np.count_nonzero(known) >= _LEAST else 0.0
+
+
 def _trimmed(x: Array, y: Array) -> tuple[float, Array]:
     """Least squares without the samples that fit worst: share explained, and the coefficients."""
     kept = np.ones(len(y), np.bool_)

@@ -15,6 +15,7 @@ from replay.signals.name_parts import end_of, index_of, is_steering, position, w
 from replay.signals.name_words import tokens
 from replay.signals.named_units import bare_name
 from replay.signals.rules import candidates
+from replay.signals.unsure_body import steering_letters
 from replay.signals.unsure_names import unsure
 
 FOUR, SIX = ("FR", "FL", "RR", "RL"), ("FR", "FL", "MR", "ML", "RR", "RL")
@@ -229,7 +230,7 @@ def _covered(channels: Mapping[str, Channel], wheels: tuple[str, ...], by_name: 
 
 def steering_names(channels: Mapping[str, Channel]) -> set[str]:
     """Names of channels and joints of a log that speak of steering. `channels` by name."""
-    names = set()
+    names = {*steering_letters(channels)}
     for c in channels.values():
         inner = re.search(r"\[([^\[\]]+)\]$", c.field)
         name = inner[1] if inner and c.topic else c.name

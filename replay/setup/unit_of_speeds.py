@@ -70,8 +70,10 @@ def unit_of_speeds(
     if abs(gain - 1) <= DIFFERS:
         return None
     if abs(gain * UNITS["mm/s"][1] - 1) <= DIFFERS:
-        for n in (*names, *_alike(found, names, origins)):
+        bodies = _bodies_alike(found, names, origins)
+        for n in (*names, *_alike(found, names, origins), *bodies):
             origins[n] = replace(origins[n], unit="mm/s")
+        labels = ", ".join((labels, *(origins[n].label for n in bodies)))
         draft.ask("signals", f"are {labels} in mm/s? None is stated; {how}.")
         return None
     turns = all(per_minute(origins[n].label) for n in names)  # n_ist, Drehzahl: hardly anybody counts these in rad/s
@@ -113,6 +115,13 @@ def _alike(found: Signals, names: Sequence[str], origins: Mapping[str, SignalSou
         sizes = [peak_of(found.items[n].values) / max(peak_of(found.items[v].values), 1e-9) for v, n in others]
         out += [n for _, n in others] if all(0.4 < size < 2.5 for size in sizes) else []
     return out
+
+
+def _bodies_alike(found: Signals, names: Sequence[str], origins: Mapping[str, SignalSource]) -> list[str]:
+    """Measured speeds of the body without a unit, which are as large as those of the wheels: they have the same one."""
+    usual = max(float(np.median([peak_of(found.items[n].values) for n in names])), 1e-9)
+    bare = [n for n in ("odom.v", "gnss.speed") if n in found.items and n in origins and not origins[n].unit]
+    return [n for n in bare if 0.4 < peak_of(found.items[n].values) / usual < 2.5]
 
 
 def by_their_mean(found: Signals, names: Sequence[str], origins: Mapping[str, SignalSource]) -> float | None:

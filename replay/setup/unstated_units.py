@@ -10,18 +10,21 @@ import numpy as np
 from replay.log.raw_log import Channel
 from replay.log.source_options import SignalSource
 from replay.machine.config import Machine
-from replay.machine.quantities import DOUBTED_UNITS
+from replay.machine.quantities import DOUBTED_UNITS, UNITS
 from replay.machine.signal_table import quantity_of
+from replay.machine.units import known_unit
 from replay.setup.draft_notes import Draft
+from replay.setup.motion import correlation
 from replay.signals.candidate import source_of
 from replay.signals.name_parts import first_indices
 from replay.signals.named_units import bare_name
 from replay.signals.signal import Signal, Signals
 from replay.signals.symbol_rules import is_measured, valve_current
 from replay.signals.to_si import peak_of
+from replay.signals.unit_doubts import per_minute
 
 #: By quantity: the unit, from and up to which largest value it is taken, and what the values would be in SI.
-_USUAL = {
+USUAL_UNITS = {
     "fraction": ("%", 1.5, 150.0, "fractions of full opening"),
     "angle": ("deg", 3.2, 180.0, "radians"),
     "rotation": ("deg/s", 6.3, 400.0, "rad/s"),
@@ -32,6 +35,9 @@ _MIDDLE_MA = 12.0
 _OVER = 1.1  # of full opening, which no command exceeds
 _TOO_FAST = 100.0  # m/s
 _SPEEDS = ("v", "v_ref", "v_true")
+_BODY = ("cmd.v", "odom.v", "gnss.speed")
+_LEAST_ALIKE, _MOST_ALIKE = 0.4, 2.5  # by which speeds of one unit differ in size
+_GOES_WITH = 0.5  # correlation of a command and what answers it
 
 
 def valve_currents(
@@ -135,7 +141,7 @@ def usual_units(draft: Draft, found: Signals) -> Mapping[str, SignalSource]:
         As found by their names, SI where no unit is stated.
     """
     out = dict(_millimetres(draft, found))
-    for quantity, (unit, least, most, si) in _USUAL.items():
+    for quantity, (unit, least, most, si) in USUAL_UNITS.items():
         bare = {
             n: s
             for n, s in found.items.items()
@@ -145,11 +151,15 @@ def usual_units(draft: Draft, found: Signals) -> Mapping[str, SignalSource]:
         commanded = max((peak_of(s.values) for n, s in bare.items() if n.endswith(".u")), default=0.0)
         if not (least < peak or (quantity == "fraction" and commanded > _OVER)) or peak > most:
             continue
+        if quantity != "fraction":
+            in_si = _in_si_already(bare, unit, peak)
+            bare = {n: s for n, s in bare.items() if n not in in_si}
         named = ", ".join(s.origin.label for s in bare.values())
         doubted, asked = _other_unit(bare, peak) if quantity == "fraction" else (None, "")
         out |= {n: replace(s.origin, unit=doubted or unit) for n, s in bare.items()}
         draft.ask(
-            "signals", f"are {named} in {unit}{asked or '?'} None is stated; in {si} they would reach {peak:.3g}."
+            "signals",
+            f"{'is' if len(bare) == 1 else 'are'} {named} in {unit}{asked or '?'} None is stated; in {si} {'it' if len(bare) == 1 else 'they'} would reach {peak:.3g}.",
         )
     return out
 
@@ -168,14 +178,34 @@ def _other_unit(bare: Mapping[str, Signal], peak: float) -> tuple[str | None, st
 
 
 def _millimetres(draft: Draft, found: Signals) -> Mapping[str, SignalSource]:
-    """Commanded and measured speeds without a unit that are as large as each other, and such as no machine has in m/s."""
-    asked = found.items.get("cmd.v")
-    if asked is None or asked.origin.unit or not _TOO_FAST < (most := peak_of(asked.values)) <= _TOO_FAST * 100:
-        return {}
+    """Speeds without a unit, of body and wheels, that are as large as each other, and such as no machine has in m/s."""
+    body = {n: s for n in _BODY if (s := found.items.get(n)) is not None and not s.origin.unit}
+    most = next((p for s in body.values() if _TOO_FAST < (p := peak_of(s.values)) <= _TOO_FAST * 100), 0.0)
     wheels = {n: s for n, s in found.items.items() if n.startswith("wheel.") and n.rpartition(".")[2] in _SPEEDS}
-    if not wheels or any(s.origin.unit or not 0.4 < peak_of(s.values) / most < 2.5 for s in wheels.values()):
+    stated = bool(wheels) and all(known_unit(s.origin.unit) == "mm/s" for s in wheels.values())
+    alike = {n: s for n, s in body.items() if _as_large(s, most)} | ({} if stated else wheels)
+    if not most or not wheels or any(s.origin.unit or per_minute(s.origin.label) for s in alike.values()):
         return {}
-    alike = {"cmd.v": asked, **wheels}
+    for leaf in _SPEEDS:  # a wheel that reads a share, or nothing, is recorded as the others are
+        scale = 1.0 / UNITS["mm/s"][1] if stated else 1.0  # to what was recorded
+        tops = sorted(peak_of(s.values) * scale for n, s in wheels.items() if n.endswith(f".{leaf}"))
+        if tops and not _LEAST_ALIKE < tops[len(tops) // 2] / most < _MOST_ALIKE:
+            return {}
     named = ", ".join(s.origin.label for s in alike.values())
-    draft.ask("signals", f"are {named} in mm/s? None is stated; in m/s they would reach {most:.3g}.")
+    one = len(alike) == 1
+    draft.ask(
+        "signals",
+        f"{'is' if one else 'are'} {named} in mm/s{', as the wheels are' if stated else ''}? None is stated; in m/s {'it' if one else 'they'} would reach {most:.3g}.",
+    )
     return {n: replace(s.origin, unit="mm/s") for n, s in alike.items()}
+
+
+def _as_large(signal: Signal, most: float) -> bool:
+    return most > 0 and _LEAST_ALIKE < peak_of(signal.values) / most < _MOST_ALIKE
+
+
+def _in_si_already(bare: Mapping[str, Signal], unit: str, most: float) -> list[str]:
+    """Signals that go with the largest one, and read what it does in SI: the others alone are in another unit."""
+    first = max(bare.values(), key=lambda s: peak_of(s.values))
+    factor = UNITS[unit][1]
+    return [n for n, s in bare.items() if _as_large(s, most * factor) and abs(correlation(first, s)) > _GOES_WITH]

@@ -28,7 +28,7 @@ from replay.signals.signal import FILE_NAMES, Signal, Signals
 from replay.signals.steering_command import turn_by_steering
 from replay.signals.to_si import Converted, choose_motor_or_wheel, convert, usable_unit
 from replay.signals.unfilled import unfilled, unfilled_note
-from replay.signals.unit_doubts import Doubt, doubt, questions
+from replay.signals.unit_doubts import Doubt, agreed, doubt, questions
 from replay.signals.unsure_kinds import Unsure
 from replay.signals.unsure_names import NOT_USED, unsure
 
@@ -142,7 +142,7 @@ def map_signals(logs: Sequence[RawLog], machine: Machine) -> Signals:
     order = {name: i for i, name in enumerate((*machine.canonical_signals(), *machine.signals))}
     items = dict(sorted(draft.items.items(), key=lambda item: order[item[0]]))
     store = logs[0].store if logs else ColumnStore()
-    asked = questions(draft.doubts, items)
+    asked = questions(agreed(draft.doubts, items, machine), items)
     numbered = by_number(items, machine)
     if numbered:
         draft.notes.append(

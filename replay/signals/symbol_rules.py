@@ -54,8 +54,12 @@ _PLAIN = (
     )
 )
 _ANGLES = frozenset(("deg", "grad"))  # units
-#: Forward speed by an odometry: ``odom_v``, ``odom_linear_x``, ``odometry_speed``.
-_ODOMETRY = re.compile(r"(?:^|_)odom(?:etry)?_(?:twist_)*(?:v|vx|speed|(?:vel|velocity|lin|linear)(?:_x)?)$")
+#: Words of the forward speed by an odometry: ``odom_v``, ``odom_linear_x``, ``speed_odom``; each of such a name, and one of those that say a speed.
+_ODOMETRY, _FORWARD = (
+    frozenset(("odom", "odometry")),
+    frozenset(("v", "vx", "speed", "velocity", "vel", "linear", "lin")),
+)
+_OF_ODOMETRY = _ODOMETRY | _FORWARD | MEASURED | {"twist", "x", "forward", "fwd", "body", "base"}
 _TURN = frozenset(("dreh", "drehung", "turn", "turning", "rotation", "rot", "wende"))
 _OMEGA = frozenset(("w", "omega", "wz", "yaw", "yaw_rate", "angular", "turn"))  # that say so beside a word that asks
 _RATES = frozenset(("speed", "velocity", "vel", "rate", "z"))
@@ -263,6 +267,14 @@ def _is_yaw_rate(last: Sequence[str], unit: str, alone: bool) -> bool:
     return alone and known_unit(unit) in (None, "rad/s", "deg/s") and bool(bare & _OMEGA) and bare <= _OMEGA | _RATES
 
 
+def _is_odometry(words: Sequence[str]) -> bool:
+    """Whether words speak of the forward speed by an odometry: of no position, other axis, or turn behind whatever machine's it is."""
+    first = next((i for i, w in enumerate(words) if w in _ODOMETRY), None)
+    if first is None or not {*words[first:]} <= _OF_ODOMETRY:
+        return False
+    return bool(_FORWARD & {*words[first:]}) or (bool(_FORWARD & {*words}) and {*words} <= _OF_ODOMETRY)
+
+
 def _by_word(channel: Channel, text: str, last: Sequence[str], unit: str, turns_alone: bool) -> Iterator[Candidate]:
     """Yield signals of the whole machine by words of their symbol; `turns_alone`: ω asked for is the machine's, not of its only wheel."""
     if re.search(r"wheel|steer|valve|axle", text) or any(is_place(w) and w != "fwd" for w in last):
@@ -284,9 +296,7 @@ def _by_word(channel: Channel, text: str, last: Sequence[str], unit: str, turns_
         and {*last} - {*tokens(unit)} <= _WHOLE
     ):
         signal = "cmd.v"
-    elif (
-        signal is None and not asks and _ODOMETRY.search("_".join(w for w in text.split("_") if w not in tokens(unit)))
-    ):
+    elif signal is None and asks in ("", "act") and _is_odometry([w for w in text.split("_") if w not in tokens(unit)]):
         signal = "odom.v"
     if signal is not None:
         yield Candidate(signal, source_of(channel, unit), 9 if named else 10, f"{channel.name} by its name")

@@ -26,6 +26,7 @@ from replay.signals.to_si import factor_of, magnitudes, peak_of
 
 _TOO_FAST = 3.0
 _WIDE = 1.5
+_WILD = 3.0  # times the usual one of the signals recorded alike
 _MOST_VOLTS = 10.5  # what an analogue signal of 10 V may reach
 _CURRENT = (3.5, 21.0)  # mA; what a signal of 4 to 20 mA keeps between
 _MOST_OF_IT = 0.2  # of the samples other than zero lie beyond the limit: no spikes
@@ -83,7 +84,9 @@ def _mostly_beyond(values: NDArray[Any], limit: float) -> bool:
     return bool(len(moving) and np.count_nonzero(moving > limit) >= _MOST_OF_IT * len(moving))
 
 
-def doubt(signal: str, values: NDArray[np.float64], origin: SignalSource, machine: Machine) -> Doubt | None:
+def doubt(
+    signal: str, values: NDArray[np.float64], origin: SignalSource, machine: Machine, fastest: float = 0.0
+) -> Doubt | None:
     """Return what is wrong with a signal that is too large for the machine; None where nothing is.
 
     Parameters
@@ -96,15 +99,55 @@ def doubt(signal: str, values: NDArray[np.float64], origin: SignalSource, machin
         How it was recorded, with the unit that was used.
     machine : Machine
         Its limits.
+    fastest : float
+        What the fastest of the speeds reaches that were recorded as this one [m/s]: they have one unit. 0: this one's.
     """
     quantity, peak = quantity_of(signal), peak_of(values)
     if quantity == "speed" and not signal.startswith("gnss") and peak > _TOO_FAST * machine.max_speed:
-        return _too_fast(signal, values, peak, origin, machine)
+        return _too_fast(signal, values, fastest or peak, origin, machine)
     if quantity == "fraction" and not signal.endswith(".psi") and peak > _WIDE * machine.control.u_max:
         return _too_open(signal, values, peak, origin, machine)
     if quantity == "angle" and signal.startswith("steer.") and peak > 2 * max(machine.max_steer, 0.1):
         return _too_far(signal, values, peak, origin, machine)
     return None
+
+
+def agreed(doubts: Sequence[Doubt], items: Mapping[str, Signal], machine: Machine) -> list[Doubt]:
+    """The doubts, those of speeds that were recorded alike with one answer for all of them: that of the fastest, which has to fit.
+
+    A reading that is several times as large as those of most others is wild, and is no measure of their unit.
+
+    Parameters
+    ----------
+    doubts : Sequence[Doubt]
+        Of all signals of a mission, each by itself.
+    items : Mapping[str, Signal]
+        The signals by name.
+    machine : Machine
+        Its limits.
+    """
+    alike: dict[tuple[str, bool, str, float], list[str]] = {}
+    for d in doubts:
+        if quantity_of(d.signal) == "speed":
+            alike.setdefault(_recorded(items[d.signal]), []).append(d.signal)
+    fastest: dict[str, float] = {}
+    for names in alike.values():
+        peaks = sorted(peak_of(items[n].values) for n in names)
+        usual = peaks[(len(peaks) - 1) // 2]
+        fastest |= dict.fromkeys(names, max(p for p in peaks if p <= _WILD * usual))
+    out = []
+    for d in doubts:
+        s = items[d.signal]
+        same = doubt(d.signal, s.values, s.origin, machine, fastest[d.signal]) if d.signal in fastest else None
+        out.append(d if same is None else replace(d, line=same.line))
+    return out
+
+
+def _recorded(signal: Signal) -> tuple[str, bool, str, float]:
+    """What speeds have in common that have one unit; a Twist is in m/s by definition."""
+    origin = signal.origin
+    unit = known_unit(origin.unit) or ("twist" if _LINEAR.search(origin.field or "") else "")
+    return unit, origin.derivative, origin.at, abs(origin.gain)
 
 
 def _too_fast(signal: str, values: NDArray[np.float64], peak: float, origin: SignalSource, machine: Machine) -> Doubt:
@@ -151,16 +194,17 @@ def _fitting_speed(signal: str, peak: float, origin: SignalSource, machine: Mach
         ways_to_try = ([tried for tried in turns if tried.unit == "rpm"], *ways_to_try)
     for k, ways in enumerate(ways_to_try):
         # what its name says may be slow: neither top speed nor wheel size need be known yet
-        best, most = "", 0.0 if named and k == 0 else 0.1 * machine.max_speed
+        least = 0.0 if named and k == 0 else 0.1 * machine.max_speed
+        reached: list[tuple[float, str]] = []
         for tried in ways:
             try:
-                reached = recorded * abs(factor_of(signal, tried, machine))
+                speed = recorded * abs(factor_of(signal, tried, machine))
             except ConfigError:
                 continue
-            if most < reached <= _WIDE * machine.max_speed:
-                best, most = signal_line(signal, tried), reached
-        if best:
-            return best
+            if least < speed <= _WIDE * machine.max_speed:
+                reached.append((speed, signal_line(signal, tried)))
+        if reached:  # the one that is nearest to the top speed, by its factor
+            return min(reached, key=lambda r: abs(np.log(r[0] / machine.max_speed)))[1]
     return ""
 
 

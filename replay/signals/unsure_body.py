@@ -72,18 +72,22 @@ def over_ground(channels: Mapping[str, Channel]) -> Iterator[tuple[str, str, str
             yield "gnss.speed", name, unit
 
 
-def angles(channels: Mapping[str, Channel], machine: Machine) -> Iterator[tuple[str, str, str, bool]]:
+def angles(
+    channels: Mapping[str, Channel], machine: Machine, letters: Mapping[str, str]
+) -> Iterator[tuple[str, str, str, bool]]:
     """Yield signal, name, unit and whether it is the driver's wheel, of columns that may be angles of an axle: ``delta_rear``, ``steer_pos_rear``.
 
-    `channels`: by name, of which nothing else is known, of messages the driver's wheel alone; `machine` has the axles.
+    `channels`: by name, of which nothing else is known, of messages the driver's wheel alone; `machine` has the axles; `letters`: of `steering_letters`.
     """
     for name, channel in channels.items():
         words, unit = _words(channel)
-        asked = role([*words])
+        asked = letters.get(name, role([*words]))
         axle = axle_of(bare_name(name)[0], machine)
+        if axle is None and name in letters and len(machine.axles) == 1:
+            axle = machine.axles[0]
         if axle is None or not _ANGLES & words or not words <= _ANGLES | _OF_ANGLES or asked == "both":
             continue
-        if not is_steering(name) and end_of(name) is None:
+        if not is_steering(name) and end_of(name) is None and name not in letters:
             continue
         most = _most(channel)
         drivers = "steer" in words and bool({"wheel", "rad"} & words)
@@ -95,6 +99,38 @@ def angles(channels: Mapping[str, Channel], machine: Machine) -> Iterator[tuple[
             unit = "rad" if most <= _RADIANS else "deg"
         if unit:
             yield f"steer.{axle}.{'phi_ref' if asked == 'ref' else 'phi'}", name, unit, drivers
+
+
+def steering_letters(channels: Mapping[str, Channel]) -> dict[str, str]:
+    """Columns that call a car's steering by its letter, δ, each with ``ref`` where it is asked for and ``act`` where it is measured.
+
+    ``command_delta`` is asked for, and ``delta`` too where nothing else speaks of steering: so most such logs are written, and what is commanded
+    alone is no part that could be judged. A difference of something else (``delta_t``, ``delta_v``) has a word for it, and one of nothing said keeps to one
+    sign, or is larger than an angle of steering.
+
+    Parameters
+    ----------
+    channels : Mapping[str, Channel]
+        By name.
+    """
+    roles: dict[str, str] = {}
+    for name, channel in channels.items():
+        words, unit = _words(channel)
+        if (
+            channel.topic
+            or position(bare_name(name)[0]) != (None, None)
+            or words - ASKING - MEASURED - {"angle", "rad"} != {"delta"}
+            or role([*words]) == "both"
+        ):
+            continue
+        known, quantity = _known(channel), UNITS[u][0] if (u := known_unit(unit)) else ""
+        most = _TURN_DEG if u == "deg" else _RADIANS
+        turns = known.size > 1 and known.min() < 0.0 < known.max() and float(np.abs(known).max()) <= most
+        if turns and quantity == ("angle" if unit else ""):
+            roles[name] = role([*words])
+    if any(is_steering(name) for name in channels):  # then a bare one may be anything
+        return {name: said for name, said in roles.items() if said}
+    return {name: said or ("act" if "ref" in roles.values() else "ref") for name, said in roles.items()}
 
 
 def openings(

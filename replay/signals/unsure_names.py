@@ -32,7 +32,7 @@ from replay.signals.named_units import bare_name, unit_by_end
 from replay.signals.rules import MESSAGE_TYPES, candidates
 from replay.signals.second_ones import number_of, seconds
 from replay.signals.symbol_rules import valve_current
-from replay.signals.unsure_body import angles, openings, over_ground, places, turns
+from replay.signals.unsure_body import angles, openings, over_ground, places, steering_letters, turns
 from replay.signals.unsure_kinds import Open, Unsure
 from replay.signals.unsure_openings import unsure_opening
 
@@ -109,7 +109,7 @@ def _beside_others(
     for signal, name in places(free):
         yield Unsure(signal, source_of(free[name], "deg"), Open.PLACE)
     every = {**free, **fields}
-    for signal, name, unit, drivers in angles(every, machine):
+    for signal, name, unit, drivers in angles(every, machine, steering_letters({**columns, **fields})):
         yield Unsure(signal, source_of(every[name], unit), Open.DRIVERS if drivers else Open.ANGLE)
     for signal, name, unit in openings(columns, machine, named):
         if name in free:

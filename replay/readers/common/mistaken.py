@@ -17,6 +17,7 @@ _NAMED = 5
 _NUMBER = re.compile(r"[+-]?(\d+([.,]\d*)?|[.,]\d+)([eE][+-]?\d+)?")
 _LEAST_LINES = 4  # of a table of one column
 _PAGE = re.compile(rb"\s*(<!doctype html|<html)", re.IGNORECASE)
+_DESCRIPTION = re.compile(rb"\s*rosbag2_bagfile_information:")
 #: First bytes, what they are of, and what to do.
 _KINDS = (
     (b"\x1f\x8b", "a gzip archive", "unpack it and give what is in it"),
@@ -85,6 +86,8 @@ def mistaken(path: Path) -> str:
         return f"{path} is a tar archive, not a log; unpack it and give what is in it"
     if _PAGE.match(head):
         return f"{path} is a web page, not a log: the download gave a page in its place; download the file itself"
+    if _DESCRIPTION.match(head):
+        return f"{path} describes a rosbag2 recording and holds none of its messages; give the folder that it stands in: {path.parent}"
     return _one_column(path, head)
 
 

@@ -6,6 +6,8 @@ import json
 import tomllib
 from pathlib import Path
 
+import numpy as np
+import pandas as pd
 import pytest
 
 from cli.main import run
@@ -112,3 +114,18 @@ def test_units_that_cannot_be_stop_with_the_line(
         assert 'write: "wheel.FR.v" = {' in said
     assert run(["channels", str(robot_log), "-m", str(file)]) == 0
     assert "To be answered before anything is judged" in capsys.readouterr().out
+
+
+def test_the_next_command_leaves_out_what_would_stop_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A file of which nothing is used ends a diagnosis with code 3; the commands that were printed had it."""
+    t = np.arange(1200) * 0.05
+    v = np.sin(0.3 * t)
+    drive, more = tmp_path / "drive.csv", tmp_path / "more.csv"
+    pd.DataFrame({"time": t, "left_speed": v, "right_speed": v, "cmd_v": v}).to_csv(drive, index=False)
+    pd.DataFrame({"time": t, "a": v}).to_csv(more, index=False)
+    file = tmp_path / "machine.toml"
+    assert run(["config", "init", "--log", str(drive), "--log", str(more), "-o", str(file)]) == 0
+    out = " ".join(capsys.readouterr().out.split())
+    assert f"none of its channels is used: {more}" in out
+    assert f"mfhca diagnose {drive} -m {file}" in out
+    assert f"mfhca config check {file} --log {drive} mfhca" in out

@@ -46,3 +46,16 @@ def test_a_correlation_that_is_hardly_larger_tells_no_delay(
     monkeypatch.setattr(measure, "_alike", alike)
     speed = np.outer(np.arange(50.0), [0.0, 0.0, 0.0, 1.0])
     assert late(speed, speed, DT)[3] == pytest.approx(delay)
+
+
+@pytest.mark.parametrize("wheel", [0, 1])
+def test_of_two_wheels_the_later_one_is_late_by_all_of_it(wheel: int) -> None:
+    """Each had been "later" by half of it, the sound one too."""
+    rng = np.random.default_rng(4)
+    command = np.repeat(rng.uniform(-1.0, 1.0, 40), round(2.0 / DT))
+    speed = np.column_stack([command, command])
+    delay = round(0.5 / DT)
+    speed[:, wheel] = np.r_[np.zeros(delay), command[:-delay]]
+    assert late(speed, np.column_stack([command] * 2), DT) == [
+        pytest.approx(0.5 if i == wheel else 0.0, abs=DT) for i in range(2)
+    ]

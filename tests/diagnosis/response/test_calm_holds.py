@@ -53,3 +53,28 @@ def test_a_lone_speed_that_ends_where_it_was_held_may_be_a_machine_that_goes_on(
     assert found
     assert all(f.side is Side.SENSOR for f in found)
     assert (max(f.probability for f in found) < 0.6) is back
+
+
+def counted(asked_later: float) -> list[str]:
+    """Wheels that are stuck of a short drive that turns on the spot for three seconds, in which its right wheel has four counts in each sample; then it may be told otherwise."""
+    rng, n, count, track = np.random.default_rng(5), 380, 0.04, 0.4
+    spin = slice(240, 300)
+    v, turn = np.full(n, 0.5), np.zeros(n)
+    v[:20], v[spin.start - 10 : spin.stop], turn[spin.start - 10 : spin.stop] = 0.0, 0.0, 0.8
+    measured, asked = {}, {"R": v + 0.5 * track * turn, "L": v - 0.5 * track * turn}
+    for w, x in asked.items():
+        moved = np.cumsum((x + rng.normal(0.0, 0.005, n) * (x != 0.0)) * DT)
+        measured[w] = np.round(np.diff(np.floor(moved / (count * DT)), prepend=0.0) * count, 6)
+    measured["R"][spin] = 4.0 * count
+    v[spin.stop - 30 : spin.stop] += asked_later
+    asked["R"][spin.stop - 30 : spin.stop] += asked_later
+    return [w for w, _ in stuck(measured, asked, np.column_stack([v, turn]))]
+
+
+def test_a_speed_of_few_counts_that_is_told_to_stay_is_no_stuck_sensor() -> None:
+    """At 4.0 counts in a sample each has four; a healthy sensor had been stuck for three seconds (p = .94, stop)."""
+    assert counted(0.0) == []
+
+
+def test_one_of_few_counts_that_stays_while_it_is_told_otherwise_is() -> None:
+    assert counted(0.4) == ["R"]

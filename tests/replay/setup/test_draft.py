@@ -523,3 +523,28 @@ def test_wheels_that_the_draft_does_not_have_are_asked_for(tmp_path: Path) -> No
     assert ", ".join(names[2:]) in asked
     (tmp_path / "m.toml").write_text(machine_text(draft, "six.csv"))
     assert any(q.startswith("which wheels are left_2_speed") for q in load_machine(tmp_path / "m.toml").questions)
+
+
+def top_speed(tmp_path: Path, columns: dict[str, Any]) -> tuple[float, str]:
+    pd.DataFrame({"time": np.arange(600) * 0.05, **columns}).to_csv(tmp_path / "run.csv", index=False)
+    draft = draft_machine(read_everything([tmp_path / "run.csv"]))
+    return draft.machine.max_speed, next(q for q in draft.questions if q.startswith("how fast can it go?"))
+
+
+def test_the_top_speed_is_a_fifth_more_than_what_the_sentence_says(tmp_path: Path) -> None:
+    """It was a fifth more than the slower of two wheels, or than half of the turns that were asked for."""
+    v, turn = np.repeat([0.2, 0.3, 0.4], 200), np.repeat([0.8, -0.4, 0.8], 200)
+    wheels = {"left_speed [m/s]": v - 0.2 * turn, "right_speed [m/s]": v + 0.2 * turn}
+    top, said = top_speed(tmp_path, wheels)
+    assert top == pytest.approx(1.2 * 0.56, rel=0.01)
+    assert "0.672 m/s is a fifth more than the 0.56 m/s that its wheels reach" in said
+    top, said = top_speed(tmp_path, wheels | {"cmd_v [m/s]": 2.0 * v})
+    assert (top, "the 0.8 m/s" in said) == (pytest.approx(1.2 * 0.8, rel=0.01), True)
+
+
+def test_a_wild_wheel_and_a_log_without_motion_are_no_measure_of_the_top_speed(tmp_path: Path) -> None:
+    v = np.repeat([0.2, 0.3, 0.4], 200)
+    top, said = top_speed(tmp_path, {"left_speed [m/s]": v, "right_speed [m/s]": 50.0 * v})
+    assert (top, "the 0.4 m/s" in said) == (pytest.approx(0.48, rel=0.01), True)
+    top, said = top_speed(tmp_path, {"left_speed [m/s]": 0.01 * v, "right_speed [m/s]": 0.01 * v})
+    assert (top, "a fifth more" in said) == (0.05, False)

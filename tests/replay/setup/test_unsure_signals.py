@@ -110,3 +110,45 @@ def test_encoders_with_fractions_are_distances(tmp_path: Path) -> None:
     draft = drafted(tmp_path, columns)
     assert {draft.machine.signals[f"wheel.{w}.v"].unit for w in ("R", "L")} == {"m"}
     assert any("positions of the wheels" in q for q in draft.questions)
+
+
+def test_odometry_in_millimetres_has_the_unit_of_the_wheels_beside_it(tmp_path: Path) -> None:
+    """It was offered mm/s in one line, and read in m/s beside wheels in mm/s."""
+    speeds = {f"speed_{s}": 1000 * x for s, x in SIDES.items()} | {"odom_v": 1000 * V}
+    for command in ({"speed_cmd": 1000 * V}, {"speed_cmd": V}, {}):
+        signals = drafted(tmp_path, {**command, **speeds}).machine.signals
+        assert {n: signals[n].unit for n in ("wheel.L.v", "wheel.R.v", "odom.v")} == dict.fromkeys(
+            ("wheel.L.v", "wheel.R.v", "odom.v"), "mm/s"
+        )
+        assert "cmd.v" not in signals or signals["cmd.v"].unit == ("mm/s" if command["speed_cmd"].max() > 10 else "")
+
+
+def test_odometry_that_states_no_unit_beside_wheels_in_millimetres(tmp_path: Path) -> None:
+    speeds = {f"speed_{s} [mm/s]": 1000 * x for s, x in SIDES.items()}
+    draft = drafted(tmp_path, {"speed_cmd": V, **speeds, "odom_v": 1000 * V})
+    assert [draft.machine.signals[n].unit for n in ("odom.v", "cmd.v", "wheel.L.v")] == ["mm/s", "", "mm/s"]
+    assert any("is odom_v in mm/s, as the wheels are?" in q for q in draft.questions)
+
+
+def test_a_wheel_that_reads_a_share_has_the_unit_of_the_others(tmp_path: Path) -> None:
+    speeds = {"speed_left": 1000 * SIDES["left"], "speed_right": 100 * SIDES["right"]}
+    signals = drafted(tmp_path, {"speed_cmd": 1000 * V, **speeds}).machine.signals
+    assert {signals[n].unit for n in ("cmd.v", "wheel.L.v", "wheel.R.v")} == {"mm/s"}
+
+
+def test_odometry_in_metres_beside_wheels_in_millimetres_stays(tmp_path: Path) -> None:
+    speeds = {f"speed_{s}": 1000 * x for s, x in SIDES.items()} | {"odom_v": V}
+    signals = drafted(tmp_path, {"speed_cmd": V, **speeds}).machine.signals
+    assert (signals["wheel.L.v"].unit, signals["odom.v"].unit) == ("mm/s", "")
+
+
+def test_a_yaw_rate_in_degrees_leaves_a_command_in_radians_that_goes_with_it(tmp_path: Path) -> None:
+    """Both had become deg/s: a command of .8 rad/s was read as .014."""
+    turn = 0.8 * W
+    wheels = {f"speed_{s}": x for s, x in SIDES.items()}
+    columns = {"cmd_v": V, "cmd_omega": turn, "gyro_z": np.degrees(turn), **wheels}
+    draft = drafted(tmp_path, columns)
+    assert [draft.machine.signals[n].unit for n in ("cmd.omega", "imu.yaw_rate")] == ["", "deg/s"]
+    assert any("is gyro_z in deg/s? None is stated" in q for q in draft.questions)
+    both = drafted(tmp_path, columns | {"cmd_omega": np.degrees(turn)}).machine.signals
+    assert [both[n].unit for n in ("cmd.omega", "imu.yaw_rate")] == ["deg/s", "deg/s"]

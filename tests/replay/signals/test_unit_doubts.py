@@ -139,3 +139,16 @@ def test_a_wheel_that_runs_away_from_a_dead_speed_is_no_wrong_unit(dead: bool, a
         "wheel.FL.v_position": SignalSource(column="o", unit="rad", derivative=True),
     }
     assert bool(mapped(columns, given).questions) is asked
+
+
+@pytest.mark.parametrize("wild", [1.0, 20.0])
+def test_speeds_recorded_alike_get_one_unit_whatever_each_of_them_reaches(wild: float) -> None:
+    """Of wheels that reach 372 and 490 in mm/s one was offered deg/s and the other mm/s."""
+    small = replace(KNOWN.geometry, wheel_diameter=0.2)  # type: ignore[type-var]
+    machine = replace(KNOWN, wheels=("FR", "FL", "RR", "RL"), geometry=small, gear_ratio=1.0, max_speed=0.451)
+    sizes = {"FR": 372.0, "FL": 490.0, "RR": 376.0, "RL": 488.0 * wild}
+    given = {f"wheel.{w}.v": SignalSource(column=w, unit="m/s") for w in sizes}
+    found = mapped({w: size * WAVE for w, size in sizes.items()}, given, machine)
+    assert len(found.questions) == 4
+    assert all('unit = "mm/s"' in q for q in found.questions)
+    assert all("max_speed = 490 if" in q for q in found.questions)

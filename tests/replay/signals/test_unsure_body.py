@@ -157,3 +157,36 @@ def test_a_speed_over_ground_is_asked_for(name: str, unit: str) -> None:
     assert asked({name: np.abs(SPEED)}) == {name: ("gnss.speed", Open.GROUND, unit)}
     assert "gnss.speed" not in sure(name)
     assert asked({name: SPEED, "gps_speed": SPEED}) == {}
+
+
+@pytest.mark.parametrize("name", ["command_delta", "delta", "cmd_delta [rad]", "deltaRef", "steer.delta_cmd"])
+def test_a_cars_steering_by_its_letter_is_a_command(name: str) -> None:
+    assert asked({name: ANGLE, "wz": ANGLE})[name] == ("steer.rear.phi_ref", Open.ANGLE, "rad")
+
+
+def test_of_two_letters_the_one_that_asks_is_the_command() -> None:
+    said = asked({"delta": ANGLE, "delta_cmd": ANGLE})
+    assert [said[n][0] for n in ("delta", "delta_cmd")] == ["steer.rear.phi", "steer.rear.phi_ref"]
+
+
+@pytest.mark.parametrize(
+    ("name", "x"),
+    [
+        ("delta_t", ANGLE),
+        ("delta_v_cmd", ANGLE),
+        ("cmd_delta_time", ANGLE),
+        ("delta_x", ANGLE),
+        ("delta_pos", ANGLE),
+        ("delta", np.abs(ANGLE)),
+        ("delta", 5.0 * ANGLE + 1.0),
+        ("delta [m]", ANGLE),
+        ("delta [s]", ANGLE),
+        ("command_delta", 40.0 * ANGLE),
+    ],
+)
+def test_a_difference_of_something_is_no_steering(name: str, x: np.ndarray) -> None:
+    assert not any(said[0].startswith("steer.") for said in asked({name: x}).values())
+
+
+def test_a_letter_beside_a_steering_angle_may_be_anything() -> None:
+    assert "delta" not in asked({"delta": ANGLE, "steering_angle": ANGLE})

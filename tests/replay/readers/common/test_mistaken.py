@@ -109,3 +109,10 @@ def test_a_link_that_leads_nowhere_else_does_not_exist(tmp_path: Path) -> None:
     (tmp_path / "drive.bag").symlink_to(tmp_path / "gone.bag")
     with pytest.raises(LogError, match="does not exist"):
         open_log(tmp_path / "drive.bag")
+
+
+def test_the_description_of_a_recording_is_not_the_recording(tmp_path: Path) -> None:
+    (tmp_path / "metadata.yaml").write_text("rosbag2_bagfile_information:\n  version: 5\n", encoding="utf-8")
+    with pytest.raises(LogError, match=r"metadata\.yaml describes a rosbag2 recording .*give the folder") as caught:
+        open_log(tmp_path / "metadata.yaml")
+    assert str(caught.value).endswith(str(tmp_path))
