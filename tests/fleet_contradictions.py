@@ -13,13 +13,14 @@ from diagnosis.audit.fleet.leave import lists_of
 from diagnosis.audit.fleet.listed import listed_machines
 from diagnosis.audit.fleet.page.page import build_fleet_page
 from diagnosis.audit.fleet.table import fleet_csv
+from diagnosis.audit.fleet.words import TICK_UNITS, UNITS
 from diagnosis.results.candidates import UNCLEAR
 from diagnosis.results.vocabulary import Leave, Verdict
 
 
 def fleet_contradictions(document: FleetDocument) -> list[str]:
     """One sentence for each contradiction in a ``fleet.json`` and what is made of it; empty where there is none."""
-    checks = (_lists, _headline, _counts, _table, _endings, _words)
+    checks = (_lists, _headline, _counts, _table, _endings, _words, _units)
     return [text for check in checks for text in check(document)]
 
 
@@ -103,3 +104,21 @@ def _endings(document: FleetDocument) -> Iterator[str]:
     ]
     if told > places.count(False):
         yield f"{told} faults are said to be last seen before the end of their log, of {places.count(False)}"
+
+
+def _units(document: FleetDocument) -> Iterator[str]:
+    """The unit of the axis of trends: beside the ticks of each picture, and behind each time and distance in words."""
+    unit, words = TICK_UNITS[document["axis"]], UNITS[document["axis"]]
+    page = build_fleet_page(document)
+    for picture in re.findall(r'<svg class="trend".*?</svg>', page, flags=re.DOTALL):
+        ticks = re.findall(r'class="(?:mid|fin)">([^<%]*)<', picture)
+        found = {m.group(1) for tick in ticks if (m := re.search(r" ([^\d−]+)$", tick))}
+        if found != {unit}:
+            yield f"a trend over {words!r} has ticks in {sorted(found)}"
+    for text in (t["forecast"]["words"] for t in document["trends"] if t["forecast"]["state"] != "not_known"):
+        for number in re.finditer(r"(?<![\d.])\d[\d.]*(?! to \d)(?![\d.])", text):
+            if not text[number.end() :].startswith((f" {words}", " %")):
+                yield f"{number.group(0)} without its unit, {words!r}: {text!r}"
+    for between in re.findall(r"\([\d.]+ ([^)]*) apart\)", page):
+        if between != words:
+            yield f"missions {between!r} apart, of a trend over {words!r}"

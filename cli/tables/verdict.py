@@ -26,7 +26,7 @@ from diagnosis.results.vocabulary import Severity
 from replay.machine.quantities import OPENING
 
 _SHOWN, _FAULTS_NAMED, _ENDLESS = 40, 6, 10_000
-_OFTEN = 3  # spells of one part and row that stand on one line
+_OFTEN = 3  # spells of one part that are called the same, and stand on one line
 _WORDS, _SATURATION = (1, 2), 5  # columns of words, which may wrap between them, and the one that is needed least
 
 
@@ -159,10 +159,10 @@ def _faults(intervals: Sequence[IntervalRow], words: MachineWords) -> _Fitting:
 
 
 def _lines(intervals: Sequence[IntervalRow], most: int | None = _SHOWN) -> list[list[IntervalRow]]:
-    """Faults by the lines of the table: each by itself, but for those of one part and row that come again and again."""
+    """Faults by the lines of the table: each by itself, but for those of one part that are called the same and come again and again."""
     kinds: dict[tuple[str, ...], list[IntervalRow]] = {}
     for i in intervals:
-        kinds.setdefault((i["component"], i["side"], i["mode"], i["severity"]), []).append(i)
+        kinds.setdefault((i["component"], i["side"], label_of(i), i["severity"]), []).append(i)
     often = {id(i): same for same in kinds.values() if len(same) >= _OFTEN for i in same}
     out = [often.get(id(i), [i]) for i in intervals if id(i) not in often or often[id(i)][0] is i]
     return out[:most]
@@ -184,7 +184,7 @@ def _spells(same: Sequence[IntervalRow], words: MachineWords, bounds: bool) -> t
     return (
         name,
         part,
-        mode_text(best["mode"], f"{label_of(best).lower()}, {len(same)} times"),
+        mode_text(symbol_of(best), f"{label_of(best).lower()}, {len(same)} times"),
         f"{first:.2f}–{last:.2f}",
         *rest,
     )

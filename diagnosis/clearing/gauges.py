@@ -223,10 +223,8 @@ def _axles(cells: Cells) -> Iterator[Gauges]:
                 np.zeros(len(off), dtype=np.intp),
                 ((np.inf, np.inf),),
             )
-            others = np.delete(rates.whole, j)
-            if np.isfinite(rates.whole[j]) and np.isfinite(others).any():
-                ahead = float(rates.whole[j] - np.nanmedian(others))
-                lasting = _lasting(long + ahead, long - ahead)
+            if rates.ahead[j]:  # what the check of the mission compares
+                lasting = _lasting(long + min(rates.ahead[j]), long - max(rates.ahead[j]))
         still = Still(frame, np.abs(frame.mean(u)) >= limit) if _known(u) else None
         second_one = _reference(cells, name, (phi, x, axles.FLOOR_RAD), clear_at) if measured else None
         about = (Kind.STEER, name)

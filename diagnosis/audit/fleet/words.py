@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from diagnosis.audit.fleet.fleet_fault import FleetFault
 from diagnosis.audit.fleet.machines import Machine
@@ -26,7 +26,9 @@ _UNCLEARED = "No fault found, not cleared"
 _SHOWN = 3
 _NAMED = 12
 _WORK = (Verdict.STOP, Verdict.WATCH)  # verdicts that ask for work
-_UNITS = {"hours": "h of driving", "days": "days"}
+#: Unit of a trend's axis in words, and beside its ticks.
+UNITS: Mapping[Axis, str] = {"hours": "h of driving", "days": "days"}
+TICK_UNITS: Mapping[Axis, str] = {"hours": "h", "days": "days"}
 
 
 def count(n: int, word: str) -> str:
@@ -84,7 +86,7 @@ def share(value: float) -> str:
 
 def forecast_words(f: Forecast, limit: float, axis: Axis = "hours") -> str:
     """When a limit is reached, in one phrase. `limit` has the unit of the trend [1 for ε]."""
-    unit = _UNITS[axis]
+    unit = UNITS[axis]
     if f.state == "not_known":
         return f"not known: {f.why}"
     if f.state == "above":
@@ -93,7 +95,7 @@ def forecast_words(f: Forecast, limit: float, axis: Axis = "hours") -> str:
         return f"does not reach the limit of {share(limit)} within {round_to(f.horizon)} {unit}"
     if f.latest is None:
         begin = f"in {round_to(f.soonest)} {unit} at the soonest" if f.soonest > 0 else "at any time"
-        likely = f", likely in {round_to(f.likely)}" if f.likely is not None else ""
+        likely = f", likely in {round_to(f.likely)} {unit}" if f.likely is not None else ""
         return f"may reach the limit of {share(limit)} {begin}{likely}; latest not known"
     return f"reaches the limit of {share(limit)} in {round_to(f.soonest)} to {round_to(f.latest)} {unit} (90 %)"
 

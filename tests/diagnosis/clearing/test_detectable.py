@@ -7,12 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from diagnosis.clearing import axle_rates
 from diagnosis.clearing.alone import Straight
 from diagnosis.clearing.cells import Frame
 from diagnosis.clearing.checks import checks_of
 from diagnosis.clearing.detectable import detectable, places_of
 from diagnosis.clearing.gauges import Gauges, gauges_of
 from diagnosis.clearing.placements import Placements, countered, placements
+from diagnosis.results.clearing import Check
 from diagnosis.results.detectability import Deviation
 from diagnosis.results.machine_words import HYDRAULIC
 from replay.faults import FaultMode, FaultSpec, Side
@@ -138,3 +140,18 @@ def test_a_window_that_is_beyond_the_limit_as_it_is_shows_no_fault_of_no_size() 
     rows = detectable(in_cells(mission, base=False)).rows
     sizes = [r.size for r in rows if (r.component, r.side) == ("FR", Side.ACTUATOR) and r.size is not None]
     assert min(sizes) > 0.0
+
+
+def test_what_would_show_of_axles_is_what_their_check_leaves(monkeypatch: pytest.MonkeyPatch) -> None:
+    bands = np.array([0.0, 0.035])  # so nearly alike that the check takes them as one
+    monkeypatch.setattr(axle_rates, "dead_bands", lambda rate, opening: bands)
+    cells = in_cells(simulated(), base=True)
+    asked = {c.component: c for c in checks_of(cells, HYDRAULIC) if c.check is Check.LASTING_RATE}
+    assert set(asked) == {"front", "rear"}
+    for g in gauges_of(cells):
+        if g.component in asked:
+            check = asked[g.component]
+            assert check.passed
+            assert check.worst is not None
+            room = min(-np.log1p(-g.lasting[Deviation.INEFFICIENT]), np.log1p(g.lasting[Deviation.EXCESS]))
+            assert room == pytest.approx(check.limit - check.worst)
