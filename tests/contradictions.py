@@ -20,7 +20,7 @@ from replay.machine.quantities import OPENING
 from tests.clearing_contradictions import of_checks, of_coverage, of_detectability, of_remedies
 from tests.page_contradictions import of_page
 from tests.plot_contradictions import of_faults, of_states
-from tests.sentence_contradictions import of_kinds
+from tests.sentence_contradictions import of_kinds, of_lengths
 from tests.word_slips import slips
 
 _TOTAL = ("stuck", "no_signal")
@@ -51,6 +51,7 @@ def contradictions(report: Mapping[str, Any], columns: Mapping[str, NDArray[Any]
         *of_detectability(report),
         *of_remedies(report),
         *of_kinds(report),
+        *of_lengths(report),
         *of_page(report),
         *slips(report),
     ]

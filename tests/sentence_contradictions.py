@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping
 from typing import Any
 
@@ -15,3 +16,15 @@ def of_kinds(report: Mapping[str, Any]) -> Iterator[str]:
         unclear = [f for f in action["faults"] if candidates_of(faults[f])]
         if (UNCLEAR in action["text"]) != bool(unclear):
             yield f"unclear are {unclear}, and action {action['n']} says {action['text']!r}"
+
+
+def of_lengths(report: Mapping[str, Any]) -> Iterator[str]:
+    """A time in which a channel did something that is longer than the fault, and not said to be."""
+    for fault in report["intervals"]:
+        seconds = fault["stop_s"] - fault["start_s"]
+        for text in fault["evidence"]:
+            for said, rest in re.findall(r"\b(?:for|over) ([\d.]+) s\b(.{0,20})", text):
+                elsewhere = re.match(r" (?:before it|after it|of driving|in all|in and around it)", rest)
+                grew = "Before that it grew" in text
+                if float(said) > 1.02 * seconds + 0.06 and not elsewhere and not grew:
+                    yield f"{fault['id']} lasts for {seconds:.2f} s: {text!r}"

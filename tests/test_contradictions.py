@@ -33,7 +33,7 @@ from tests.contradictions import contradictions
 from tests.coverage_changes import changed_coverage, judged_side
 from tests.fleet_contradictions import fleet_contradictions
 from tests.page_contradictions import of_reasons
-from tests.sentence_contradictions import of_kinds
+from tests.sentence_contradictions import of_kinds, of_lengths
 from tests.whole_documents import whole_report
 
 Document = dict[str, Any]
@@ -208,6 +208,15 @@ def test_a_fault_that_its_heading_alone_calls_unclear_is_seen(result: tuple[Docu
     rows = zip(("noisy", "stuck", "no_signal"), (0.4, 0.35, 0.25), strict=True)
     fault["hypotheses"] = [{"side": fault["side"], "mode": m, "p": p} for m, p in rows]
     assert len(list(of_kinds(document))) == 1
+
+
+def test_a_sentence_on_a_time_longer_than_its_fault_is_seen(result: tuple[Document, Columns]) -> None:
+    document = copy.deepcopy(result[0])
+    assert list(of_lengths(document)) == []
+    document["intervals"][0]["evidence"].append(
+        "wheel.FR.v followed 0.7 × what it should, over 44.62 s; the rest is noise."
+    )
+    assert len(list(of_lengths(document))) == 1
 
 
 def test_a_fault_of_no_size_that_would_show_is_seen() -> None:

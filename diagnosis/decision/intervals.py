@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from diagnosis.decision.advice import check_of_all
+from diagnosis.decision.lengths import with_lengths_told
 from diagnosis.decision.severity import severity_of
 from diagnosis.decision.size_notes import size_note
 from diagnosis.results.assessment import LEAST_SHARE, STATES, Assessment, Finding
@@ -35,7 +36,7 @@ def intervals_of(
         for own in assessment.findings:
             f = replace(own, epsilon=_bounded(own, kind))
             seconds = (f.stop - f.start) * step_ns * 1e-9
-            told = (*f.evidence, *_left_to_health(f), *f.course)
+            told = (*with_lengths_told(f.evidence, seconds), *_left_to_health(f), *f.course)
             severity, advice = severity_of(f, seconds, machine.limits, words, kind)
             found[component, f.side, f.start, f.stop] = FaultInterval(
                 id="",
