@@ -30,12 +30,22 @@ def test_one_clock_moves_everything(open_page: OPEN) -> None:
     )
     expect(page.locator("#stage-machine [data-c=FR] .says")).to_have_text("stuck")  # at this time, not over the mission
     assert page.locator("#stage-path .here").get_attribute("visibility") == "visible"
-    expect(page.locator("#stage-modes > div", has_text="FR speed sensor")).to_contain_text("stuck 96 %")
+    expect(page.locator("#stage-modes > div", has_text="FR speed sensor")).to_contain_text(
+        "stuck 99 %"
+    )  # as it is stated
     page.locator("#stage-figure .reading p").first.wait_for()
     page.locator("#figure .reading p").first.wait_for()
     page.locator("#scrub").fill("10")
     expect(page.locator("#stage-machine [data-c=FR] rect.tyre")).to_have_class("tyre healthy")
     expect(page.locator("#stage-machine [data-c=FR] .says")).to_have_text("healthy")
+
+
+def test_a_fault_is_called_at_its_time_what_its_heading_calls_it(open_page: OPEN) -> None:
+    page = open_page("unclear", "#fault=F1&t=27,39")
+    page.locator("#scrub").fill("33")
+    part = page.locator("#stage-modes > div", has_text="FR speed sensor")
+    expect(part.locator("span").last).to_have_text("faulty, kind unclear")
+    expect(page.locator("#stage-machine [data-c=FR] .says")).to_have_text("faulty, kind unclear")
 
 
 def test_sentences_say_why_now_and_lead_to_their_time(open_page: OPEN) -> None:

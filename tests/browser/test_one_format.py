@@ -50,3 +50,10 @@ def test_no_script_has_a_format_of_its_own() -> None:
             text = re.sub(r"\n  number: .*?\n};\n", "\n};\n", text, flags=re.DOTALL)  # the one place
         found = len(re.findall(r"\.to(?:Fixed|Precision)\(", text))
         assert found == _MACHINE.get(script.name, 0), script.name
+
+
+def test_a_heading_gives_a_late_time_as_sentences_and_axes_count_it_too(open_page: Callable[..., Any]) -> None:
+    page = open_page("decided")
+    heads = {f: page.locator(f"[data-ev={f}] p.muted").first.text_content() or "" for f in ("F1", "F2")}
+    assert heads["F1"].startswith("0:30.000 to 0:36.000 · 6.0\u00a0s · ")
+    assert heads["F2"].startswith("1:00.000 to 1:24.000 (60.000 to 84.000\u00a0s) · 24.0\u00a0s · ")

@@ -294,6 +294,7 @@ const Now = {
     const [h, m, s] = [Math.floor(whole / 3600), Math.floor(whole / 60) % 60, whole % 60], two = (n) => String(n).padStart(2, "0"), rest = digits ? `.${String(ticks % 10 ** digits).padStart(digits, "0")}` : "";
     return `${seconds < 0 && ticks ? "−" : ""}${h ? `${h}:${two(m)}` : m}:${two(s)}${rest}`;
   },
+  seconds: (t) => t.toFixed(3), // as sentences and axes count a mission's time
   span(seconds) {
     const v = +seconds.toFixed(6), [x, digits, unit] = v < 1 ? [1e3 * v, 0, "ms"] : v < 120 ? [v, 1, "s"] : v < 7200 ? [v / 60, 1, "min"] : [v / 3600, 1, "h"];
     const up = x.toFixed(digits), half = /^50*$/.test(x.toFixed(60).split(".")[1].slice(digits));

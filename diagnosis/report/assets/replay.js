@@ -41,6 +41,9 @@ class Replay {
     });
   }
 
+  // A fault as it is stated, which weighs more than the readings of one moment: ``stuck 96 %``, ``faulty, kind unclear``.
+  static stated(f) { return f.unclear ? f.words : `${f.words} ${Math.round(100 * f.p)}\u00a0%`; }
+
   // Whether a fault is, or may be, of a part.
   static of(f, part) { return f.component === part.c && (f.side === part.side || f.side === "sensor_or_actuator"); }
 
@@ -174,16 +177,16 @@ class Replay {
       if (part.faults.length) {
         const f = part.faults.find((x) => x.start <= t && t < x.stop);
         part.modes.forEach(({ m }, i) => { part.bar.children[i].style.width = `${f?.mode === m ? 100 * f.p : 0}%`; });
-        part.says.textContent = f ? `${f.words} ${Math.round(100 * f.p)}\u00a0%` : "no fault stated";
+        part.says.textContent = f ? Replay.stated(f) : "no fault stated";
         part.bar.setAttribute("aria-label", `${part.words}: ${part.says.textContent}`);
         continue;
       }
       const shares = await Promise.all(part.modes.map(({ channel }) => Data.at(channel, t).then(([a, b]) => (a + b) / 2)));
       let top = -1;
       shares.forEach((p, i) => { part.bar.children[i].style.width = `${100 * (p || 0)}%`; if (p > (shares[top] ?? -1)) top = i; });
-      const most = top < 0 ? "not judged" : `${Data.view.words[part.side][part.modes[top].m]} ${Math.round(100 * shares[top])}\u00a0%`, slight = top >= 0 && part.modes[top].m !== "healthy" && !Data.view.faults.some((f) => Replay.of(f, part) && f.start <= t && t < f.stop);
+      const most = top < 0 ? "not judged" : `${Data.view.words[part.side][part.modes[top].m]} ${Math.round(100 * shares[top])}\u00a0%`, fault = here.filter((f) => Replay.of(f, part)).sort((a, b) => b.p - a.p)[0], slight = top >= 0 && part.modes[top].m !== "healthy" && !fault;
       if (slight) for (const share of part.bar.children) share.style.width = "0";
-      part.says.textContent = slight ? "no fault stated" : most;
+      part.says.textContent = fault ? Replay.stated(fault) : slight ? "no fault stated" : most;
       part.bar.setAttribute("aria-label", `${part.words}: ${part.says.textContent}`);
     }
   }
