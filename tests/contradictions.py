@@ -20,7 +20,7 @@ from replay.machine.quantities import OPENING
 from tests.clearing_contradictions import of_checks, of_coverage, of_detectability, of_remedies
 from tests.page_contradictions import of_page
 from tests.plot_contradictions import of_faults, of_states
-from tests.sentence_contradictions import of_kinds, of_lengths
+from tests.sentence_contradictions import of_kinds, of_lengths, of_slip
 from tests.word_slips import slips
 
 _TOTAL = ("stuck", "no_signal")
@@ -52,6 +52,7 @@ def contradictions(report: Mapping[str, Any], columns: Mapping[str, NDArray[Any]
         *of_remedies(report),
         *of_kinds(report),
         *of_lengths(report),
+        *of_slip(report),
         *of_page(report),
         *slips(report),
     ]

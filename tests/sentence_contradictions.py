@@ -18,6 +18,20 @@ def of_kinds(report: Mapping[str, Any]) -> Iterator[str]:
             yield f"unclear are {unclear}, and action {action['n']} says {action['text']!r}"
 
 
+def of_slip(report: Mapping[str, Any]) -> Iterator[str]:
+    """A fault during whose time a lane of its part says mostly that the wheel slips, or that sensor is faulty: it is told which."""
+    for fault in report["intervals"]:
+        sides = ("sensor", "actuator") if fault["side"] == "sensor_or_actuator" else (fault["side"],)
+        for side in sides if fault["severity"] != "info" else ():
+            spans = [s for s in report["states"] if (s["component"], s["side"]) == (fault["component"], side)]
+            shared = [
+                (s["state"], min(s["stop_s"], fault["stop_s"]) - max(s["start_s"], fault["start_s"])) for s in spans
+            ]
+            slips = sum(t for state, t in shared if state == "slip" and t > 0.0)
+            if slips > 0.5 * (fault["stop_s"] - fault["start_s"]):
+                yield f"{fault['id']}: its {side} is said to slip for {slips:.1f} s of it"
+
+
 def of_lengths(report: Mapping[str, Any]) -> Iterator[str]:
     """A time in which a channel did something that is longer than the fault, and not said to be."""
     for fault in report["intervals"]:

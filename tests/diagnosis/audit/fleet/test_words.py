@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from diagnosis.audit.fleet.trend_types import Axis
-from diagnosis.audit.fleet.words import forecast_words
+from diagnosis.audit.fleet.words import forecast_words, time_words
 from diagnosis.audit.trends.trend import Forecast
 
 
@@ -23,3 +23,8 @@ def test_every_time_of_a_forecast_has_the_unit_of_the_axis(
     forecast: Forecast, words: str, axis: Axis, unit: str
 ) -> None:
     assert forecast_words(forecast, 0.1, axis).endswith(words.replace("{}", unit))
+
+
+def test_one_day_is_no_days() -> None:
+    assert [time_words(x, "days") for x in (0.5, 0.999, 1.0, 2.0)] == ["0.5 days", "1 day", "1 day", "2 days"]
+    assert time_words(1.0, "hours") == "1 h of driving"
