@@ -7,9 +7,8 @@ from collections.abc import Sequence
 from rich.console import Console, ConsoleOptions, RenderableType, RenderResult
 from rich.measure import Measurement
 from rich.table import Table
-from rich.text import Text
 
-from cli.tables.layout import bullets, section, table, text
+from cli.tables.layout import Sentence, bullets, paragraph, section, table, text
 from cli.tables.logs import log_parts
 from cli.tables.looks import mode_text, severity_text, verdict_title
 from diagnosis.comparison.words import OUTCOMES, are_several, headline
@@ -41,9 +40,9 @@ def verdict_parts(report: ReportDocument) -> list[RenderableType]:
         first.append_text(text(f"– {answer}", "bold"))
     parts: list[RenderableType] = [first]
     if title.casefold() != label.casefold():
-        parts.append(text(title, "bold"))
+        parts.append(paragraph(title, "bold"))
     if verdict["text"] and verdict["text"] != title:
-        parts.append(text(verdict["text"]))
+        parts.append(paragraph(verdict["text"]))
     parts += _assumed(report["machine"])
     if verdict["actions"]:
         parts += [section("What to do"), _actions(verdict["actions"], report)]
@@ -77,8 +76,8 @@ def _assumed(machine: MachineRow) -> list[RenderableType]:
     )
     return [
         "",
-        text(f"{what}: the paper's Haulotte 16RTJ PRO stands in.", "bold yellow"),
-        text(f"Of that machine, not known to be of this one: {'; '.join(machine['assumed'])}. {do}"),
+        paragraph(f"{what}: the paper's Haulotte 16RTJ PRO stands in.", "bold yellow"),
+        paragraph(f"Of that machine, not known to be of this one: {'; '.join(machine['assumed'])}. {do}"),
     ]
 
 
@@ -113,7 +112,9 @@ def _actions(actions: Sequence[ActionRow], report: ReportDocument) -> Table:
         more = f" and {rest} more" if rest > 1 else ""
         out.add_row(
             severity_text(action["severity"], action["n"]),
-            Text.assemble(text(lead, "bold"), text(action["text"].removeprefix(lead)), "  ", (faults + more, "dim")),
+            Sentence.assemble(
+                text(lead, "bold"), text(action["text"].removeprefix(lead)), "  ", (faults + more, "dim")
+            ),
         )
         own = [intervals[f] for f in action["faults"] if f in intervals]
         if own and (sure := sure_of_action(own, report)):
@@ -121,7 +122,7 @@ def _actions(actions: Sequence[ActionRow], report: ReportDocument) -> Table:
         if check := action.get("check"):
             same = said.setdefault(check, action["n"])
             how = check if same == action["n"] else f"as for {same}."
-            out.add_row("", Text.assemble(text("How to check: ", "bold"), text(how)))
+            out.add_row("", Sentence.assemble(text("How to check: ", "bold"), text(how)))
     return out
 
 
