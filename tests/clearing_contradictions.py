@@ -82,9 +82,8 @@ def of_remedies(report: Mapping[str, Any]) -> Iterator[str]:
 
 def of_detectability(report: Mapping[str, Any]) -> Iterator[str]:
     """A part of which a fault of no size would have shown, while no check of it deviates; one of whose checks leave another room."""
-    faulty = {f["component"] for f in report["intervals"]}
-    deviating = {c["component"] for c in report["clearing"] if not c["passed"] or c["text"]}
+    open_ = {(c["component"], c["check"] == "roughness") for c in report["clearing"] if not c["passed"]}
     for row in report["detectability"]["rows"]:
-        if row["size"] == 0.0 and row["component"] not in faulty | deviating:
+        if row["size"] == 0.0 and (row["component"], row["deviation"] == "noisy") not in open_:
             what = f"{row['deviation']} {'throughout' if row['for_s'] is None else row['for_s']}"
             yield f"{row['component']} {row['side']}: a fault of no size would show ({what}), and nothing deviates"

@@ -161,15 +161,18 @@ def _wheels(cells: Cells) -> Iterator[Gauges]:
             usual, back = responses.usual[i], (~responses.ahead[:, i]).astype(np.intp)
             # of a wheel that is measured twice on both sides, an excess is the ground's doing
             above, lasting_above = (np.inf, np.inf) if twice and measured else (limit.above, limit.lasting_above)
-            rooms = _rooms(usual.ways, limit.lasting_below, lasting_above)
+            # where its faults are stated for much of the mission, nothing more is asked of all of it
+            told = cells.mostly_explained(name)
+            rooms = _rooms(tuple(None if told else x for x in usual.ways), limit.lasting_below, lasting_above)
             ratio = Ratio(cells.frame, off, responses.weight[:, i], limit.below, above, back, rooms)
-            if usual.least is not None and usual.most is not None:
+            if usual.least is not None and usual.most is not None and not told:
                 lasting = _lasting(limit.lasting_below + usual.least, lasting_above - usual.most)
         delay = delays[i]
         late_by = {} if delay is None else {Deviation.DELAY: wheels.LATE_S + delay + cells.dt}
         most = alone_apart(most_apart, i, clear_at)
         second_one = _reference(cells, name, (v, x, wheels.FLOOR * top), most) if measured else None
-        own = Rough(cells.frame, rough.quick[:, i], rough.size[:, i], rough.limit[:, i], cells.width)
+        quick = np.where(cells.explained(name), np.nan, rough.quick[:, i])
+        own = Rough(cells.frame, quick, rough.size[:, i], rough.limit[:, i], cells.width)
         about = (Kind.WHEEL, name)
         yield Gauges(
             *about,
@@ -223,7 +226,7 @@ def _axles(cells: Cells) -> Iterator[Gauges]:
                 np.zeros(len(off), dtype=np.intp),
                 ((np.inf, np.inf),),
             )
-            if rates.ahead[j]:  # what the check of the mission compares
+            if rates.ahead[j] and not cells.mostly_explained(name):  # what the check of the mission compares
                 lasting = _lasting(long + min(rates.ahead[j]), long - max(rates.ahead[j]))
         still = Still(frame, np.abs(frame.mean(u)) >= limit) if _known(u) else None
         second_one = _reference(cells, name, (phi, x, axles.FLOOR_RAD), clear_at) if measured else None

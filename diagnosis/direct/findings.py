@@ -17,6 +17,7 @@ from diagnosis.direct.same_value import in_one_row
 from diagnosis.direct.sentences import END_SENTENCE, RANGE_SENTENCE, alike_sentence, sentences
 from diagnosis.direct.slow_deviation import not_noise
 from diagnosis.direct.stated_mode import least_constant, mode_of
+from diagnosis.direct.stated_row import of_a_constant
 from diagnosis.direct.timing import timing_explains
 from diagnosis.estimation.by_itself import told_by_itself
 from diagnosis.estimation.changing_gain import as_changing_gain
@@ -188,7 +189,7 @@ def finding_of(run: Run, found: IdentifiedPair, limits: Limits) -> Finding | Non
     if run.row in (STUCK, INEFFICIENT) and isolated.seen.still and share is not None:
         # nothing moved: a constant value and a constant share of a constant are the same
         if run.row == STUCK or p[STUCK] > p[INEFFICIENT]:
-            p[STUCK] = p[INEFFICIENT] = (p[STUCK] + p[INEFFICIENT]) / 2
+            p = of_a_constant(p)
         if run.row == STUCK:
             epsilon = Epsilon(1.0, 1.0 - share, 1.0)  # all, if it is stuck; else what is not left
         if p[STUCK] > _DOUBT:

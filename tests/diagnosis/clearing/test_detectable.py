@@ -104,6 +104,18 @@ def test_what_is_stated_is_no_place_for_another_fault() -> None:
     assert not np.any((places.first * cells.dt > 10.2) & (places.last * cells.dt < 29.8))
 
 
+def test_what_is_stated_for_most_of_the_mission_leaves_nothing_to_show_over_all_of_it() -> None:
+    cells = in_cells(simulated(), base=True)
+    stated = replace(cells, stated={"FR": [(5.0, 55.0)], "front": [(5.0, 55.0)]})
+    for part, side in (("FR", Side.ACTUATOR), ("front", Side.ACTUATOR)):
+        free, told = (next(g for g in gauges_of(x) if (g.component, g.side) == (part, side)) for x in (cells, stated))
+        assert {Deviation.INEFFICIENT, Deviation.EXCESS} <= set(free.lasting)
+        assert not told.lasting
+    sensor = next(g for g in gauges_of(stated) if (g.component, g.side) == ("FR", Side.SENSOR))
+    assert sensor.rough is not None
+    assert np.isnan(sensor.rough.quick[stated.explained("FR")]).all()
+
+
 def test_a_part_that_rests_has_no_places() -> None:
     moving = np.zeros(600, dtype=np.bool_)
     assert placements(moving, 20, 600).first.size == 0
