@@ -33,7 +33,8 @@ class Rates(NamedTuple):
     frame : Frame
         Windows of `_RATE_S`.
     off : Array, shape (windows, axles)
-        Against the axle's usual one.
+        Against the axle's usual one, and no more than against that of each side where it is steered to both for a while in both halves of
+        the mission.
     apart : list[float | None]
         How far that over the mission is from the other axle's, or, of the only one, from what the machine file's [steering] lets
         expect; None where an axle is hardly steered.
@@ -89,11 +90,12 @@ def rates_of(cells: Cells, rate: Array, opening: Array) -> Rates:
             between = _between(rate[:, [a, b]], opening[:, [a, b]], use[:, [a, b]], dead[[a, b]])
             apart[a], apart[b] = (max(apart[j] or 0.0, abs(between)) for j in (a, b))
             ahead[a], ahead[b] = (*ahead[a], between), (*ahead[b], -between)
-    changes = [_changes(cells, frame, off, j) for j in range(len(whole))]
     ways = [
         np.where(enough, _off(frame, cells.dt, rate, opening, use, band, by_way=True), np.nan)
         for band in (dead - unsure, dead, most)
     ]
+    evened = np.where(_both_ways(opened, opening, cells.dt), _nearest(ways), off)
+    changes, off = [_changes(cells, frame, evened, j) for j in range(len(whole))], _nearest([off, evened])
     as_they_are, by_side = _parted(tried), _parted(ways)
     parted = [a if b is None else b if a is None else min(a, b) for a, b in zip(as_they_are, by_side, strict=True)]
     return Rates(frame, off, apart, ahead, turned, changes, parted)
@@ -188,8 +190,23 @@ def _evened(ahead: Array, opened: Array, opening: Array, dt: float) -> Array:
     return out
 
 
+def _both_ways(opened: Array, opening: Array, dt: float) -> Flags:
+    """Whether each axle is steered to either side for a while in both halves of the time it is steered in, shape (axles,).
+
+    Where it is steered to one side first and to the other later, what its usual rates hide may be a fault. Arrays (cells, axles).
+    """
+    out = np.zeros(opened.shape[1], dtype=np.bool_)
+    for j in range(opened.shape[1]):
+        at = np.flatnonzero(opened[:, j] > 0.0)
+        left = opening[at, j] > 0.0
+        half = np.searchsorted(at, at[0] + (at[-1] - at[0]) / 2.0) if at.size else 0
+        times = [np.count_nonzero(part) * dt for x in (left[:half], left[half:]) for part in (x, ~x)]
+        out[j] = min(times) >= _FEW_S
+    return out
+
+
 def _nearest(off: Sequence[Array]) -> Array:
-    """The smallest deviation of those that different dead bands give, 0 where they do not agree on its sign."""
+    """The smallest deviation of those that different ways to take it give, 0 where they do not agree on its sign."""
     every = np.stack(off)
     low, high = every.min(axis=0), every.max(axis=0)
     return np.asarray(np.where(low > 0.0, low, np.where(high < 0.0, high, 0.0 * low)))

@@ -34,7 +34,7 @@ _LASTING_ALONE = 5.0
 #: Of those limits, for two driven wheels that are measured twice on both sides, of which neither tells how far healthy ones deviate: of ten healthy
 #: missions of such a truck none changed by more than 0.02 or was off by 0.04, while motors that had lost 0.4 and 0.5 showed 0.16 to 0.28; in windows
 #: healthy ones of another truck were off by 0.12 at most (22 missions), motors that had lost 0.37 by 0.24 to 0.50.
-_PAIR, _OF_PAIR, _LASTS_OF_PAIR = 2, 0.45, 0.7
+PAIR, _OF_PAIR, _LASTS_OF_PAIR = 2, 0.45, 0.7
 _STRICT = 0.3  # loss that counts, from which on a machine file asks for no more than that
 #: Limits of speed per opening below and above the other wheels', in windows and over the mission, as multiples of the loss
 #: that counts, by whether opening and speed are measured twice. What measurements judge need not be judged by its likeness to
@@ -151,7 +151,7 @@ def _beside_others(
             changed=alone(responses.changes, i, limit.changed, changed, _CHANGED_ALONE),
             grown=alone(responses.grown, i, limit.grown, changed, _CHANGED_ALONE),
         )
-        if driven == _PAIR and all(both):
+        if driven == PAIR and all(both):
             limit = limit._replace(
                 below=min(limit.below, _OF_PAIR * usual_limits(both, clear_at).below),
                 changed=_OF_PAIR * limit.changed,

@@ -26,9 +26,14 @@ _IN, _OUT = 0.75, 2.0  # of a spell, that is known of it; times its length, that
 def pairs_fall(responses: Responses, cells: Cells) -> Array:
     """By how much more than any other wheel's each wheel's speed per opening falls, together with another one's [ln], shape (wheels,).
 
-    From some moment on, or for a spell of wheels of one axle or one side. NaN with fewer than four wheels, or of few windows in which all are known.
+    From some moment on, or for a spell of wheels of one axle or one side, as they are and less what turns make of them. NaN with fewer than four
+    wheels, or of few windows in which all are known.
     """
-    own = responses.own
+    return np.asarray(np.fmin(*(_fall(responses, cells, own) for own in (responses.own, responses.evened))))
+
+
+def _fall(responses: Responses, cells: Cells, own: Array) -> Array:
+    """The same of one of both, of shape (windows, wheels)."""
     count = own.shape[1]
     out = np.full(count, np.nan)
     if count < _WHEELS:
@@ -42,12 +47,12 @@ def pairs_fall(responses: Responses, cells: Cells) -> Array:
                 others = np.abs(np.delete(change, (a, b))).max()
                 more = max(0.0, -max(change[a], change[b]) - others)
                 out[[a, b]] = np.fmax(out[[a, b]], more)
-    return np.asarray(np.fmax(out, _in_spells(responses, cells)))
+    return np.asarray(np.fmax(out, _in_spells(responses, cells, own)))
 
 
-def _in_spells(responses: Responses, cells: Cells) -> Array:
+def _in_spells(responses: Responses, cells: Cells, own: Array) -> Array:
     """The same of spells of `_SPELL_S` beside the rest of the mission in which it goes the same way, shape (wheels,)."""
-    own, count = responses.own, responses.own.shape[1]
+    count = own.shape[1]
     long = max(1, round(_SPELL_S / (cells.frame.hop * cells.dt)))
     out = np.full(count, np.nan)
     pairs = [p for p in combinations(range(count), 2) if _belong(cells, *p)]

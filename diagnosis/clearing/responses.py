@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from diagnosis.clearing.cells import Array, Cells
 from diagnosis.clearing.dead_openings import beyond, dead_opening
 from diagnosis.clearing.measure import lowest_passed
+from diagnosis.clearing.turn_slope import turn_slope
 
 LAG_S = 0.15  #: Of a valve and its drive [s].
 SETTLED_S, SETTLED = 0.6, 0.03  #: a command that has changed by less than this [m/s] over this time
@@ -57,8 +58,8 @@ class Responses(NamedTuple):
     changes, grown : list[float | None]
         By how much each wheel's usual one changes in the mission at most, and over half of it at its usual pace; None where it is not
         known.
-    own : Array, shape (windows, wheels)
-        ln of the speed per opening itself [ln of m/s].
+    own, evened : Array, shape (windows, wheels)
+        ln of the speed per opening itself, and less what turns make of it [ln of m/s].
     """
 
     windows: Array
@@ -69,6 +70,7 @@ class Responses(NamedTuple):
     changes: list[float | None]
     grown: list[float | None]
     own: Array
+    evened: Array
 
 
 def responses_of(
@@ -86,9 +88,14 @@ def responses_of(
     Only where a command (without one: the wheel) has settled beyond `moving` [m/s, for a machine of `USUAL_TOP`]; forward and reverse
     have usual ones of their own. Without `over_time` it is not asked how they change in the mission: `changes` and `grown` are None.
     With `beyond_dead` `windows` are no further off than beyond what of an opening moves no drive of the machine, where its wheels agree better so.
+    They are no further off, and change no more, than beside what turns make of all wheels alike (`turn_slope`).
     """
     sums = _sums(cells, speed, opening, reference, moving)
     found = _beside(cells, sums, sums.opened, over_time=over_time)
+    stated = np.column_stack([cells.explained(wheel) for wheel in cells.machine.wheels])
+    slope = turn_slope(np.where(stated, np.nan, found.beside), sums.turn, sums.ahead)
+    if slope != 0.0:
+        found = _in_turns(found, _beside(cells, sums, sums.opened, over_time=over_time, slope=slope))
     if beyond_dead:
         some = np.where(sums.enough, sums.moved, np.nan), np.where(sums.enough, sums.opened, np.nan)
         dead = dead_opening(cells, *some, sums.settled, sums.ahead)
@@ -98,15 +105,26 @@ def responses_of(
     return found
 
 
+def _in_turns(found: Responses, evened: Responses) -> Responses:
+    """What deviates and changes as it is and with turns evened out: a wheel that turns far, or is on its way there, follows no straight line."""
+    changes, grown = (
+        [None if a is None or b is None else min(a, b) for a, b in zip(x, y, strict=True)]
+        for x, y in ((found.changes, evened.changes), (found.grown, evened.grown))
+    )
+    windows = _nearer(found.windows, evened.windows)
+    return found._replace(windows=windows, changes=changes, grown=grown, evened=evened.evened)
+
+
 def _nearer(a: Array, b: Array) -> Array:
-    """Whichever of two deviations is smaller, 0 where they do not agree on its sign: how much of an opening is dead is not known well."""
+    """Whichever of two deviations is smaller, 0 where they do not agree on its sign: neither what is dead nor what turns make is known well."""
     return np.asarray(np.where(np.sign(a) * np.sign(b) < 0.0, 0.0, np.where(np.abs(a) < np.abs(b), a, b)))
 
 
 class _Sums(NamedTuple):
     """What wheels do in windows, shape (windows, wheels), but for `weight`, of which a window has the sums: (cells, wheels).
 
-    Speed [m/s] and opening [1] over settled cells, how many these are and whether they are enough, and whether it drives forward.
+    Speed [m/s] and opening [1] over settled cells, how many these are and whether they are enough, whether it drives forward, and ln of its
+    commanded speed over that of the other wheels there, NaN where a command is not known.
     """
 
     weight: Array
@@ -115,6 +133,7 @@ class _Sums(NamedTuple):
     settled: Array
     enough: NDArray[np.bool_]
     ahead: NDArray[np.bool_]
+    turn: Array
 
 
 def _sums(cells: Cells, speed: Array, opening: Array, reference: Array, moving: float) -> _Sums:
@@ -132,16 +151,23 @@ def _sums(cells: Cells, speed: Array, opening: Array, reference: Array, moving: 
     moved, opened = frame.sums(weight), frame.sums(np.where(settled, np.abs(passed), 0.0))
     count = frame.sums(settled.astype(np.float64))
     enough = count >= _LEAST_CELLS * min(frame.length, frame.cells)
-    return _Sums(weight, moved, opened, count, enough, frame.mean(np.sign(np.nan_to_num(motion))) >= 0.0)
+    asked = frame.sums(np.where(settled & known, np.abs(motion), 0.0)) / np.maximum(count, 1.0)
+    asked = np.where(enough & (frame.sums((settled & ~known).astype(np.float64)) == 0.0), asked, np.nan)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        turn = np.log(asked / others_at(asked, cells.driven))
+    ahead = frame.mean(np.sign(np.nan_to_num(motion))) >= 0.0
+    return _Sums(weight, moved, opened, count, enough, ahead, turn)
 
 
-def _beside(cells: Cells, sums: _Sums, opened: Array, *, over_time: bool) -> Responses:
-    """Of sums of openings (windows, wheels), of which some may be left out."""
+def _beside(cells: Cells, sums: _Sums, opened: Array, *, over_time: bool, slope: float = 0.0) -> Responses:
+    """Of sums of openings (windows, wheels), of which some may be left out; less what turns make of them by such a slope."""
     frame, ahead = cells.frame, sums.ahead
     ratio = np.where(sums.enough, sums.moved / np.maximum(opened, 1e-3 * frame.length), np.nan)
     with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
         log = np.log(np.maximum(ratio, 1e-3) / others_at(ratio, cells.driven))
         alone = np.log(np.maximum(ratio, 1e-3))
+    by_turn = slope * np.nan_to_num(sums.turn)
+    log = log - by_turn
     off = np.full(log.shape, np.nan)
     lasting: list[Usual] = []
     changes: list[float | None] = []
@@ -172,7 +198,7 @@ def _beside(cells: Cells, sums: _Sums, opened: Array, *, over_time: bool) -> Res
             if usual
             else Usual()
         )
-    return Responses(off, log, lasting, sums.weight, ahead, changes, grown, alone)
+    return Responses(off, log, lasting, sums.weight, ahead, changes, grown, alone, alone - by_turn)
 
 
 def largest_change(log: Array, ways: Sequence[NDArray[np.bool_]]) -> float:

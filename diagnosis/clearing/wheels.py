@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from diagnosis.channels.echo import repeats_its_command
 from diagnosis.clearing.cells import Array, Cells
 from diagnosis.clearing.efforts import effort_checks
-from diagnosis.clearing.limits import Limits, long_limit, measured_twice, response_limits
+from diagnosis.clearing.limits import PAIR, Limits, long_limit, measured_twice, response_limits
 from diagnosis.clearing.longer import around, longer
 from diagnosis.clearing.measure import alone, compared, lasts, late, times, worst
 from diagnosis.clearing.opening_offsets import opening_offsets
@@ -140,10 +140,10 @@ def wheel_checks(cells: Cells, clear_at: float) -> Iterator[Checked]:
                 yield lasts(cells, (*about, either, Check.LASTING_EXCESS), lasting[i].above, own.lasting_above)
             if tells and not any(twice[i]) and i in beside:
                 yield worst(cells, (*about, either, Check.SAME_SIDE), *beside[i], apart=True)
-            if tells and (not any(twice[i]) or powered == OTHERS) and np.isfinite(offsets[1][i]):
+            if tells and (not any(twice[i]) or powered == PAIR) and np.isfinite(offsets[1][i]):
                 about_opening = (*about, either, Check.OPENING_OFFSET)
                 once, usual = (alone(x, i, 1.0, LEAST_OFFSET, _OFF_ALONE) for x in most_off)
-                if powered == OTHERS:
+                if powered == PAIR:
                     once = alone(most_off[0], i, 1.0, LEAST_OFFSET, _OFF_OF_PAIR, others=1)
                 yield max(
                     worst(cells, about_opening, offsets[0][:, i], once, apart=True),

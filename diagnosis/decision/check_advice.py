@@ -33,6 +33,8 @@ def act_of(check: Checked, twice: Collection[str]) -> str:
         return words.fill(
             f"log steer.{check.component}.u (the {{valve}} command), steer.{check.component}.phi_true (a second angle) or imu.yaw_rate"
         )
+    if check.check is Check.COMMANDED_ANGLE:
+        return f"steer to both stops and straight ahead, and compare steer.{check.component}.phi in the log with what the loop reads and with a protractor"
     if check.check is Check.PLANT_RATE and check.worst is None:
         return (
             "run `mfhca fit` on healthy missions, and diagnose with the file that it writes (-m), or log "

@@ -51,7 +51,7 @@ _BESIDE_WHEELS = (
 )
 _BESIDE_AXLES = (Check.LASTING_RATE, Check.YAW, Check.LASTING_YAW)
 _OVER_MISSION = (Check.LASTING_RATE, Check.RATE)  # a rate that changes is compared with the other axle's
-_BY_ITSELF_ALONE = (Check.SECOND_MEASUREMENT, Check.JITTER, Check.JUMP)
+_BY_ITSELF_ALONE = (Check.SECOND_MEASUREMENT, Check.JITTER, Check.JUMP, Check.COMMANDED_ANGLE)
 
 
 @dataclass(frozen=True)

@@ -40,6 +40,7 @@ class Check(StrEnum):
     LASTING_YAW = "lasting_yaw"
     JUMP = "jump"
     ANGLE_SCALE = "angle_scale"
+    COMMANDED_ANGLE = "commanded_angle"
 
 
 #: What a check compares, and what is said where it is beyond its limit; ``{part}`` and ``{value}`` are filled in, and the
@@ -137,6 +138,10 @@ CHECK_WORDS: dict[Check, tuple[str, str]] = {
         "what tells the scale of the angle",
         "nothing in this log tells whether the angle of the {part} axle is as large as it reads: its loop holds a wrong reading at its command",
     ),
+    Check.COMMANDED_ANGLE: (
+        "angle against its command while the {valve} rests",
+        "the angle of the {part} axle is {value} off its command while its {valve} is told to rest",
+    ),
     Check.JUMP: (
         "jumps of the angle",
         "the angle of the {part} axle jumps by {value}, quicker than it can be steered",
@@ -167,7 +172,7 @@ class Checked:
     check : Check
         What was asked.
     worst : float or None
-        Largest value [1, seconds for `Check.DELAY`, radians for the yaw rate and jumps; natural logarithm of the ratio for speeds and
+        Largest value [1, seconds for `Check.DELAY`, radians for the yaw rate, jumps and commanded angles; natural logarithm of the ratio for speeds and
         steering rates per opening]; None: the mission does not show it.
     limit : float
         From here on the part is not cleared.
@@ -254,7 +259,7 @@ def size_words(check: str, value: float) -> str:
     value : float
         Of it, or its limit, as `Checked.worst` has it.
     """
-    if check in (Check.YAW, Check.LASTING_YAW, Check.JUMP):
+    if check in (Check.YAW, Check.LASTING_YAW, Check.JUMP, Check.COMMANDED_ANGLE):
         return f"{math.degrees(value):.1f}°"
     if check == Check.DELAY:
         return f"{value:.2f} s"

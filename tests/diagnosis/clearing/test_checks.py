@@ -48,7 +48,7 @@ def test_a_healthy_mission_passes_all_checks_and_says_what_it_would_have_shown()
     assert Check.SECOND_MEASUREMENT not in {check for _, _, check in base}
     response = base["FR", "sensor_or_actuator", Check.RESPONSE]
     assert response.shows is not None
-    assert 0.25 < response.shows < 0.5
+    assert 0.2 < response.shows < 0.5
 
 
 @pytest.mark.turns("base")

@@ -21,7 +21,7 @@ CELLS = cast(Cells, SimpleNamespace(frame=FRAME, dt=0.1, machine=haulotte()))
 def responses(own: np.ndarray[tuple[int, int], np.dtype[np.float64]]) -> Responses:
     count = own.shape[1]
     nothing: list[float | None] = [None] * count
-    return Responses(own, own, [Usual()] * count, own, np.ones(own.shape, np.bool_), nothing, nothing, own)
+    return Responses(own, own, [Usual()] * count, own, np.ones(own.shape, np.bool_), nothing, nothing, own, own)
 
 
 def windows(count: int = 4) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
@@ -58,7 +58,7 @@ def test_of_fewer_wheels_or_little_known_nothing_is_said() -> None:
 def test_what_two_wheels_of_one_axle_or_side_lose_for_a_spell_is_theirs(pair: tuple[int, int], *, found: bool) -> None:
     own = windows()
     own[np.ix_(np.arange(36, 50), pair)] += np.log(0.7)
-    fall = _in_spells(responses(own), CELLS)
+    fall = _in_spells(responses(own), CELLS, own)
     assert all(bool(fall[i] > LIMIT) is found for i in pair)
 
 
@@ -66,3 +66,11 @@ def test_a_spell_in_which_all_wheels_lose_is_no_pairs() -> None:
     own = windows()
     own[40:60] += np.log(0.6)
     assert np.nanmax(pairs_fall(responses(own), CELLS)) < 0.3 * LIMIT
+
+
+def test_what_turns_make_of_both_wheels_of_a_side_is_no_fall_of_theirs() -> None:
+    own = windows()
+    evened = own.copy()
+    own[np.ix_(np.arange(120) >= 50, (0, 2))] += np.log(0.7)
+    assert np.nanmax(pairs_fall(responses(own), CELLS)) > LIMIT
+    assert np.nanmax(pairs_fall(responses(own)._replace(evened=evened), CELLS)) < LIMIT

@@ -26,7 +26,9 @@ def responses(*largest: float, changes: tuple[float | None, ...] = ()) -> Respon
     rows = [np.concatenate([np.zeros(20), [x, -x]]) for x in largest]
     windows = np.column_stack(rows)
     known = list(changes or [0.0] * len(largest))
-    return Responses(windows, windows, [Usual()] * len(largest), windows, windows >= 0.0, known, known, windows)
+    return Responses(
+        windows, windows, [Usual()] * len(largest), windows, windows >= 0.0, known, known, windows, windows
+    )
 
 
 def test_a_wheel_that_deviates_alone_is_held_to_a_lower_limit() -> None:

@@ -23,7 +23,7 @@ def cells_of(places: dict[str, float]) -> Any:
 def responses(own: np.ndarray) -> Responses:
     """Wheels with these speeds per opening [ln], the first half driven forward."""
     ahead = np.repeat((np.arange(N) < N // 2)[:, np.newaxis], own.shape[1], axis=1)
-    return Responses(own, own, [], own, ahead, [], [], own)
+    return Responses(own, own, [], own, ahead, [], [], own, own)
 
 
 def alike(seed: int = 1) -> np.ndarray:
