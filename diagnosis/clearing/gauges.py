@@ -171,7 +171,11 @@ def _wheels(cells: Cells) -> Iterator[Gauges]:
         late_by = {} if delay is None else {Deviation.DELAY: wheels.LATE_S + delay + cells.dt}
         most = alone_apart(most_apart, i, clear_at)
         second_one = _reference(cells, name, (v, x, wheels.FLOOR * top), most) if measured else None
-        quick = np.where(cells.explained(name), np.nan, rough.quick[:, i])
+        with np.errstate(
+            invalid="ignore"
+        ):  # nor does a window show anything that is beyond the limit as it is, which a check need not count
+            as_it_is = rough.quick[:, i] >= rough.limit[:, i] * rough.size[:, i]
+        quick = np.where(cells.explained(name) | as_it_is, np.nan, rough.quick[:, i])
         own = Rough(cells.frame, quick, rough.size[:, i], rough.limit[:, i], cells.width)
         about = (Kind.WHEEL, name)
         yield Gauges(

@@ -116,6 +116,19 @@ def test_what_is_stated_for_most_of_the_mission_leaves_nothing_to_show_over_all_
     assert np.isnan(sensor.rough.quick[stated.explained("FR")]).all()
 
 
+def test_a_window_that_is_rough_as_it_is_shows_no_noise_of_no_size() -> None:
+    mission, name = simulated(), "wheel.FR.v"
+    x = mission.columns[name].copy()
+    x[2000:2400] += 0.1 * np.random.default_rng(2).standard_normal(400)
+    rough = next(
+        g for g in gauges_of(in_cells(replace(mission, columns={**mission.columns, name: x}), base=True))
+    ).rough
+    assert rough is not None
+    assert np.isnan(rough.quick).any()
+    known = np.isfinite(rough.quick)
+    assert (rough.quick[known] < (rough.limit * rough.size)[known]).all()
+
+
 def test_a_part_that_rests_has_no_places() -> None:
     moving = np.zeros(600, dtype=np.bool_)
     assert placements(moving, 20, 600).first.size == 0
