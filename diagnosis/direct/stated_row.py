@@ -86,3 +86,11 @@ def of_a_constant(p: Array) -> Array:
         rows = [STUCK, INEFFICIENT, *ahead]
         out[rows] = out[rows].mean()
     return out
+
+
+def as_sure(p: Array, row: int, side: Side) -> Array:
+    """Probabilities of the rows, shape (rows,), of which none is more probable than `row`: what others explain as well is called by none more surely."""
+    out = p.copy()
+    ahead = [r for r in codes_of(side) if r != HEALTHY and p[r] >= p[row]]
+    out[ahead] = p[ahead].mean()
+    return out
