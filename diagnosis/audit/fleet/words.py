@@ -85,7 +85,7 @@ def share(value: float) -> str:
 
 
 def time_words(value: float, axis: Axis) -> str:
-    """A time on a trend's axis: ``4.2 h of driving``, ``1 day``. `value` in hours of driving or days."""
+    """A time on a trend's axis: ``4.2 h of driving``, ``1 day``. `value` in its unit [h or d]."""
     words = round_to(value)
     return f"{words} {'day' if axis == 'days' and words == '1' else _UNITS[axis]}"
 
