@@ -78,3 +78,14 @@ def of_remedies(report: Mapping[str, Any]) -> Iterator[str]:
         valves = bool(parts) and all(p["side"] == "actuator" for p in parts)
         if valves and "off its second measurement" in row["reason"] and "tachometer" in row["act"]:
             yield f"{row['reason']!r}: {row['act']!r}"
+
+
+def of_detectability(report: Mapping[str, Any]) -> Iterator[str]:
+    """A part of which a fault of no size would have shown, while no check of it deviates; one of whose checks leave another room."""
+    open_ = {(c["component"], c["check"] == "roughness") for c in report["clearing"] if not c["passed"]}
+    unjudged = {p["component"] for row in report["verdict"]["to_clear"] if row.get("why") for p in row["parts"]}
+    for row in report["detectability"]["rows"]:
+        where = (row["component"], row["deviation"] == "noisy")
+        if row["size"] == 0.0 and where not in open_ and row["component"] not in unjudged:
+            what = f"{row['deviation']} {'throughout' if row['for_s'] is None else row['for_s']}"
+            yield f"{row['component']} {row['side']}: a fault of no size would show ({what}), and nothing deviates"

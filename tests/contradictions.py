@@ -17,9 +17,10 @@ from diagnosis.results.candidates import candidates_of, label_of
 from diagnosis.results.machine_words import HYDRAULIC
 from diagnosis.results.vocabulary import Severity
 from replay.machine.quantities import OPENING
-from tests.clearing_contradictions import of_checks, of_coverage, of_remedies
+from tests.clearing_contradictions import of_checks, of_coverage, of_detectability, of_remedies
 from tests.page_contradictions import of_page
 from tests.plot_contradictions import of_faults, of_states
+from tests.sentence_contradictions import of_kinds, of_lengths, of_slip
 from tests.word_slips import slips
 
 _TOTAL = ("stuck", "no_signal")
@@ -47,7 +48,11 @@ def contradictions(report: Mapping[str, Any], columns: Mapping[str, NDArray[Any]
         *_terminal(report),
         *of_coverage(report),
         *of_checks(report),
+        *of_detectability(report),
         *of_remedies(report),
+        *of_kinds(report),
+        *of_lengths(report),
+        *of_slip(report),
         *of_page(report),
         *slips(report),
     ]

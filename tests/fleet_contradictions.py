@@ -8,18 +8,24 @@ import re
 from collections import Counter
 from collections.abc import Iterator
 
+from diagnosis.audit.fleet.fault_types import FleetFaultRow
 from diagnosis.audit.fleet.fleet_types import FleetDocument
-from diagnosis.audit.fleet.leave import lists_of
+from diagnosis.audit.fleet.leave import GONE, lists_of
 from diagnosis.audit.fleet.listed import listed_machines
 from diagnosis.audit.fleet.page.page import build_fleet_page
+from diagnosis.audit.fleet.page.trends import chosen, dead_words
 from diagnosis.audit.fleet.table import fleet_csv
+from diagnosis.audit.fleet.trend_types import TrendRow
+from diagnosis.audit.fleet.words import TICK_UNITS
 from diagnosis.results.candidates import UNCLEAR
 from diagnosis.results.vocabulary import Leave, Verdict
+
+_UNITS = {"hours": ("h of driving",), "days": ("days", "day")}
 
 
 def fleet_contradictions(document: FleetDocument) -> list[str]:
     """One sentence for each contradiction in a ``fleet.json`` and what is made of it; empty where there is none."""
-    checks = (_lists, _headline, _counts, _table, _endings, _words)
+    checks = (_lists, _headline, _counts, _table, _endings, _words, _units)
     return [text for check in checks for text in check(document)]
 
 
@@ -103,3 +109,35 @@ def _endings(document: FleetDocument) -> Iterator[str]:
     ]
     if told > places.count(False):
         yield f"{told} faults are said to be last seen before the end of their log, of {places.count(False)}"
+
+
+def _units(document: FleetDocument) -> Iterator[str]:
+    """The unit of the axis of trends: beside the ticks of each picture, and behind each time and distance in words."""
+    unit, words = TICK_UNITS[document["axis"]], _UNITS[document["axis"]]
+    page = build_fleet_page(document)
+    for picture in re.findall(r'<svg class="trend".*?</svg>', page, flags=re.DOTALL):
+        ticks = re.findall(r'class="(?:mid|fin)">([^<%]*)<', picture)
+        found = {m.group(1) for tick in ticks if (m := re.search(r" ([^\d−]+)$", tick))}
+        if found != {unit}:
+            yield f"a trend over {words} has ticks in {sorted(found)}"
+    for text in (t["forecast"]["words"] for t in document["trends"] if t["forecast"]["state"] != "not_known"):
+        for number in re.finditer(r"(?<![\d.])\d[\d.]*(?! to \d)(?![\d.])", text):
+            if not text[number.end() :].startswith((*(f" {word}" for word in words), " %")):
+                yield f"{number.group(0)} without its unit, {words}: {text!r}"
+    for between in re.findall(r"\([\d.]+ ([^)]*) apart\)", page):
+        if between not in words:
+            yield f"missions {between!r} apart, of a trend over {words}"
+    for t, text in zip(_drawn(document), re.findall(r'<b class="fc">.*?</p>', page, flags=re.DOTALL), strict=True):
+        if t["first"] > 0 and "the line through all missions" in text:
+            yield f"a line from mission {t['first']} on is said to go through all: {text!r}"
+    if found_at := re.search(r"[?]\.|\b1 (?:days|missions|hours|points)\b", re.sub(r"<[^>]*>", " ", page)):
+        yield f"a slip: {found_at.group(0)!r}"
+
+
+def _drawn(document: FleetDocument) -> list[TrendRow]:
+    """Trends that the page shows, in its order."""
+    present: dict[int, list[FleetFaultRow]] = {}
+    for f in document["faults"]:
+        if f["status"] not in GONE:
+            present.setdefault(f["machine"], []).append(f)
+    return chosen(document["trends"], lambda t: bool(dead_words(t, present.get(t["machine"], []))))

@@ -14,6 +14,7 @@ import pytest
 from numpy.typing import NDArray
 
 from diagnosis.audit.fleet.fleet_types import FleetDocument
+from diagnosis.audit.fleet.trend_types import Axis
 from diagnosis.audit.fleet_files import fleet_json, load_fleet
 from diagnosis.pipeline import diagnose_mission
 from diagnosis.results.vocabulary import Verdict
@@ -27,10 +28,12 @@ from replay.simulation.run import simulate_mission
 from tests import fleet_samples as samples
 from tests import report_samples
 from tests.campaigns import campaign_of_rows
+from tests.clearing_contradictions import of_detectability
 from tests.contradictions import contradictions
 from tests.coverage_changes import changed_coverage, judged_side
 from tests.fleet_contradictions import fleet_contradictions
 from tests.page_contradictions import of_reasons
+from tests.sentence_contradictions import of_kinds, of_lengths
 from tests.whole_documents import whole_report
 
 Document = dict[str, Any]
@@ -175,7 +178,19 @@ def _no_reason(d: Document) -> None:
 @pytest.mark.parametrize(
     "spoil",
     [
-        *(_calm, _advice, _minority, _size, _late, _softer, _healthy, _untold, _sum, _unmoved, _moment),
+        *(
+            _calm,
+            _advice,
+            _minority,
+            _size,
+            _late,
+            _softer,
+            _healthy,
+            _untold,
+            _sum,
+            _unmoved,
+            _moment,
+        ),
         *(_not_judged, _lasting, _in_both, _two_remedies, _other_act, _no_reason, _logged_already),
     ],
 )
@@ -184,6 +199,33 @@ def test_a_spoilt_result_is_seen(result: tuple[Document, Columns], spoil: Callab
     changed = copy.deepcopy(document)
     spoil(changed)
     assert contradictions(changed) != []
+
+
+def test_a_fault_that_its_heading_alone_calls_unclear_is_seen(result: tuple[Document, Columns]) -> None:
+    document = copy.deepcopy(result[0])
+    assert list(of_kinds(document)) == []
+    fault = next(f for f in document["intervals"] if f["severity"] != "info")
+    rows = zip(("noisy", "stuck", "no_signal"), (0.4, 0.35, 0.25), strict=True)
+    fault["hypotheses"] = [{"side": fault["side"], "mode": m, "p": p} for m, p in rows]
+    assert len(list(of_kinds(document))) == 1
+
+
+def test_a_sentence_on_a_time_longer_than_its_fault_is_seen(result: tuple[Document, Columns]) -> None:
+    document = copy.deepcopy(result[0])
+    assert list(of_lengths(document)) == []
+    document["intervals"][0]["evidence"].append(
+        "wheel.FR.v followed 0.7 × what it should, over 44.62 s; the rest is noise."
+    )
+    assert len(list(of_lengths(document))) == 1
+
+
+def test_a_fault_of_no_size_that_would_show_is_seen() -> None:
+    document: Document = whole_report(report_samples.no_faults()[0])  # type: ignore[assignment]
+    assert list(of_detectability(document)) == []
+    row = {"component": "FR", "side": "sensor", "deviation": "excess", "for_s": None, "size": 0.0}
+    document["detectability"]["rows"].append(row)
+    (said,) = of_detectability(document)
+    assert said == "FR sensor: a fault of no size would show (excess throughout), and nothing deviates"
 
 
 def test_a_part_that_is_not_cleared_without_a_reason_is_seen() -> None:
@@ -245,9 +287,13 @@ def fleet(tmp_path_factory: pytest.TempPathFactory) -> FleetDocument:
     return fleet_json(load_fleet(samples.write_store(folder / "fleet.sqlite", samples.few())))
 
 
+@pytest.mark.parametrize("axis", ["hours", "days"])
 @pytest.mark.parametrize("missions", [samples.few, samples.hostile])
-def test_fleets_do_not_contradict_themselves(tmp_path: Path, missions: Callable[[], list[samples.Sample]]) -> None:
-    document = fleet_json(load_fleet(samples.write_store(tmp_path / "fleet.sqlite", missions())))
+def test_fleets_do_not_contradict_themselves(
+    tmp_path: Path, missions: Callable[[], list[samples.Sample]], axis: Axis
+) -> None:
+    document = fleet_json(load_fleet(samples.write_store(tmp_path / "fleet.sqlite", missions()), axis=axis))
+    assert any(t["forecast"]["state"] != "not_known" for t in document["trends"]) == (missions is samples.few)
     assert fleet_contradictions(document) == []
 
 
@@ -264,7 +310,11 @@ def _other_list(d: FleetDocument) -> None:
     d["verdict"]["text"].append(f"Must not go out (4): {label}.")
 
 
-@pytest.mark.parametrize("spoil", [_two_states, _other_number, _other_list])
+def _other_axis(d: FleetDocument) -> None:
+    d["axis"] = "days"  # and all that was worded still says hours
+
+
+@pytest.mark.parametrize("spoil", [_two_states, _other_number, _other_list, _other_axis])
 def test_a_spoilt_fleet_is_seen(fleet: FleetDocument, spoil: Callable[[FleetDocument], None]) -> None:
     assert fleet_contradictions(fleet) == []
     changed = copy.deepcopy(fleet)

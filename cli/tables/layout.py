@@ -2,19 +2,43 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Sequence
+from typing import Any
 
 from rich.console import Console, ConsoleOptions, Group, RenderableType, RenderResult
+from rich.containers import Lines
 from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
 from cli.terminal.streams import clean
 
+_UNIT = re.compile(r"(?<=\d) (?=(?:%|°|m/s|rad/s|rad|[km]?m|[mk]?Hz|ms|min|[shd]|MB)(?!\w))")
+_JOINT = "\ue000"  # where no line is broken; of no log, for `clean` takes such characters out
+
+
+class Sentence(Text):
+    """Text of which no line ends between a number and its unit."""
+
+    def wrap(self, console: Console, width: int, **options: Any) -> Lines:
+        """Lines of a width [characters]; options as of `rich.text.Text.wrap`."""
+        joined = self.copy()
+        joined.plain = _UNIT.sub(_JOINT, self.plain)
+        lines = joined.wrap(console, width, **options)
+        for line in lines:
+            line.plain = line.plain.replace(_JOINT, " ")
+        return lines
+
 
 def text(value: object, style: str = "") -> Text:
     """Text without control characters, styled as a whole."""
-    return Text(clean(value), style=style)
+    return Sentence(clean(value), style=style)
+
+
+def paragraph(value: object, style: str = "") -> Group:
+    """The same to stand by itself: a console joins texts that follow each other to one that breaks lines anywhere."""
+    return Group(text(value, style))
 
 
 def table(headings: Sequence[str], rows: Iterable[Sequence[object]], right: Sequence[int] = ()) -> Table:

@@ -7,9 +7,8 @@ from collections.abc import Sequence
 from rich.console import Console, ConsoleOptions, RenderableType, RenderResult
 from rich.measure import Measurement
 from rich.table import Table
-from rich.text import Text
 
-from cli.tables.layout import bullets, section, table, text
+from cli.tables.layout import Sentence, bullets, paragraph, section, table, text
 from cli.tables.logs import log_parts
 from cli.tables.looks import mode_text, severity_text, verdict_title
 from diagnosis.comparison.words import OUTCOMES, are_several, headline
@@ -26,7 +25,7 @@ from diagnosis.results.vocabulary import Severity
 from replay.machine.quantities import OPENING
 
 _SHOWN, _FAULTS_NAMED, _ENDLESS = 40, 6, 10_000
-_OFTEN = 3  # spells of one part and row that stand on one line
+_OFTEN = 3  # spells of one part that are called the same, and stand on one line
 _WORDS, _SATURATION = (1, 2), 5  # columns of words, which may wrap between them, and the one that is needed least
 
 
@@ -41,9 +40,9 @@ def verdict_parts(report: ReportDocument) -> list[RenderableType]:
         first.append_text(text(f"– {answer}", "bold"))
     parts: list[RenderableType] = [first]
     if title.casefold() != label.casefold():
-        parts.append(text(title, "bold"))
+        parts.append(paragraph(title, "bold"))
     if verdict["text"] and verdict["text"] != title:
-        parts.append(text(verdict["text"]))
+        parts.append(paragraph(verdict["text"]))
     parts += _assumed(report["machine"])
     if verdict["actions"]:
         parts += [section("What to do"), _actions(verdict["actions"], report)]
@@ -77,8 +76,8 @@ def _assumed(machine: MachineRow) -> list[RenderableType]:
     )
     return [
         "",
-        text(f"{what}: the paper's Haulotte 16RTJ PRO stands in.", "bold yellow"),
-        text(f"Of that machine, not known to be of this one: {'; '.join(machine['assumed'])}. {do}"),
+        paragraph(f"{what}: the paper's Haulotte 16RTJ PRO stands in.", "bold yellow"),
+        paragraph(f"Of that machine, not known to be of this one: {'; '.join(machine['assumed'])}. {do}"),
     ]
 
 
@@ -113,7 +112,9 @@ def _actions(actions: Sequence[ActionRow], report: ReportDocument) -> Table:
         more = f" and {rest} more" if rest > 1 else ""
         out.add_row(
             severity_text(action["severity"], action["n"]),
-            Text.assemble(text(lead, "bold"), text(action["text"].removeprefix(lead)), "  ", (faults + more, "dim")),
+            Sentence.assemble(
+                text(lead, "bold"), text(action["text"].removeprefix(lead)), "  ", (faults + more, "dim")
+            ),
         )
         own = [intervals[f] for f in action["faults"] if f in intervals]
         if own and (sure := sure_of_action(own, report)):
@@ -121,7 +122,7 @@ def _actions(actions: Sequence[ActionRow], report: ReportDocument) -> Table:
         if check := action.get("check"):
             same = said.setdefault(check, action["n"])
             how = check if same == action["n"] else f"as for {same}."
-            out.add_row("", Text.assemble(text("How to check: ", "bold"), text(how)))
+            out.add_row("", Sentence.assemble(text("How to check: ", "bold"), text(how)))
     return out
 
 
@@ -159,10 +160,10 @@ def _faults(intervals: Sequence[IntervalRow], words: MachineWords) -> _Fitting:
 
 
 def _lines(intervals: Sequence[IntervalRow], most: int | None = _SHOWN) -> list[list[IntervalRow]]:
-    """Faults by the lines of the table: each by itself, but for those of one part and row that come again and again."""
+    """Faults by the lines of the table: each by itself, but for those of one part that are called the same and come again and again."""
     kinds: dict[tuple[str, ...], list[IntervalRow]] = {}
     for i in intervals:
-        kinds.setdefault((i["component"], i["side"], i["mode"], i["severity"]), []).append(i)
+        kinds.setdefault((i["component"], i["side"], label_of(i), i["severity"]), []).append(i)
     often = {id(i): same for same in kinds.values() if len(same) >= _OFTEN for i in same}
     out = [often.get(id(i), [i]) for i in intervals if id(i) not in often or often[id(i)][0] is i]
     return out[:most]
@@ -184,7 +185,7 @@ def _spells(same: Sequence[IntervalRow], words: MachineWords, bounds: bool) -> t
     return (
         name,
         part,
-        mode_text(best["mode"], f"{label_of(best).lower()}, {len(same)} times"),
+        mode_text(symbol_of(best), f"{label_of(best).lower()}, {len(same)} times"),
         f"{first:.2f}–{last:.2f}",
         *rest,
     )

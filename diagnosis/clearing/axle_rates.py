@@ -35,10 +35,11 @@ class Rates(NamedTuple):
     off : Array, shape (windows, axles)
         Against the axle's usual one, and no more than against that of each side where it is steered to both for a while in both halves of
         the mission.
-    whole : Array, shape (axles,)
-        Over the mission; NaN where an axle is hardly steered.
     apart : list[float | None]
-        How far that is from the other axle's, or, of the only one, from what the machine file's [steering] lets expect.
+        How far that over the mission is from the other axle's, or, of the only one, from what the machine file's [steering] lets
+        expect; None where an axle is hardly steered.
+    ahead : list[tuple[float, ...]]
+        By how much each axle is ahead of its neighbours over the mission, as `apart` has it, but with its sign; empty of the only one.
     weight : Array, shape (cells, axles)
         Rate that counts in a window, 0 where none does [rad/s].
     changes : list[float | None]
@@ -51,8 +52,8 @@ class Rates(NamedTuple):
 
     frame: Frame
     off: Array
-    whole: Array
     apart: list[float | None]
+    ahead: list[tuple[float, ...]]
     weight: Array
     changes: list[float | None]
     parted: list[float | None]
@@ -65,7 +66,7 @@ def rates_of(cells: Cells, rate: Array, opening: Array) -> Rates:
     for k, axle in enumerate(cells.machine.axles):
         use[:, k] &= np.asarray(~cells.told(axle) | cells.mostly_explained(axle), dtype=np.bool_)
     unsure = np.maximum(_UNSURE, _EDGE * dead)
-    steered, ahead, opened = beyond(rate, opening, use, dead)
+    steered, turned, opened = beyond(rate, opening, use, dead)
     # at the edge of a dead band, what of an opening moves something is not known
     enough = frame.sums(opened) >= _EDGE * dead * frame.sums(steered.astype(np.float64))
     most = np.maximum(dead + unsure, min(ALIKE * stands(cells), OVERLAP))
@@ -75,18 +76,20 @@ def rates_of(cells: Cells, rate: Array, opening: Array) -> Rates:
     ]
     off = _nearest(tried)
     with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
-        whole = np.log(np.maximum(ahead.sum(axis=0) / opened.sum(axis=0), 1e-3))
+        whole = np.log(np.maximum(turned.sum(axis=0) / opened.sum(axis=0), 1e-3))
     whole = np.where(steered.sum(axis=0) * cells.dt >= _FEW_S, whole, np.nan)
     apart: list[float | None] = [None] * len(whole)
     one = len(apart) == 1 or (len(apart) > 1 and one_joint(cells, 0, 1))
     if one:
-        apart = [_by_plant(cells, ahead[:, 0], np.where(steered, opening, 0.0)[:, 0])] * len(apart)
-    for j in np.flatnonzero(np.isfinite(whole) & (ahead.sum(axis=0) <= 0.0)):
+        apart = [_by_plant(cells, turned[:, 0], np.where(steered, opening, 0.0)[:, 0])] * len(apart)
+    for j in np.flatnonzero(np.isfinite(whole) & (turned.sum(axis=0) <= 0.0)):
         apart[j] = _WRONG_WAY
+    ahead: list[tuple[float, ...]] = [()] * len(whole)
     for a, b in pairwise(range(len(whole))):
         if np.isfinite(whole[a]) and np.isfinite(whole[b]) and not one:
             between = _between(rate[:, [a, b]], opening[:, [a, b]], use[:, [a, b]], dead[[a, b]])
-            apart[a], apart[b] = max(apart[a] or 0.0, between), max(apart[b] or 0.0, between)
+            apart[a], apart[b] = (max(apart[j] or 0.0, abs(between)) for j in (a, b))
+            ahead[a], ahead[b] = (*ahead[a], between), (*ahead[b], -between)
     ways = [
         np.where(enough, _off(frame, cells.dt, rate, opening, use, band, by_way=True), np.nan)
         for band in (dead - unsure, dead, most)
@@ -95,11 +98,11 @@ def rates_of(cells: Cells, rate: Array, opening: Array) -> Rates:
     changes, off = [_changes(cells, frame, evened, j) for j in range(len(whole))], _nearest([off, evened])
     as_they_are, by_side = _parted(tried), _parted(ways)
     parted = [a if b is None else b if a is None else min(a, b) for a, b in zip(as_they_are, by_side, strict=True)]
-    return Rates(frame, off, whole, apart, ahead, changes, parted)
+    return Rates(frame, off, apart, ahead, turned, changes, parted)
 
 
 def _between(rate: Array, opening: Array, use: Flags, dead: Array) -> float:
-    """How far the rates per opening of two axles are apart [ln], arrays (cells, 2); dead bands (2,) that are nearly alike are taken as one.
+    """How far the first of two axles is ahead of the other in its rate per opening [ln], arrays (cells, 2); dead bands (2,) that are nearly alike are taken as one.
 
     A sensor's gain and a dead band take each other's place: an angle that reads 1.4 was found with a dead band of 0 beside one of 0.02.
     """
@@ -108,7 +111,7 @@ def _between(rate: Array, opening: Array, use: Flags, dead: Array) -> float:
     _, ahead, opened = beyond(rate, opening, use, dead)
     with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
         log = np.log(np.maximum(ahead.sum(axis=0) / opened.sum(axis=0), 1e-3))
-    return float(abs(log[0] - log[1]))
+    return float(log[0] - log[1])
 
 
 def _parted(tried: Sequence[Array]) -> list[float | None]:

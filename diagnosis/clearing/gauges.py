@@ -161,15 +161,22 @@ def _wheels(cells: Cells) -> Iterator[Gauges]:
             usual, back = responses.usual[i], (~responses.ahead[:, i]).astype(np.intp)
             # of a wheel that is measured twice on both sides, an excess is the ground's doing
             above, lasting_above = (np.inf, np.inf) if twice and measured else (limit.above, limit.lasting_above)
-            rooms = _rooms(usual.ways, limit.lasting_below, lasting_above)
+            # where its faults are stated for much of the mission, nothing more is asked of all of it
+            told = cells.mostly_explained(name)
+            rooms = _rooms(tuple(None if told else x for x in usual.ways), limit.lasting_below, lasting_above)
             ratio = Ratio(cells.frame, off, responses.weight[:, i], limit.below, above, back, rooms)
-            if usual.least is not None and usual.most is not None:
+            if usual.least is not None and usual.most is not None and not told:
                 lasting = _lasting(limit.lasting_below + usual.least, lasting_above - usual.most)
         delay = delays[i]
         late_by = {} if delay is None else {Deviation.DELAY: wheels.LATE_S + delay + cells.dt}
         most = alone_apart(most_apart, i, clear_at)
         second_one = _reference(cells, name, (v, x, wheels.FLOOR * top), most) if measured else None
-        own = Rough(cells.frame, rough.quick[:, i], rough.size[:, i], rough.limit[:, i], cells.width)
+        with np.errstate(
+            invalid="ignore"
+        ):  # nor does a window show anything that is beyond the limit as it is, which a check need not count
+            as_it_is = rough.quick[:, i] >= rough.limit[:, i] * rough.size[:, i]
+        quick = np.where(cells.explained(name) | as_it_is, np.nan, rough.quick[:, i])
+        own = Rough(cells.frame, quick, rough.size[:, i], rough.limit[:, i], cells.width)
         about = (Kind.WHEEL, name)
         yield Gauges(
             *about,
@@ -223,10 +230,8 @@ def _axles(cells: Cells) -> Iterator[Gauges]:
                 np.zeros(len(off), dtype=np.intp),
                 ((np.inf, np.inf),),
             )
-            others = np.delete(rates.whole, j)
-            if np.isfinite(rates.whole[j]) and np.isfinite(others).any():
-                ahead = float(rates.whole[j] - np.nanmedian(others))
-                lasting = _lasting(long + ahead, long - ahead)
+            if rates.ahead[j] and not cells.mostly_explained(name):  # what the check of the mission compares
+                lasting = _lasting(long + min(rates.ahead[j]), long - max(rates.ahead[j]))
         still = Still(frame, np.abs(frame.mean(u)) >= limit) if _known(u) else None
         second_one = _reference(cells, name, (phi, x, axles.FLOOR_RAD), clear_at) if measured else None
         about = (Kind.STEER, name)

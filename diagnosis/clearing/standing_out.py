@@ -56,7 +56,8 @@ _WHEELS = 3  # fewer have no others to be compared with
 _BESIDE = 0.65  # how often a partial fault beside one of the other side was right
 _LESS_SURE = "The other side has a fault that no row explains, which makes this one less probable."
 _HALF = 0.5  # of the time of a fault
-_OPEN = (CODE[State.HEALTHY], CODE[State.NOT_ASSESSED])
+#: States that a fault takes the place of; that a wheel slips, or its sensor is faulty, says no more than not assessed does.
+_OPEN = (CODE[State.HEALTHY], CODE[State.NOT_ASSESSED], CODE[State.SLIP])
 _COMMANDED = (*_OPEN, CODE[State.NOT_EXCITED])  # an axle that stands still under its command is excited
 
 

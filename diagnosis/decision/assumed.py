@@ -17,7 +17,7 @@ _WORDS: Mapping[str, Callable[[Machine], str]] = {
     "max_steer": lambda m: f"largest steering angle {amount(m.max_steer, 'rad')}",
     "flow": lambda m: f"pump flow for {m.plant.flow:g} m/s over all wheels",
     "control": lambda m: (
-        f"control law MFHCA with ξ = {m.control.xi:g} 1/s, β = {m.control.beta:g} 1/s, steering gain {m.control.k_ps:g} 1/rad"
+        f"control law MFHCA with ξ = {m.control.xi:g} s⁻¹, β = {m.control.beta:g} s⁻¹, steering gain {m.control.k_ps:g} rad⁻¹"
     ),
 }
 

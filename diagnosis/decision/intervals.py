@@ -8,12 +8,14 @@ from dataclasses import replace
 import numpy as np
 
 from diagnosis.decision.advice import check_of_all
+from diagnosis.decision.lengths import with_lengths_told
 from diagnosis.decision.severity import severity_of
 from diagnosis.decision.size_notes import size_note
 from diagnosis.results.assessment import LEAST_SHARE, STATES, Assessment, Finding
 from diagnosis.results.machine_words import MachineWords
+from diagnosis.results.plain_numbers import with_minus_signs
 from diagnosis.results.result import Epsilon, FaultInterval, Sat, StateSpan
-from diagnosis.results.sentence import About, about_of, is_about
+from diagnosis.results.sentence import About, about_of, is_about, mapped
 from diagnosis.results.vocabulary import Kind, Tier
 from replay.faults import FaultMode, Side, State
 from replay.machine.config import Machine
@@ -35,7 +37,8 @@ def intervals_of(
         for own in assessment.findings:
             f = replace(own, epsilon=_bounded(own, kind))
             seconds = (f.stop - f.start) * step_ns * 1e-9
-            told = (*f.evidence, *_left_to_health(f), *f.course)
+            told = (*with_lengths_told(f.evidence, seconds), *_left_to_health(f), *f.course)
+            told = tuple(mapped(text, with_minus_signs) for text in told)
             severity, advice = severity_of(f, seconds, machine.limits, words, kind)
             found[component, f.side, f.start, f.stop] = FaultInterval(
                 id="",

@@ -17,6 +17,7 @@ from diagnosis.results.document import MissingRow, QualityRow, SignalRow
 from diagnosis.results.left_out import is_left_out
 from diagnosis.results.log_rows import ClockRow
 from diagnosis.results.machine_words import MachineWords
+from diagnosis.results.plain_numbers import with_minus_signs
 from diagnosis.results.wheel_model import WheelModelFit
 from replay.arrays.blocks import blocks, release
 from replay.arrays.processors import each
@@ -138,7 +139,7 @@ def checks(
 
 
 def _row(check: str, result: str, effect: str = "none", ok: bool = True) -> QualityRow:
-    return {"check": check, "result": result, "effect": effect, "ok": ok}
+    return {"check": check, "result": with_minus_signs(result), "effect": effect, "ok": ok}
 
 
 def _sample_rate(jitter_ms: float, step_ns: int) -> QualityRow:

@@ -19,6 +19,7 @@ from diagnosis.estimation.viterbi import most_probable
 from diagnosis.results.assessment import CODE, Assessment
 from diagnosis.results.evidence_columns import steps_of
 from diagnosis.results.loss import loss_of
+from diagnosis.results.plain_numbers import plain
 from diagnosis.results.sizes import amount, not_reported
 from diagnosis.results.vocabulary import Tier
 from replay.faults import Side, State
@@ -96,16 +97,16 @@ def _notes(found: IdentifiedPair, below: int) -> tuple[str, ...]:
     parts = [
         f"{pair.y_name} against {pair.x_name}: noise {amount(found.model.noise, pair.unit, 2)}",
         f"rounding step {amount(found.lsb, pair.unit, 2)}",
-        f"delay {relation.delay * pair.dt * ms:.3g} ms",
+        f"delay {plain(relation.delay * pair.dt * ms)} ms",
     ]
     if relation.lag:
-        parts.append(f"lag {relation.lag * ms:.2g} ms")
+        parts.append(f"lag {plain(relation.lag * ms, 2)} ms")
     if relation.play:
         parts.append(f"hysteresis {amount(relation.play, pair.unit, 2)}")
     if pair.habit.travel:
-        parts.append(f"values held for {pair.habit.travel:.2g} m of travel")
+        parts.append(f"values held for {plain(pair.habit.travel, 2)} m of travel")
     elif pair.habit.stepwise:
-        parts.append(f"values held for {pair.habit.window * ms:.2g} ms")
+        parts.append(f"values held for {plain(pair.habit.window * ms, 2)} ms")
     figures = ", ".join(parts) + "."
     if not below:
         return (figures,)

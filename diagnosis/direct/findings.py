@@ -17,6 +17,7 @@ from diagnosis.direct.same_value import in_one_row
 from diagnosis.direct.sentences import END_SENTENCE, RANGE_SENTENCE, alike_sentence, sentences
 from diagnosis.direct.slow_deviation import not_noise
 from diagnosis.direct.stated_mode import least_constant, mode_of
+from diagnosis.direct.stated_row import as_sure, of_a_constant
 from diagnosis.direct.timing import timing_explains
 from diagnosis.estimation.by_itself import told_by_itself
 from diagnosis.estimation.changing_gain import as_changing_gain
@@ -162,8 +163,7 @@ def finding_of(run: Run, found: IdentifiedPair, limits: Limits) -> Finding | Non
     pair, run, p = found.pair, isolated.run, isolated.p
     if p[HEALTHY] > p[run.row] or _hysteresis(isolated, found) or _unresolved(isolated, found):
         return None
-    ahead = [r for r in codes_of(pair.side) if r != HEALTHY and p[r] >= p[run.row]]
-    p[ahead] = p[ahead].mean()  # what other rows explain as well is called by none of them more surely
+    p = as_sure(p, run.row, pair.side)
     if run.row in VARYING_ROWS:
         times = isolated.seen.deviation / max(isolated.seen.noise, 1e-30)
         most = _WITHIN_P + (1.0 - _WITHIN_P) * max(times - _CLEAR, 0.0)
@@ -188,7 +188,7 @@ def finding_of(run: Run, found: IdentifiedPair, limits: Limits) -> Finding | Non
     if run.row in (STUCK, INEFFICIENT) and isolated.seen.still and share is not None:
         # nothing moved: a constant value and a constant share of a constant are the same
         if run.row == STUCK or p[STUCK] > p[INEFFICIENT]:
-            p[STUCK] = p[INEFFICIENT] = (p[STUCK] + p[INEFFICIENT]) / 2
+            p = of_a_constant(p)
         if run.row == STUCK:
             epsilon = Epsilon(1.0, 1.0 - share, 1.0)  # all, if it is stuck; else what is not left
         if p[STUCK] > _DOUBT:
@@ -197,6 +197,7 @@ def finding_of(run: Run, found: IdentifiedPair, limits: Limits) -> Finding | Non
     named = {run.row: mode.value}  # a gain beyond the table has the probability of the row that it was found by
     noisy = [Hypothesis(pair.side.value, ROWS[run.row].value, within * float(p[run.row]))] if outside else []
     p[run.row] *= 1.0 - within
+    p = as_sure(p, run.row, pair.side)
     hypotheses = [
         Hypothesis(pair.side.value, named.get(row, ROWS[row].value), float(p[row])) for row in codes_of(pair.side)
     ] + noisy

@@ -5,7 +5,15 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnosis.estimation.fault_models import HEALTHY, NO_SIGNAL, SCALED_ROWS, STEADY_ROWS, TOTAL_ROWS
+from diagnosis.estimation.fault_models import (
+    HEALTHY,
+    INEFFICIENT,
+    NO_SIGNAL,
+    SCALED_ROWS,
+    STEADY_ROWS,
+    STUCK,
+    TOTAL_ROWS,
+)
 from diagnosis.results.fault_rows import codes_of
 from replay.faults import Side
 
@@ -63,4 +71,26 @@ def with_lapses(p: Array, row: int, side: Side, seconds: float | None) -> Array:
     kept = max(kept, min(level, 1.0))
     out[others] += p[row] * (1.0 - kept) / len(others)
     out[row] = p[row] * kept
+    return out
+
+
+def of_a_constant(p: Array) -> Array:
+    """Probabilities of the rows, shape (rows,), where nothing moved: a constant value and a constant share of a constant are the same.
+
+    Where another row is more probable than half of both, none of the three is called more surely than the others.
+    """
+    out = p.copy()
+    out[[STUCK, INEFFICIENT]] = 0.5 * (p[STUCK] + p[INEFFICIENT])
+    ahead = [r for r in range(p.size) if r not in (HEALTHY, STUCK, INEFFICIENT) and out[r] > out[STUCK]]
+    if ahead:
+        rows = [STUCK, INEFFICIENT, *ahead]
+        out[rows] = out[rows].mean()
+    return out
+
+
+def as_sure(p: Array, row: int, side: Side) -> Array:
+    """Probabilities of the rows, shape (rows,), of which none is more probable than `row`: what others explain as well is called by none more surely."""
+    out = p.copy()
+    ahead = [r for r in codes_of(side) if r != HEALTHY and p[r] >= p[row]]
+    out[ahead] = p[ahead].mean()
     return out

@@ -18,7 +18,7 @@ from diagnosis.report.plot_rows import fault_rows
 from diagnosis.report.rows import Columns, Group, Row, row_json
 from diagnosis.report.tables import machine_name
 from diagnosis.report.units import units_of
-from diagnosis.results.candidates import label_of
+from diagnosis.results.candidates import candidates_of, label_of
 from diagnosis.results.document import IntervalRow, MachineRow, ReportDocument
 from diagnosis.results.fault_rows import LOOKS, state_label
 from diagnosis.results.machine_words import words_of
@@ -182,6 +182,7 @@ def view(
             "side": f["side"],
             "p": round(f["probability"], 3),
             "words": label_of(f).lower(),
+            "unclear": bool(candidates_of(f)),
             "severity": f["severity"],
             "title": labels.fault_title(f, words),
             "rows": place[id(figures[f["id"]])],

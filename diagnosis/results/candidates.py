@@ -15,6 +15,9 @@ from replay.faults import Side, State
 UNCLEAR = "faulty, kind unclear"
 _MAJORITY = 0.5  # of the probability of any fault of the part: a row that gives its name
 _CANDIDATE = 0.15  # one that is named beside others
+_ROUNDED = (
+    1e-6  # what documents round probabilities by, and more: sentences are made before, headings from the document
+)
 
 #: Side, mode and probability of one explanation.
 Weighted = tuple[str, str, float]
@@ -36,9 +39,9 @@ def candidates(side: str, hypotheses: Iterable[Weighted]) -> tuple[str, ...]:
             rows[mode] = rows.get(mode, 0.0) + p
     ranked = sorted(rows, key=lambda mode: -rows[mode])
     total = sum(rows.values())
-    if len(ranked) < 2 or rows[ranked[0]] >= _MAJORITY * total:
+    if len(ranked) < 2 or rows[ranked[0]] >= _MAJORITY * total - _ROUNDED:
         return ()
-    return tuple(mode for mode in ranked if rows[mode] >= _CANDIDATE * total)
+    return tuple(mode for mode in ranked if rows[mode] >= _CANDIDATE * total - _ROUNDED)
 
 
 def candidates_of(fault: IntervalRow) -> tuple[str, ...]:

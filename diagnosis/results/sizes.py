@@ -18,7 +18,7 @@ def loss_known(low: float, high: float) -> bool:
 
 def gain_words(epsilon: float) -> str:
     """What a part gives whose loss [1] no row of the tables describes, ``1.91 times what it should be``; empty for a loss that one does."""
-    return "" if 0.0 <= epsilon <= 1.0 else f"{plain(1.0 - epsilon, 3).replace('-', '−')} times what it should be"
+    return "" if 0.0 <= epsilon <= 1.0 else f"{plain(1.0 - epsilon, 3)} times what it should be"
 
 
 def amount(value: float, unit: str, digits: int = 3) -> str:

@@ -10,6 +10,7 @@ from dataclasses import replace
 
 from diagnosis.results.assessment import Assessment, Finding
 from diagnosis.results.machine_words import MachineWords
+from diagnosis.results.plain_numbers import with_minus_signs
 from diagnosis.results.sentence import mapped
 
 
@@ -17,8 +18,8 @@ def worded(found: Assessment, words: MachineWords) -> Assessment:
     """The same with every reason, note, sentence of evidence and unit of speed as the machine has it."""
     return replace(
         found,
-        reasons={state: words.fill(why) for state, why in found.reasons.items()},
-        notes=tuple(words.fill(note) for note in found.notes),
+        reasons={state: _said(why, words) for state, why in found.reasons.items()},
+        notes=tuple(_said(note, words) for note in found.notes),
         hidden=words.fill(found.hidden),
         unexplained_size=words.fill(found.unexplained_size),
         findings=tuple(_finding(f, words) for f in found.findings),
@@ -29,4 +30,10 @@ def _finding(found: Finding, words: MachineWords) -> Finding:
     sat = found.sat
     if sat is not None and sat.unit == "m/s":
         sat = replace(sat, unit=words.speed_unit)
-    return replace(found, evidence=tuple(mapped(text, words.fill) for text in found.evidence), sat=sat)
+    return replace(
+        found, evidence=tuple(mapped(text, lambda part: _said(part, words)) for text in found.evidence), sat=sat
+    )
+
+
+def _said(text: str, words: MachineWords) -> str:
+    return with_minus_signs(words.fill(text))

@@ -268,11 +268,12 @@ def _or_all_off(findings: Sequence[Finding], command: Array, *, losses: bool = F
 def _or_off(finding: Finding) -> Finding:
     """A valve that does not answer a command which stays where it is; it may be off by a constant as well."""
     most = _LESS_AT_REST if finding.mode is FaultMode.INEFFICIENT else _AT_REST
-    share = most / max(finding.probability, most)
-    named = [replace(h, p=h.p * share) for h in finding.hypotheses]
+    finding = replace(finding, evidence=(*finding.evidence, _CONSTANT))
+    if finding.probability <= most:  # as little as that already
+        return finding
+    named = [replace(h, p=h.p * most / finding.probability) for h in finding.hypotheses]
     off = Hypothesis(Side.ACTUATOR.value, FaultMode.OUTSIDE_TABLE.value, 1.0 - sum(h.p for h in named))
-    hypotheses = tuple(sorted([*named, off], key=lambda h: -h.p))
-    return replace(finding, probability=most, hypotheses=hypotheses, evidence=(*finding.evidence, _CONSTANT))
+    return replace(finding, probability=most, hypotheses=tuple(sorted([*named, off], key=lambda h: -h.p)))
 
 
 def _stands_while_told(finding: Finding, opening: Array, command: Array, use: Flags, dt: float) -> bool:

@@ -112,7 +112,7 @@ def _robust_line(
     if agreeing < _LEAST_AGREEING:
         return _refused(start, f"only {agreeing:.0%} of the moments agree on one offset and drift")
     if abs(line[1]) > _MOST_DRIFT:
-        return _refused(start, f"the drift would be {line[1] * 1e6:.0f} ppm")
+        return _refused(start, f"the drift would be {line[1] * 1e6:.0f} ppm".replace("-", "−"))
     residual = lag - line[0] - line[1] * u
     uneven, more = _uneven(u, residual, weight0, weight, scale)
     if uneven:

@@ -52,7 +52,7 @@ class SourceClock:
     def sentence(self) -> str:
         """What was found and done, for the report; empty for the reference."""
         name, base = PurePath(self.source).name, PurePath(self.reference).name
-        change = f"{_seconds(self.offset_s)} at its start and {self.drift_ppm:+.1f} ppm"
+        change = f"{_seconds(self.offset_s)} at its start and {self.drift_ppm:+.1f} ppm".replace("-", "−")
         if self.method == "estimated":
             return (
                 f"{name}: its stamps were moved onto the clock of {base} by {change} (95 % within ±{_size(self.uncertainty_s)} "

@@ -65,8 +65,8 @@ def choose_law(
     law = best.law
     lambda_ = best.lambda_ if fitted and best.lambda_ > 0 else control.lambda_
     detail = (
-        f"fit: λ̂ = {best.lambda_:.4g} ± {best.lambda_std:.2g} s/m with Ψ̂ {best.psi}"
-        + (f", ζ̂ = {best.zeta:.4g} s/m²" if best.psi == "forced" else "")
+        f"fit: λ̂ = {_number(best.lambda_)} ± {best.lambda_std:.2g} s/m with Ψ̂ {best.psi}"
+        + (f", ζ̂ = {_number(best.zeta)} s/m²" if best.psi == "forced" else "")
         + f"; explains {100 * best.explained:.1f} % of the recorded command"
     )
     if control.law == "auto" and not fitted:
@@ -107,3 +107,7 @@ def _other_law(pi: PiFit) -> Reading:
         f"proportional and integral with feed-forward: {pi.text}",
         f"explains {100 * pi.explained:.1f} % of the command within a second, no reading of MFHCA's law does; it has no Ψ̂ to replay",
     )
+
+
+def _number(value: float) -> str:
+    return f"{value:.4g}".replace("-", "−")

@@ -196,7 +196,7 @@ def align(signals: Signals, start_s: float | None = None, stop_s: float | None =
                 np.count_nonzero(np.abs(signal.values[part]) > _LARGEST) for part in blocks(signal.values.size)
             )
             if absurd:
-                notes.append(f"{name}: {absurd} values that are infinite or beyond {_LARGEST:g} count as no sample.")
+                notes.append(f"{name}: {absurd} values that are infinite or beyond a billion count as no sample.")
             values[name], fresh[name] = _hold(signal, periods.of(signal.stamps), start, step, size, signals.store)
             release(signal.stamps, signal.values, values[name])
     return Timeline(

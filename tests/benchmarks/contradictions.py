@@ -152,7 +152,7 @@ def fleets(count: int, first: int) -> Iterator[tuple[str, FleetDocument]]:
             missions.append(fleet_samples.Sample(f"{n}", machine, day, state, verdict, faults, {}, blind))
         with tempfile.TemporaryDirectory() as folder:
             store = fleet_samples.write_store(Path(folder) / "fleet.sqlite", missions)
-            yield f"fleet {first + k}", fleet_json(load_fleet(store))
+            yield f"fleet {first + k}", fleet_json(load_fleet(store, axis=("hours", "days")[k % 2]))
 
 
 def main() -> None:

@@ -43,6 +43,15 @@ def decided() -> tuple[dict[str, Any], samples.Columns]:
     return report, {k: np.asarray(v) for k, v in columns.items()}
 
 
+def unclear() -> tuple[dict[str, Any], samples.Columns]:
+    """The same with a first fault of which no kind has half of the probability, though each reading fits one best."""
+    report, columns = decided()
+    rows = (("stuck", 0.45), ("inefficient", 0.35), ("noisy", 0.2))
+    report["intervals"][0]["hypotheses"] = [{"side": "sensor", "mode": mode, "p": p} for mode, p in rows]
+    report["intervals"][0]["probability"] = 0.45
+    return report, columns
+
+
 def machine_events(*, faults: bool = True) -> tuple[dict[str, Any], samples.Columns]:
     """A mission of whose machine as a whole two things are told, one of them throughout."""
     report, columns = decided() if faults else samples.no_faults()

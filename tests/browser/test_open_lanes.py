@@ -24,7 +24,7 @@ def test_a_healthy_lane_is_opened_by_keyboard(open_page: OPEN) -> None:
     residual, threshold = (healthy_evidence()[1][f"evidence.FR.sensor.{n}"] for n in ("residual", "threshold"))
     near = max(abs(residual) / threshold)
     expect(lane.locator(".near")).to_have_text(
-        re.compile(r"^(Nearest to|Furthest beyond) its threshold at \d+\.\d{3} s: residual ")
+        re.compile(r"^(Nearest to|Furthest beyond) its threshold at \d:\d\d\.\d{3}: residual ")
     )
     part = re.search(r"([\d.]+) % of the threshold", lane.locator(".near").inner_text())
     assert part

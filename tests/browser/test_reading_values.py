@@ -46,7 +46,7 @@ def test_cursor_and_markers_stand_in_headings_and_pictures(open_page: OPEN) -> N
     page.mouse.move(place["x"], place["y"])
     heads = page.locator("#figure .reading p")
     expect(heads).to_have_count(page.evaluate("document.getElementById('figure').layout.annotations.length"))
-    expect(heads.first).to_contain_text(re.compile(r"3[23]\.\d{4} s .*measured 0\.21"))
+    expect(heads.first).to_contain_text(re.compile(r"0:3[23]\.\d{4} .*measured 0\.21"))
     expect(page.locator("#timeline .now").first).to_be_visible()
     assert page.locator("#path .here").get_attribute("visibility") == "visible"
     expect(page.locator(".machine [data-c=FR] .live text")).to_contain_text("0.21 m/s")
@@ -67,7 +67,7 @@ def test_cursor_and_markers_by_keys_are_spoken(open_page: OPEN) -> None:
     page = drawn(open_page("five_faults", "#fault=F1&t=27,39"))
     for key in (".", "a", ">", "b"):
         page.keyboard.press(key)
-    expect(page.locator("#live")).to_contain_text(re.compile(r"^33\.\d{3} s: commanded "))
+    expect(page.locator("#live")).to_contain_text(re.compile(r"^0:33\.\d{3}: commanded "))
     expect(page.locator("#figure .reading p").first).to_contain_text("Δt 0.")
 
 

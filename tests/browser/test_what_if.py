@@ -69,7 +69,7 @@ def test_sliders_change_residual_and_evidence(open_page: OPEN) -> None:
     page.keyboard.press("w")
     words = page.locator("#whatif-words")
     expect(words).to_contain_text(
-        re.compile(r"What if: residual [\d.]+ m/s r\.m\.s\., beyond its threshold .*, first at [\d.]+ s, ")
+        re.compile(r"What if: residual [\d.]+ m/s r\.m\.s\., beyond its threshold .*, first at 0:[\d.]+, ")
     )
     page.locator("#whatif-figure .main-svg").first.wait_for()
     times = re.compile(r"What if: residual ([\d.]+) m/s r\.m\.s\..* Log: ([\d.]+) m/s r\.m\.s\.")
@@ -77,15 +77,15 @@ def test_sliders_change_residual_and_evidence(open_page: OPEN) -> None:
     assert found
     # the log's residual passes its threshold at one time, whoever says so
     page.get_by_role("button", name="Play").click()
-    at = re.search(r"Log: .*, first at ([\d.]+) s, ", words.inner_text())
+    at = re.search(r"Log: .*, first at ([\d.:]+), ", words.inner_text())
     assert at
-    expect(page.locator("#events")).to_contain_text(f"{at[1]} s · FR speed sensor: the residual, ")
+    expect(page.locator("#events")).to_contain_text(f"{at[1]} · FR speed sensor: the residual, ")
     page.get_by_role("button", name="Pause").click()
     assert float(found[1]) == pytest.approx(float(found[2]), rel=0.15)  # as it was diagnosed, it is as it was recorded
     page.locator("#whatif-mode").select_option("inefficient")
     page.locator("#whatif-epsilon").fill("0.2")
     page.locator("#whatif-onset").fill("32")
-    expect(page.locator("#whatif-onset + output")).to_have_text(re.compile(r"^3[12]\.\d{3} s$"))
+    expect(page.locator("#whatif-onset + output")).to_have_text(re.compile(r"^0:3[12]\.\d{3}$"))
     inefficient = times.search(words.inner_text())
     assert inefficient
     assert float(inefficient[1]) < float(found[1])
@@ -144,6 +144,6 @@ def test_a_residual_that_passes_its_threshold_now_and_then_is_said_to_be_so(open
           return WhatIf.words(d, { ratio: residual, residual, spec: { start: 0, stop: 1 } }); }"""
     )
     assert (
-        "Log: 0.391 m/s r.m.s., beyond its threshold in 10 % of the fault, first at 0.400 s, 400 ms after the onset."
+        "Log: 0.391 m/s r.m.s., beyond its threshold in 10 % of the fault, first at 0:00.400, 400 ms after the onset."
         in words
     )

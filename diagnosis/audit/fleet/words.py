@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from diagnosis.audit.fleet.fleet_fault import FleetFault
 from diagnosis.audit.fleet.machines import Machine
@@ -26,7 +26,9 @@ _UNCLEARED = "No fault found, not cleared"
 _SHOWN = 3
 _NAMED = 12
 _WORK = (Verdict.STOP, Verdict.WATCH)  # verdicts that ask for work
-_UNITS = {"hours": "h of driving", "days": "days"}
+_UNITS: Mapping[Axis, str] = {"hours": "h of driving", "days": "days"}
+#: Unit of a trend's axis beside its ticks.
+TICK_UNITS: Mapping[Axis, str] = {"hours": "h", "days": "days"}
 
 
 def count(n: int, word: str) -> str:
@@ -82,20 +84,25 @@ def share(value: float) -> str:
     )
 
 
+def time_words(value: float, axis: Axis) -> str:
+    """A time on a trend's axis: ``4.2 h of driving``, ``1 day``. `value` in its unit [h or d]."""
+    words = round_to(value)
+    return f"{words} {'day' if axis == 'days' and words == '1' else _UNITS[axis]}"
+
+
 def forecast_words(f: Forecast, limit: float, axis: Axis = "hours") -> str:
     """When a limit is reached, in one phrase. `limit` has the unit of the trend [1 for ε]."""
-    unit = _UNITS[axis]
     if f.state == "not_known":
         return f"not known: {f.why}"
     if f.state == "above":
         return f"already above the limit of {share(limit)}"
     if f.state == "not_within" or f.soonest is None:
-        return f"does not reach the limit of {share(limit)} within {round_to(f.horizon)} {unit}"
+        return f"does not reach the limit of {share(limit)} within {time_words(f.horizon, axis)}"
     if f.latest is None:
-        begin = f"in {round_to(f.soonest)} {unit} at the soonest" if f.soonest > 0 else "at any time"
-        likely = f", likely in {round_to(f.likely)}" if f.likely is not None else ""
+        begin = f"in {time_words(f.soonest, axis)} at the soonest" if f.soonest > 0 else "at any time"
+        likely = f", likely in {time_words(f.likely, axis)}" if f.likely is not None else ""
         return f"may reach the limit of {share(limit)} {begin}{likely}; latest not known"
-    return f"reaches the limit of {share(limit)} in {round_to(f.soonest)} to {round_to(f.latest)} {unit} (90 %)"
+    return f"reaches the limit of {share(limit)} in {round_to(f.soonest)} to {round_to(f.latest)} {_UNITS[axis]} (90 %)"
 
 
 def standing(m: Machine) -> str:

@@ -287,7 +287,19 @@ const Now = {
     requestAnimationFrame(() => { this.asked = false; document.documentElement.dispatchEvent(new Event("now")); });
   },
   leave() { if (this.t !== null && this.a === null && !this.held) this.set(null); },
-  number: (v) => (Number.isFinite(v) ? `${+v.toPrecision(4)}`.replace("-", "−") : "–"),
+  // Numbers and times as all of the page has them: `labels.number`, `labels.clock` and `labels.span`, which round a half to the even digit.
+  number: (v, digits = 4) => (Number.isFinite(v) ? `${+v.toPrecision(digits)}`.replaceAll("-", "−") : "–"),
+  clock(seconds, digits = 3) {
+    const exact = Math.abs(seconds) * 10 ** digits, ticks = exact % 1 === 0.5 ? 2 * Math.round(exact / 2) : Math.round(exact), whole = Math.floor(ticks / 10 ** digits);
+    const [h, m, s] = [Math.floor(whole / 3600), Math.floor(whole / 60) % 60, whole % 60], two = (n) => String(n).padStart(2, "0"), rest = digits ? `.${String(ticks % 10 ** digits).padStart(digits, "0")}` : "";
+    return `${seconds < 0 && ticks ? "−" : ""}${h ? `${h}:${two(m)}` : m}:${two(s)}${rest}`;
+  },
+  seconds: (t) => t.toFixed(3), // as sentences and axes count a mission's time
+  span(seconds) {
+    const v = +seconds.toFixed(6), [x, digits, unit] = v < 1 ? [1e3 * v, 0, "ms"] : v < 120 ? [v, 1, "s"] : v < 7200 ? [v / 60, 1, "min"] : [v / 3600, 1, "h"];
+    const up = x.toFixed(digits), half = /^50*$/.test(x.toFixed(60).split(".")[1].slice(digits));
+    return `${half && +up.at(-1) % 2 ? (x - 0.25 / 10 ** digits).toFixed(digits) : up} ${unit}`;
+  },
 };
 
 // All else that the page does; where the browser cannot expand it, the page is as without scripts.

@@ -13,7 +13,7 @@ const Export = (() => {
   }
 
   async function image(figure, name, form) {
-    const times = figure.range.map((v) => `${+v.toFixed(4)} s`).join(" to "), fault = name in faults ? `${name} ${faults[name]}` : name;
+    const times = figure.range.map((v) => Now.clock(v)).join(" to "), fault = name in faults ? `${name} ${faults[name]}` : name;
     const address = await figure.image(form, `${Data.view.name} · ${fault} · ${times}`), data = address.slice(address.indexOf(",") + 1);
     if (form === "svg") save(`${name}.svg`, "image/svg+xml", decodeURIComponent(data));
     else save(`${name}.png`, "image/png", Data.fromBase64(data));

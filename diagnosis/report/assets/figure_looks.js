@@ -112,7 +112,7 @@ class FigureLooks {
     return this.rows.map((r) => curves.slice(from, from += r.traces.length + (r.band ? 1 : 0) + (r.threshold === undefined ? 0 : 2)));
   }
 
-  static duration(s) { return s < 1 ? `${+(s * 1e3).toPrecision(2)} ms` : `${+s.toPrecision(2)} s`; }
+  static duration(s) { return s < 1 ? `${Now.number(s * 1e3, 2)} ms` : `${Now.number(s, 2)} s`; }
 
   // Samples of which the extremes alone are stored, where curves are drawn from such; else 1.
   static stored(curves) { return Math.max(1, ...curves.map((c) => c.stored || 1)); }

@@ -37,7 +37,7 @@ const Lanes = {
     if (row) {
       const { part, time, residual, limit, span } = await Lanes.nearest(row), unit = row.unit === "1" ? "" : row.unit === "°" ? "°" : ` ${row.unit}`;
       if (span > 0) row.limits = [-span, span];
-      words.textContent = part < 0 ? "Its residual was never held against a threshold." : part < 1 ? `Nearest to its threshold at ${time.toFixed(3)} s: residual ${Now.number(residual)}${unit}, ${Now.number(+(100 * part).toPrecision(2))} % of the threshold of ${Now.number(limit)}${unit}.` : `Furthest beyond its threshold at ${time.toFixed(3)} s: residual ${Now.number(residual)}${unit}, ${Now.number(+part.toPrecision(2))} times the threshold of ${Now.number(limit)}${unit}. That alone is no fault: one lasts for longer.`;
+      words.textContent = part < 0 ? "Its residual was never held against a threshold." : part < 1 ? `Nearest to its threshold at ${Now.clock(time)}: residual ${Now.number(residual)}${unit}, ${Now.number(100 * part, 2)} % of the threshold of ${Now.number(limit)}${unit}.` : `Furthest beyond its threshold at ${Now.clock(time)}: residual ${Now.number(residual)}${unit}, ${Now.number(part, 2)} times the threshold of ${Now.number(limit)}${unit}. That alone is no fault: one lasts for longer.`;
     }
     await figure.draw(rows, Data.view.faults.filter((f) => f.component === component).slice(0, 40).map((f) => ({ ...f, main: false })), [0, Data.view.duration]);
   },

@@ -101,7 +101,7 @@ class Pictures {
         if (job !== this.job) return;
         bar.setAttribute("y", line ? w.middle - part * w.half - 1 : w.middle - Math.max(0, part) * w.half);
         if (!line) bar.setAttribute("height", Math.max(1, tall));
-        const size = `${Now.number(+(value * k).toPrecision(2))}${unit === "1" ? "" : unit === "°" ? unit : ` ${unit.replace("% of opening", "%")}`}`;
+        const size = `${Now.number(value * k, 2)}${unit === "1" ? "" : unit === "°" ? unit : ` ${unit.replace("% of opening", "%")}`}`;
         if (w.out || !line) texts.push(name === "u" ? `asked ${size}` : name === "u_applied" ? `${w.drive} ${size}` : size);
       }
       w.words.replaceChildren(...texts.map((text, i) => { const line = Pictures.svg("tspan", { x: w.words.getAttribute("x"), dy: i ? (w.out ? 15 : 11) : 0 }); line.textContent = text; return line; }));

@@ -84,7 +84,7 @@ class Figure extends FigureLooks {
     const { dt } = Data.view, parts = this.perRow(curves), exact = parts.filter((p) => p.every((c) => c.exact)).length, every = exact === parts.length;
     this.badge.classList.toggle("full", every);
     if (every) {
-      this.badge.textContent = `every sample drawn · ${+(1 / dt).toPrecision(4)} Hz`;
+      this.badge.textContent = `every sample drawn · ${Now.number(1 / dt)} Hz`;
       return;
     }
     const time = Figure.duration(Math.max(...curves.map((c) => c.stride)) * dt), words = [`min–max envelope · ${time}`], stored = Figure.stored(curves);

@@ -48,7 +48,7 @@ class Reading {
     const { figure } = this, layout = figure.element._fullLayout, head = document.createElement("p"), title = document.createElement("b");
     title.textContent = row.title;
     head.append(title, ` (${row.unit}) `);
-    if (!i) head.append(` ${Now.t.toFixed(4)} s${Now.a === null || Now.b === null ? "" : `, Δt ${Now.number(Now.b - Now.a)} s`} `);
+    if (!i) head.append(` ${Now.clock(Now.t, 4)}${Now.t < 60 ? "" : ` = ${Now.seconds(Now.t)} s`}${Now.a === null || Now.b === null ? "" : `, Δt ${Now.number(Now.b - Now.a)} s`} `);
     row.traces.forEach((t, j) => {
       const span = document.createElement("span"), sign = document.createElement("u"), s = Figure.style(t.role);
       sign.textContent = s.sign;
@@ -72,7 +72,7 @@ class Reading {
   // What the first row shows at the cursor, for who hears it.
   spoken() {
     const row = this.figure.rows[0];
-    return `${Now.t.toFixed(3)} s: ${row.traces.map((t, j) => `${t.name} ${Reading.words(this.values[0][j])} ${row.unit}`).join(", ")}`;
+    return `${Now.clock(Now.t)}: ${row.traces.map((t, j) => `${t.name} ${Reading.words(this.values[0][j])} ${row.unit}`).join(", ")}`;
   }
 }
 

@@ -41,6 +41,9 @@ class Replay {
     });
   }
 
+  // A fault as it is stated, which weighs more than the readings of one moment: ``stuck 96 %``, ``faulty, kind unclear``.
+  static stated(f) { return f.unclear ? f.words : `${f.words} ${Math.round(100 * f.p)}\u00a0%`; }
+
   // Whether a fault is, or may be, of a part.
   static of(f, part) { return f.component === part.c && (f.side === part.side || f.side === "sensor_or_actuator"); }
 
@@ -123,24 +126,24 @@ class Replay {
   }
 
   async crossings(part) {
-    const { limit } = Data.view, words = Data.view.words[part.side] ?? {}, out = [], mine = Data.view.faults.filter((f) => Replay.of(f, part)), near = (s) => mine.some((f) => f.start - Replay.BESIDE < s.stop && s.start < f.stop + Replay.BESIDE), get = (leaf) => this.names.get(part.base + leaf), clock = (t) => `${t.toFixed(3)} s`;
-    const value = async (leaf, t) => { const c = get(leaf); if (c === undefined) return null; const { k, unit } = Data.view.channels[c], [a, b] = await Data.at(c, t); return { v: k * (a + b) / 2, text: `${Now.number(+(k * (a + b) / 2).toPrecision(3))}${unit === "1" ? "" : unit === "°" ? unit : ` ${unit}`}` }; };
+    const { limit } = Data.view, words = Data.view.words[part.side] ?? {}, out = [], mine = Data.view.faults.filter((f) => Replay.of(f, part)), near = (s) => mine.some((f) => f.start - Replay.BESIDE < s.stop && s.start < f.stop + Replay.BESIDE), get = (leaf) => this.names.get(part.base + leaf);
+    const value = async (leaf, t) => { const c = get(leaf); if (c === undefined) return null; const { k, unit } = Data.view.channels[c], [a, b] = await Data.at(c, t); return { v: k * (a + b) / 2, text: `${Now.number(k * (a + b) / 2, 3)}${unit === "1" ? "" : unit === "°" ? unit : ` ${unit}`}` }; };
     const p = get("probability"), r = get("residual"), h = get("threshold");
     const over = r !== undefined && h !== undefined ? await Replay.passing(r, 0, h) : null;
     if (over) {
       for (const s of over) {
         const [now, top, expected] = await Promise.all(["residual", "threshold", "expected"].map((leaf) => value(leaf, s.start)));
-        out.push({ t: s.start, near: near(s), words: `${clock(s.start)} · ${part.words}: the residual, ${now.text}, passes its threshold of ${top.text}${expected && Number.isFinite(expected.v) ? `; ${expected.text} was expected` : ""}.` });
+        out.push({ t: s.start, near: near(s), words: `${Now.clock(s.start)} · ${part.words}: the residual, ${now.text}, passes its threshold of ${top.text}${expected && Number.isFinite(expected.v) ? `; ${expected.text} was expected` : ""}.` });
       }
     }
     if (p !== undefined && limit) {
       for (const s of await Replay.passing(p, limit)) {
         const t = Math.min(s.start + s.dt, s.stop), shares = (await Promise.all(part.modes.map(async ({ m }) => ({ m, p: (await value(`p_${m}`, t))?.v })))).filter((x) => x.m !== "healthy" && Number.isFinite(x.p)).sort((a, b) => b.p - a.p), [now, top] = [await value("residual", t), await value("threshold", t)];
-        const ratio = now && top && top.v > 0 && Math.abs(now.v) > top.v ? `; the residual is ${Now.number(+(Math.abs(now.v) / top.v).toPrecision(2))} times its threshold` : "";
+        const ratio = now && top && top.v > 0 && Math.abs(now.v) > top.v ? `; the residual is ${Now.number(Math.abs(now.v) / top.v, 2)} times its threshold` : "";
         const whole = mine.find((f) => f.start <= t && t < f.stop), first = shares.length ? words[shares[0].m] : "";
         const then = first && whole && whole.words !== first ? ` at first; the whole of it is ${whole.words}` : "", told = over && over.length < Replay.MOST && Data.parts(r).some((x) => x.every && x.from <= s.start && s.stop <= x.to), within = told && !over.some((o) => o.start < s.stop && s.start < o.stop), little = near(s) ? "" : `; no fault is stated here${within ? ": the residual does not stay beyond its threshold" : ""}`;
-        out.push({ t: s.start, sure: 1, words: `${clock(s.start)} · ${part.words}: the probability that it deviates passes ${Now.number(100 * limit)}\u00a0%${first ? `, ${first} ${Math.round(100 * shares[0].p)} %${then}` : ""}${ratio}${little}.` });
-        out.push({ t: s.stop, sure: 1, words: `${clock(s.stop)} · ${part.words}: the probability that it deviates falls below ${Now.number(100 * limit)}\u00a0% again.` });
+        out.push({ t: s.start, sure: 1, words: `${Now.clock(s.start)} · ${part.words}: the probability that it deviates passes ${Now.number(100 * limit)}\u00a0%${first ? `, ${first} ${Math.round(100 * shares[0].p)} %${then}` : ""}${ratio}${little}.` });
+        out.push({ t: s.stop, sure: 1, words: `${Now.clock(s.stop)} · ${part.words}: the probability that it deviates falls below ${Now.number(100 * limit)}\u00a0% again.` });
       }
     }
     return out;
@@ -151,8 +154,8 @@ class Replay {
     this.figure.drawn && this.figure.read().show();
     if (t === null) return;
     one("#scrub").value = t;
-    one("#scrub").setAttribute("aria-valuetext", `${t.toFixed(2)} seconds`);
-    one("#clock").textContent = `${t.toFixed(2)} s`;
+    one("#scrub").setAttribute("aria-valuetext", Now.clock(t, 2));
+    one("#clock").textContent = Now.clock(t, 2);
     // The last crossing of a part whose fault lasts here, else the last of all.
     const here = Data.view.faults.filter((f) => f.start <= t && t < f.stop), before = this.events.filter((e) => e.t <= t + 1e-9);
     for (const e of this.events) e.item.removeAttribute("aria-current");
@@ -174,16 +177,16 @@ class Replay {
       if (part.faults.length) {
         const f = part.faults.find((x) => x.start <= t && t < x.stop);
         part.modes.forEach(({ m }, i) => { part.bar.children[i].style.width = `${f?.mode === m ? 100 * f.p : 0}%`; });
-        part.says.textContent = f ? `${f.words} ${Math.round(100 * f.p)}\u00a0%` : "no fault stated";
+        part.says.textContent = f ? Replay.stated(f) : "no fault stated";
         part.bar.setAttribute("aria-label", `${part.words}: ${part.says.textContent}`);
         continue;
       }
       const shares = await Promise.all(part.modes.map(({ channel }) => Data.at(channel, t).then(([a, b]) => (a + b) / 2)));
       let top = -1;
       shares.forEach((p, i) => { part.bar.children[i].style.width = `${100 * (p || 0)}%`; if (p > (shares[top] ?? -1)) top = i; });
-      const most = top < 0 ? "not judged" : `${Data.view.words[part.side][part.modes[top].m]} ${Math.round(100 * shares[top])}\u00a0%`, slight = top >= 0 && part.modes[top].m !== "healthy" && !Data.view.faults.some((f) => Replay.of(f, part) && f.start <= t && t < f.stop);
+      const most = top < 0 ? "not judged" : `${Data.view.words[part.side][part.modes[top].m]} ${Math.round(100 * shares[top])}\u00a0%`, fault = here.filter((f) => Replay.of(f, part)).sort((a, b) => b.p - a.p)[0], slight = top >= 0 && part.modes[top].m !== "healthy" && !fault;
       if (slight) for (const share of part.bar.children) share.style.width = "0";
-      part.says.textContent = slight ? "no fault stated" : most;
+      part.says.textContent = fault ? Replay.stated(fault) : slight ? "no fault stated" : most;
       part.bar.setAttribute("aria-label", `${part.words}: ${part.says.textContent}`);
     }
   }

@@ -7,7 +7,7 @@ const Sight = {
     article.querySelector("h2").textContent = `${f.id} · ${f.title}`;
     const words = (await Data.intervals())[f.id];
     if (article.dataset.ev !== f.id) return;
-    const times = `${f.start.toFixed(3)} s to ${f.stop.toFixed(3)} s · ${(f.stop - f.start).toFixed(3)} s · severity ${f.severity}`;
+    const times = `${Now.clock(f.start)} to ${Now.clock(f.stop)}${f.stop < 60 ? "" : ` (${Now.seconds(f.start)} to ${Now.seconds(f.stop)} s)`} · ${Now.span(f.stop - f.start)} · severity ${f.severity}`;
     article.querySelector("p").textContent = times;
     article.dataset.text = `${f.id} ${f.title}, ${times}`;
     article.querySelector("ul").replaceChildren(...(words.evidence || []).map((s) => { const li = document.createElement("li"); li.textContent = s; return li; }));

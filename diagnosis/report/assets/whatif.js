@@ -107,14 +107,14 @@ const WhatIf = {
         if (t >= start && t < stop && Number.isFinite(ratio[i])) { sum += (d.rk * residual[i]) ** 2; n += 1; over += Math.abs(ratio[i]) > 1 ? 1 : 0; }
       }
       const share = 100 * over / (n || 1), part = over === n ? "all the time" : `in ${share < 1 ? "less than 1" : share > 99 ? "more than 99" : Now.number(Math.round(share))} % of the fault`;
-      return { over, words: `${Now.number(+Math.sqrt(sum / (n || 1)).toPrecision(3))} ${d.runit} r.m.s.`, part };
+      return { over, words: `${Now.number(Math.sqrt(sum / (n || 1)), 3)} ${d.runit} r.m.s.`, part };
     };
     // As the sentences of the replay have it: some samples on end.
     const beyond = Replay.stretches({ y: w.ratio, t: d.t, dt: d.dt, stride: d.stride }, (i) => Replay.over(Math.abs(w.ratio[i]), 1)).find((s) => s.stop > w.spec.start && s.start < w.spec.stop);
-    const late = (s, onset, { over, part }) => { if (!s) return over ? `beyond its threshold ${part}, in single readings only` : "never beyond its threshold"; const ms = 1000 * (s.start - onset), is = `${Now.number(+Math.abs(ms).toPrecision(3))} ms`; return `beyond its threshold ${part}, first at ${s.start.toFixed(3)} s, ${Math.abs(ms) < 0.5 ? "the onset" : ms > 0 ? `${is} after the onset` : `${is} before the onset stated`}`; };
-    const seen = d.f.detected, other = seen !== null && d.passes && Math.abs(seen - d.passes.start) > 2 * d.dt ? ` The fault was detected at ${seen.toFixed(3)} s by its probability, which weighs the readings together; the residual is one of them.` : "";
+    const late = (s, onset, { over, part }) => { if (!s) return over ? `beyond its threshold ${part}, in single readings only` : "never beyond its threshold"; const ms = 1000 * (s.start - onset), is = `${Now.number(Math.abs(ms), 3)} ms`; return `beyond its threshold ${part}, first at ${Now.clock(s.start)}, ${Math.abs(ms) < 0.5 ? "the onset" : ms > 0 ? `${is} after the onset` : `${is} before the onset stated`}`; };
+    const seen = d.f.detected, other = seen !== null && d.passes && Math.abs(seen - d.passes.start) > 2 * d.dt ? ` The fault was detected at ${Now.clock(seen)} by its probability, which weighs the readings together; the residual is one of them.` : "";
     const then = size(w.ratio, w.residual, w.spec), log = size(d.residual.map((v, i) => v / d.threshold[i]), d.residual, d.f);
-    return `What if: residual ${then.words}, ${late(beyond, w.spec.start, then)}${beyond && d.stride > 1 ? `, to ${Figure.duration(d.dt)}` : ""}. Log: ${log.words}, ${late(d.passes, d.f.start, log)}.${other}${d.plant ? ` Wheel model found here: K = ${Now.number(+d.plant.K.toPrecision(3))} m/s, τ = ${Now.number(+d.plant.tau.toPrecision(2))} s, dead zone ${Now.number(100 * d.plant.dead)} %; it explains ${Now.number(+(100 * d.plant.explains).toPrecision(3))} % of the healthy speed.` : ""}`;
+    return `What if: residual ${then.words}, ${late(beyond, w.spec.start, then)}${beyond && d.stride > 1 ? `, to ${Figure.duration(d.dt)}` : ""}. Log: ${log.words}, ${late(d.passes, d.f.start, log)}.${other}${d.plant ? ` Wheel model found here: K = ${Now.number(d.plant.K, 3)} m/s, τ = ${Now.number(d.plant.tau, 2)} s, dead zone ${Now.number(100 * d.plant.dead)} %; it explains ${Now.number(100 * d.plant.explains, 3)} % of the healthy speed.` : ""}`;
   },
 };
 
@@ -151,9 +151,9 @@ class WhatIfPanel {
     one("#whatif-epsilon").disabled = fixed;
     one("#whatif-sat").disabled = mode === "no_signal" || mode === "inefficient";
     const say = (id, words) => { one(`${id} + output`).textContent = words; one(id).setAttribute("aria-valuetext", words); };
-    say("#whatif-epsilon", fixed ? "1" : Now.number(+value("#whatif-epsilon").toPrecision(3)));
-    say("#whatif-sat", one("#whatif-sat").disabled ? "0" : `${Now.number(+value("#whatif-sat").toPrecision(3))} ${this.unit}`);
-    say("#whatif-onset", `${value("#whatif-onset").toFixed(3)} s`);
+    say("#whatif-epsilon", fixed ? "1" : Now.number(value("#whatif-epsilon"), 3));
+    say("#whatif-sat", one("#whatif-sat").disabled ? "0" : `${Now.number(value("#whatif-sat"), 3)} ${this.unit}`);
+    say("#whatif-onset", Now.clock(value("#whatif-onset")));
     const w = WhatIf.run(d, { mode, epsilon: value("#whatif-epsilon"), sat: value("#whatif-sat") / d.channel.k, start: value("#whatif-onset") });
     one("#whatif-words").textContent = WhatIf.words(d, w);
     const room = Math.max(1, (f.stop - f.start) / 2);

@@ -179,6 +179,19 @@ def test_one_line_of_spells_says_between_which_values_they_lie(
     assert "differs" in seen
 
 
+def test_a_spell_whose_kind_is_unclear_stands_beside_those_that_are_clear(
+    calls: dict[str, Any], capsys: pytest.CaptureFixture[str]
+) -> None:
+    several = result(*["medium"] * 4)
+    rows = [("stuck", 0.4), ("noisy", 0.35), ("inefficient", 0.25)]
+    several.report["intervals"][2]["hypotheses"] = [{"side": "sensor", "mode": mode, "p": p} for mode, p in rows]
+    calls["result"] = several
+    run(["diagnose", "drive.mcap"])
+    seen = capsys.readouterr().out
+    assert "stuck, 3 times" in seen
+    assert "faulty, kind unclear" in seen
+
+
 def test_json_is_the_report_alone(calls: dict[str, Any], capsys: pytest.CaptureFixture[str]) -> None:
     calls["result"] = result("low")
     assert run(["diagnose", "drive.mcap", "--json", "-v"]) == 1

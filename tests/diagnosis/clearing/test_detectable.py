@@ -7,12 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from diagnosis.clearing import axle_rates
 from diagnosis.clearing.alone import Straight
 from diagnosis.clearing.cells import Frame
 from diagnosis.clearing.checks import checks_of
 from diagnosis.clearing.detectable import detectable, places_of
 from diagnosis.clearing.gauges import Gauges, gauges_of
 from diagnosis.clearing.placements import Placements, countered, placements
+from diagnosis.results.clearing import Check
 from diagnosis.results.detectability import Deviation
 from diagnosis.results.machine_words import HYDRAULIC
 from replay.faults import FaultMode, FaultSpec, Side
@@ -102,6 +104,31 @@ def test_what_is_stated_is_no_place_for_another_fault() -> None:
     assert not np.any((places.first * cells.dt > 10.2) & (places.last * cells.dt < 29.8))
 
 
+def test_what_is_stated_for_most_of_the_mission_leaves_nothing_to_show_over_all_of_it() -> None:
+    cells = in_cells(simulated(), base=True)
+    stated = replace(cells, stated={"FR": [(5.0, 55.0)], "front": [(5.0, 55.0)]})
+    for part, side in (("FR", Side.ACTUATOR), ("front", Side.ACTUATOR)):
+        free, told = (next(g for g in gauges_of(x) if (g.component, g.side) == (part, side)) for x in (cells, stated))
+        assert {Deviation.INEFFICIENT, Deviation.EXCESS} <= set(free.lasting)
+        assert not told.lasting
+    sensor = next(g for g in gauges_of(stated) if (g.component, g.side) == ("FR", Side.SENSOR))
+    assert sensor.rough is not None
+    assert np.isnan(sensor.rough.quick[stated.explained("FR")]).all()
+
+
+def test_a_window_that_is_rough_as_it_is_shows_no_noise_of_no_size() -> None:
+    mission, name = simulated(), "wheel.FR.v"
+    x = mission.columns[name].copy()
+    x[2000:2400] += 0.1 * np.random.default_rng(2).standard_normal(400)
+    rough = next(
+        g for g in gauges_of(in_cells(replace(mission, columns={**mission.columns, name: x}), base=True))
+    ).rough
+    assert rough is not None
+    assert np.isnan(rough.quick).any()
+    known = np.isfinite(rough.quick)
+    assert (rough.quick[known] < (rough.limit * rough.size)[known]).all()
+
+
 def test_a_part_that_rests_has_no_places() -> None:
     moving = np.zeros(600, dtype=np.bool_)
     assert placements(moving, 20, 600).first.size == 0
@@ -138,3 +165,18 @@ def test_a_window_that_is_beyond_the_limit_as_it_is_shows_no_fault_of_no_size() 
     rows = detectable(in_cells(mission, base=False)).rows
     sizes = [r.size for r in rows if (r.component, r.side) == ("FR", Side.ACTUATOR) and r.size is not None]
     assert min(sizes) > 0.0
+
+
+def test_what_would_show_of_axles_is_what_their_check_leaves(monkeypatch: pytest.MonkeyPatch) -> None:
+    bands = np.array([0.0, 0.035])  # so nearly alike that the check takes them as one
+    monkeypatch.setattr(axle_rates, "dead_bands", lambda rate, opening: bands)
+    cells = in_cells(simulated(), base=True)
+    asked = {c.component: c for c in checks_of(cells, HYDRAULIC) if c.check is Check.LASTING_RATE}
+    assert set(asked) == {"front", "rear"}
+    for g in gauges_of(cells):
+        if g.component in asked:
+            check = asked[g.component]
+            assert check.passed
+            assert check.worst is not None
+            room = min(-np.log1p(-g.lasting[Deviation.INEFFICIENT]), np.log1p(g.lasting[Deviation.EXCESS]))
+            assert room == pytest.approx(check.limit - check.worst)

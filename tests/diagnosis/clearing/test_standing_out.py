@@ -136,6 +136,7 @@ def test_states_of_both_sides_say_the_fault_but_where_nothing_was_known() -> Non
     (fault,) = _found(FaultSpec("RR", Side.ACTUATOR, FaultMode.NO_SIGNAL, *WHOLE)).values()
     states = np.full(round(100 * LENGTH) + 1, CODE[State.HEALTHY])
     states[: fault.start + 5] = CODE[State.NO_DATA]
+    states[fault.start + 50 : fault.start + 90] = CODE[State.SLIP]  # or its sensor is faulty: it is
     before = {(c, s): Assessment(states) for c in ("RR", "FR") for s in ("sensor", "actuator")}
     after = with_findings(before, {"RR": fault})
     assert after["FR", "sensor"] is before["FR", "sensor"]

@@ -45,7 +45,7 @@ def test_a_small_offset_is_none(offset: float) -> None:
 @pytest.mark.parametrize("offset", [0.05, -0.05])
 def test_an_offset_is_told_with_its_size_and_sign(offset: float) -> None:
     text = offset_at_rest(logged(gyro(offset), course()), haulotte())
-    sign = "+" if offset > 0.0 else "-"
+    sign = "+" if offset > 0.0 else "−"
     assert f"reads up to {sign}2.9°/s whenever the machine stands" in text
 
 

@@ -56,3 +56,11 @@ def test_samples_without_a_number_are_a_gap() -> None:
     (row,) = [r for r in checks(signals, told, line, (), (), {}, None, HYDRAULIC) if r["check"] == "Gaps"]
     assert row["ok"] is False
     assert "longest 2.01 s" in str(row["result"])
+
+
+def test_notes_have_minus_signs() -> None:
+    told = recorded(Signals({}, {}), LINE, HYDRAULIC)
+    found = checks(
+        Signals({}, {}, ("u reads -0.02 at rest, as a-1.csv has it",)), told, LINE, (), (), {}, None, HYDRAULIC
+    )
+    assert "u reads −0.02 at rest, as a-1.csv has it" in [r["result"] for r in found]

@@ -13,7 +13,7 @@ from numpy.testing import assert_array_equal
 from diagnosis.channels.sample_status import PAIR, SILENT, SKIP, sample_status
 from diagnosis.direct.assess import assess_pair
 from diagnosis.direct.inputs import Pair
-from diagnosis.direct.stated_row import stated_row
+from diagnosis.direct.stated_row import as_sure, of_a_constant, stated_row
 from diagnosis.estimation.fault_models import HEALTHY, INEFFICIENT, NO_SIGNAL, NOISY, STUCK
 from diagnosis.results.assessment import CODE, Assessment, Finding
 from diagnosis.results.fault_rows import ROWS
@@ -146,6 +146,24 @@ def test_a_clearly_more_probable_row_is_stated_unless_the_rows_are_alike() -> No
     assert row(INEFFICIENT, STUCK, still=True) == INEFFICIENT
     near = np.array([0.0, 0.3, 0.0, 0.2, 0.5])
     assert stated_row(STUCK, near, zero=False, still=False) == STUCK
+
+
+def test_no_row_is_more_probable_than_the_one_that_is_stated() -> None:
+    p = np.zeros(5)
+    p[[NOISY, STUCK, INEFFICIENT, HEALTHY]] = 0.45, 0.48, 0.04, 0.03
+    got = as_sure(p, NOISY, Side.ACTUATOR)
+    assert got[[NOISY, STUCK]].tolist() == pytest.approx([0.465, 0.465])
+    assert (got[INEFFICIENT], got[HEALTHY]) == (0.04, 0.03)
+
+
+def test_a_constant_that_is_shared_is_called_by_no_less_than_its_likeliest_row() -> None:
+    p = np.zeros(5)
+    p[[STUCK, INEFFICIENT, NOISY, NO_SIGNAL, HEALTHY]] = 0.45, 0.05, 0.38, 0.1, 0.02
+    got = of_a_constant(p)
+    assert got[STUCK] == got[INEFFICIENT] == got[NOISY] == pytest.approx(0.88 / 3)
+    assert (got[NO_SIGNAL], got[HEALTHY], got.sum()) == (0.1, 0.02, pytest.approx(1.0))
+    p[[STUCK, NOISY]] = 0.8, 0.03
+    assert of_a_constant(p)[[STUCK, INEFFICIENT, NOISY]].tolist() == pytest.approx([0.425, 0.425, 0.03])
 
 
 def test_epsilon_is_a_share_unless_outside_the_table() -> None:

@@ -367,3 +367,16 @@ def test_a_fault_of_unclear_kind_has_the_symbol_of_none() -> None:
     assert 'class="fb warning' in text
     assert 'class="fb warning' not in clear
     assert "</svg></span>Faulty, kind unclear</span>" in text.partition('id="timeline"')[2].partition("</section>")[0]
+
+
+def test_a_check_of_the_data_that_passes_with_an_effect_has_no_tick() -> None:
+    report, columns = samples.no_faults()
+    open_ = {"check": "Scale of speeds", "result": "not checked", "effect": "an error would not show", "ok": True}
+    page = build_page({**report, "quality": [*report["quality"], open_]}, columns)  # type: ignore[typeddict-item]
+    shown = {
+        name: sign
+        for sign, name in re.findall(
+            r'class="ic (\w+)" aria-hidden="true"><svg(?:(?!<td).)*</svg></span>([^<]+)</span></td>', page
+        )
+    }
+    assert (shown["Scale of speeds"], shown["Sample rate"]) == ("not_assessed", "healthy")

@@ -23,9 +23,9 @@ def test_a_channel_that_hardly_moved_is_given_by_its_two_ends(least: float, most
 def test_what_turns_does_so_in_degrees_a_second_as_the_page_has_it() -> None:
     assert (turn(0.1), turn(-0.05), turn(0.1, sign="+"), turn(-0.1, sign="+")) == (
         "5.7°/s",
-        "-2.9°/s",
+        "−2.9°/s",
         "+5.7°/s",
-        "-5.7°/s",
+        "−5.7°/s",
     )
     assert amount(0.5, "rad/s", 2) == "29°/s"
 

@@ -120,6 +120,17 @@ def test_beside_a_command_that_rests_a_share_may_be_a_constant_that_is_missing()
     )
 
 
+def test_what_is_less_probable_already_is_not_more_so_for_a_command_that_rests() -> None:
+    rows = (("stuck", 0.5), ("noisy", 0.4), ("outside_table", 0.1))
+    hypotheses = tuple(Hypothesis(Side.ACTUATOR.value, mode, p) for mode, p in rows)
+    before = Finding(*SPAN, Side.ACTUATOR, FaultMode.STUCK, 0.5, hypotheses, None, None, (), Tier.MODEL)
+    inputs = axle({"u": np.full(SIZE, 0.2), "u_applied": np.full(SIZE, 0.1)}, DT)
+    inputs.valve_redundant = False  # type: ignore[misc]
+    (after,) = of_one_cause(Side.ACTUATOR, SideFindings((before,), ()), inputs, 0.05).findings
+    assert (after.probability, after.hypotheses) == (0.5, hypotheses)
+    assert "off by a constant would look the same" in after.evidence[-1]
+
+
 def test_a_sensor_that_stands_still_says_what_the_second_one_shows_meanwhile() -> None:
     angle = 0.3 * np.sin(np.arange(SIZE) * DT * 3.0)
     stuck = np.where((np.arange(SIZE) >= SPAN[0]) & (np.arange(SIZE) < SPAN[1]), 0.1, angle)

@@ -102,7 +102,7 @@ GOOD = T0 + TRUE
 HEADERS: dict[str, tuple[Stamps, list[str], float]] = {
     "in order": (GOOD, [], 0.0),
     "an hour ahead from 5 s on": (GOOD + after(5, HOUR), ["/joints", "jump once", "+3600.000 s after 5.0 s"], 0.0),
-    "an hour back from 5 s on": (GOOD + after(5, -HOUR), ["jump once", "-3600.000 s"], 0.0),
+    "an hour back from 5 s on": (GOOD + after(5, -HOUR), ["jump once", "−3600.000 s"], 0.0),
     "set by NTP after 3 s": (GOOD + after(3, 300_000_000), ["jump once", "+0.300 s after 3.0 s", "taken out"], 0.1),
     "set twice": (GOOD + after(3, -400_000_000) + after(8, 150_000_000), ["jump 2 times"], 0.1),
     "unset until 4 s": (np.where(TRUE < 4 * S, TRUE, GOOD), ["jump once", "days"], 1.0),

@@ -46,7 +46,6 @@ _STANDING = 2  # faults of a machine that its row names
 _BLIND = 100  # machines whose parts that were not judged are listed
 _FAILURES = 1000
 _FILTER = (Verdict.STOP, Verdict.WATCH, Verdict.READY, Verdict.NOT_ASSESSED)
-_UNITS = {"hours": "h", "days": "d"}
 _DEFINITIONS = (
     "The verdict of a machine is that of its last mission that could be judged. It is worse where no later mission judged "
     "the part of an earlier fault. A machine counts as ready only if no mission without a verdict may be later. A log that cannot "
@@ -118,9 +117,7 @@ def build_fleet_page(found: FleetDocument) -> str:
         "unlisted": max(0, len(present) - _FAULTS),
         "past": [fault_context(f, document, directions) for f in past[:_FAULTS]],
         "past_count": len(past),
-        "trends": [
-            course(t, document["machines"], _UNITS[axis], standing[t["machine"]], _start_of(document)) for t in drawn
-        ],
+        "trends": [course(t, document["machines"], axis, standing[t["machine"]], _start_of(document)) for t in drawn],
         "keys": keys(drawn),
         "quiet": len(trends) - len(drawn),
         "brief": sum(t["forecast"]["state"] == "not_known" for t in trends if all(t is not d for d in drawn)),

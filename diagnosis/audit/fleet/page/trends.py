@@ -9,8 +9,8 @@ from diagnosis.audit.fleet.fleet_types import MachineRow
 from diagnosis.audit.fleet.page.shown import Context
 from diagnosis.audit.fleet.page.svg import physical, trend_picture
 from diagnosis.audit.fleet.runs import sides_of
-from diagnosis.audit.fleet.trend_types import TrendRow
-from diagnosis.audit.fleet.words import count, round_to, share
+from diagnosis.audit.fleet.trend_types import Axis, TrendRow
+from diagnosis.audit.fleet.words import TICK_UNITS, count, share, time_words
 from diagnosis.decision.wording import join_words
 from diagnosis.pages.labels import utc
 from diagnosis.results.fault_rows import state_label
@@ -52,6 +52,11 @@ def _between(t: TrendRow) -> float:
     """Mean time between missions of a trend, in the unit of its axis."""
     at = [point[1] for point in t["points"]]
     return (max(at) - min(at)) / max(1, len(at) - 1)
+
+
+def _fitted(t: TrendRow) -> str:
+    """Which missions the line goes through: a step or bend starts a new one."""
+    return "all missions" if t["first"] == 0 else f"the {len(t['points']) - t['first']} missions since the last change"
 
 
 def chosen(trends: Sequence[TrendRow], dead: Callable[[TrendRow], bool] = lambda t: False) -> list[TrendRow]:
@@ -101,11 +106,11 @@ def keys(trends: Sequence[TrendRow]) -> Context:
 def course(
     t: TrendRow,
     machines: Sequence[MachineRow],
-    unit: str,
+    axis: Axis,
     standing: Sequence[FleetFaultRow] = (),
     start_of: Callable[[int], int | None] = lambda place: None,
 ) -> Context:
-    """Title, picture and words of one course; `start_of` a mission's place gives when it began [ns]."""
+    """Title, picture and words of one course over an axis; `start_of` a mission's place gives when it began [ns]."""
     title = f"{machines[t['machine']]['label']} · {words_of(machines[t['machine']]).part_words(t['kind'], t['component'], t['side'])}"
     line = t["line"]
     notes = []
@@ -118,14 +123,16 @@ def course(
         least, most = physical(t)
         level = {k: min(max(line["level"][k], least), most) for k in ("value", "low", "high")}
         notes.append(
-            f"over its whole last mission, fast driving counting more, {_tenths(t['points'][-1][2])} % was lost; the line through all missions is "
+            f"over its whole last mission, fast driving counting more, {_tenths(t['points'][-1][2])} % was lost; the line through {_fitted(t)} is "
             f"at {_tenths(level['value'])} % now ({_tenths(level['low'])} to {_tenths(level['high'])} %) and changes by {low} to {high} points per mission "
-            f"({round_to(between)} {unit} apart), 95 %".replace("-", "−")
+            f"({time_words(between, axis)} apart), 95 %".replace("-", "−")
         )
     notes += [
-        {"drop": "falls by {:.2f}: repaired?", "rise": "rises by {:.2f} at once", "bend": "the slope changes"}[
-            c["kind"]
-        ].format(abs(c["size"]))
+        {
+            "drop": "falls by {} points at once, as by a repair",
+            "rise": "rises by {} points at once",
+            "bend": "the slope changes",
+        }[c["kind"]].format(_tenths(abs(c["size"])))
         for c in t["changes"]
     ]
     if t["outliers"]:
@@ -147,7 +154,7 @@ def course(
         "title": title,
         "dates": _dates(t, start_of),
         "state": state,
-        "picture": trend_picture(t, title, unit),
+        "picture": trend_picture(t, title, TICK_UNITS[axis]),
         "words": words[:1].upper() + words[1:],
         "more": " ".join(f"{note[:1].upper()}{note[1:]}." for note in notes),
     }

@@ -109,7 +109,7 @@ def test_a_trend_is_drawn_with_its_limit_its_change_and_its_outlier(tmp_path: Pa
         assert style in picture
     assert "22 missions; " in picture
     page = build_fleet_page(d)
-    assert "repaired?" in page
+    assert "as by a repair" in page
     assert "1 outlier excluded" in page
 
 
