@@ -93,8 +93,9 @@ class PiFit:
     @property
     def text(self) -> str:
         """The law with its gains."""
-        terms = [f"{self.feed_forward:.3g}·v_c", f"{self.kp:.3g}·e", f"{self.ki:.3g}·∫e dt"]
-        return f"u = {' − '.join(terms)}"
+        terms = ((self.feed_forward, "v_c"), (-self.kp, "e"), (-self.ki, "∫e dt"))
+        text = " ".join(f"{'−' if gain < 0.0 else '+'} {abs(gain):.3g}·{of}" for gain, of in terms)
+        return f"u = {text.removeprefix('+ ')}"
 
 
 def fit_pi(u: Array, v: Array, v_c: Array, dt: float, u_max: float, driving: float) -> PiFit | None:

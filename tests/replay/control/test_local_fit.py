@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from replay.control.local_fit import fit_pi, local_lambda, spread_windows
+from replay.control.local_fit import PiFit, fit_pi, local_lambda, spread_windows
 
 DT = 0.002
 N = 60_000
@@ -74,3 +74,8 @@ def test_windows_are_whole_and_within() -> None:
         assert places.shape[1] == length
         assert places.size == 0 or (places.max() < size and np.all(np.diff(places, axis=1) == 1))
         assert len(np.unique(places)) == places.size
+
+
+def test_the_sign_of_a_gain_stands_between_the_terms() -> None:
+    assert PiFit(1.28, 2.0, 0.5, (0.0, 0.0, 0.0), 0.9).text == "u = 1.28·v_c − 2·e − 0.5·∫e dt"
+    assert PiFit(1.28, -0.875, 0.733, (0.0, 0.0, 0.0), 0.9).text == "u = 1.28·v_c + 0.875·e − 0.733·∫e dt"
