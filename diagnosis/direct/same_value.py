@@ -84,9 +84,11 @@ def _stuck(f: Finding, words: Sentence) -> Finding:
 
 
 def _lost(f: Finding, lost: float, words: Sentence) -> Finding:
-    """A finding as inefficient by such a loss [1], of those that it was as probably stuck."""
+    """A finding as inefficient by such a loss [1], of those that it was as probably stuck; what it lost by itself is no evidence of its own then."""
     told = _of_row(f, FaultMode.INEFFICIENT, [mode.value for mode in _EITHER], words)
-    return replace(told, epsilon=Epsilon(lost, max(0.0, lost - _ABOUT), min(1.0, lost + _ABOUT)), sat=None)
+    evidence = tuple(e for e in told.evidence if not is_about(e, About.SHARE) and not is_about(e, About.SAT))
+    size = Epsilon(lost, max(0.0, lost - _ABOUT), min(1.0, lost + _ABOUT))
+    return replace(told, epsilon=size, sat=None, evidence=evidence)
 
 
 def _of_row(f: Finding, row: FaultMode, of: Sequence[str], words: Sentence) -> Finding:

@@ -42,7 +42,7 @@ def told(values: tuple[float, ...], commands: tuple[float, ...] = COMMANDS, sure
             Finding(
                 a, b, Side.ACTUATOR, FaultMode.STUCK, stuck,
                 tuple(Hypothesis("actuator", mode.value, p) for mode, p in rows),
-                Epsilon(1.0, 0.6, 1.0), None, (Sentence(About.EITHER, "Either."),), Tier.DIRECT,
+                Epsilon(1.0, 0.6, 1.0), None, (Sentence(About.EITHER, "Either."), Sentence(About.SHARE, "Its own.")), Tier.DIRECT,
             )
         )  # fmt: skip
     return in_one_row(found, measured)
@@ -64,6 +64,7 @@ def test_one_share_of_other_commands_is_a_loss() -> None:
     assert found[0].epsilon is not None
     assert found[0].epsilon.value == pytest.approx(0.5, abs=0.02)
     assert "one share, 0.50, of command" in found[0].evidence[-1]
+    assert not any(is_about(e, About.SHARE) for f in found for e in f.evidence)  # of one spell, with other bounds
 
 
 @pytest.mark.parametrize(
