@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 _SLIPS = {
-    "a sentence that begins small": r"[.!?] (?!wheel\.|steer\.|imu\.|mfhca|filterpy|e\.g)[a-z]",
+    "a sentence that begins small": r"[.!?] (?!wheel\.|steer\.|imu\.|mfhca|filterpy|e\.g|[xyz]\b)[a-z]",
     "empty brackets": r"\(\s*\)",
     "one of many": r"\b1 (faults|parts|wheels|missions|samples|reasons|checks|seconds)\b",
     "another word for what is said so elsewhere": r"judged too briefly|control signal|assessed the part",
