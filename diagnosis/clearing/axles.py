@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from diagnosis.clearing.axle_rates import Rates, one_joint, rates_of
 from diagnosis.clearing.cells import Array, Cells
-from diagnosis.clearing.commanded_angles import commanded_angle, off_command
+from diagnosis.clearing.commanded_angles import commanded_angle
 from diagnosis.clearing.measure import alone, compared, lasts, times, worst
 from diagnosis.clearing.responses import largest
 from diagnosis.clearing.seconds import slope_off
@@ -84,8 +84,8 @@ def axle_checks(cells: Cells, clear_at: float) -> Iterator[Checked]:
             yield _beside_second(cells, axle, angle[:, j], second[:, j], clear_at)
         if not np.isfinite(np.column_stack([second[:, j], used[:, j], cells.means("imu.yaw_rate")])).any():
             yield Checked(*about, Side.SENSOR, Check.ANGLE_SCALE, None, clear_at)
-        if np.isfinite(off_command(cells, j)).any():
-            yield commanded_angle(cells, j)
+        if (asked := commanded_angle(cells, j)).worst is not None:
+            yield asked
         if np.isfinite(command[:, j]).any():
             yield _still(cells, j, limit)
             twice = both[j]

@@ -163,11 +163,10 @@ def relation(value: Array, other: Array, aside: Flags, cell_s: float, gains: tup
         if r is None:
             continue
         found.append(Relation(r.gain, delay, reach, r.noise, r.spread, r.usual, y, _later(unshifted, delay)))
-    if any(
-        np.isinf(r.least) for r in found
-    ):  # what leaps ahead of the body, as wheels that slip, does so within one of the windows
-        found = [r for r in found if np.isinf(r.least)]
-    return min(found, key=lambda r: r.least, default=None)
+    loose = [
+        r for r in found if np.isinf(r.least)
+    ]  # what leaps ahead of the body, as wheels that slip, does so within one of the windows
+    return min(loose or found, key=lambda r: r.least, default=None)
 
 
 def _later(x: Array, delay: int) -> Array:

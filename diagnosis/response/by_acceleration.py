@@ -141,20 +141,15 @@ def jumps_of(data: FollowerData) -> list[Jump]:
         return []
     usual = float(np.quantile(np.abs(value[value != 0.0]), 0.9)) if np.any(value) else 0.0
     out: list[Jump] = []
-    for k in (np.flatnonzero(np.abs(np.diff(value[:-1])) > 0.5 * _JUMP * usual) + 1).tolist():
-        before, behind = (
-            float(np.median(value[max(0, k - _LEVEL) : k])),
-            float(np.median(value[k + 1 : k + 1 + _LEVEL])),
-        )
-        size = abs(behind - before)
-        if not np.isfinite(behind) or size < _JUMP * usual or before * behind < 0.0:
-            continue
-        if (
-            abs(value[k - 1] - before) > _STEADY * size
-            or abs(value[min(k + 1, value.size - 1)] - behind) > _STEADY * size
-        ):
-            continue
-        if out and step[k] - out[-1].step <= step[k] - step[k - 1]:  # one jump over two readings
+    at = np.flatnonzero(np.abs(np.diff(value)) > 0.5 * _JUMP * usual) + 1
+    at = at[(at >= _LEVEL) & (at < value.size - _LEVEL)]
+    near = np.arange(1, _LEVEL + 1)
+    befores, behinds = (np.median(value[at[:, np.newaxis] + side * near], axis=1) for side in (-1, 1))
+    size = np.abs(behinds - befores)
+    from_levels = np.maximum(np.abs(value[at - 1] - befores), np.abs(value[at + 1] - behinds))
+    sharp = (size >= _JUMP * usual) & (befores * behinds >= 0.0) & (from_levels <= _STEADY * size)
+    for k, before, behind in zip(at[sharp].tolist(), befores[sharp].tolist(), behinds[sharp].tolist(), strict=True):
+        if out and out[-1].step >= step[k - 1]:  # one jump over two readings
             continue
         out.append(Jump(int(step[k]), before, behind))
     return out

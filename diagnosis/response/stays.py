@@ -63,7 +63,7 @@ def stays_though_told(one: Judged, driving_speed: float) -> list[Finding]:
     out: list[Finding] = []
     for start, stop in runs_of(known & (size <= STILL * driving_speed)):
         there = slice(start, stop)
-        if np.count_nonzero(told[there] & others[there]) * dt < _LEAST_S:
+        if (stop - start) * dt < _LEAST_S or np.count_nonzero(told[there] & others[there]) * dt < _LEAST_S:
             continue
         if float(np.mean(others[there][told[there]])) < _OTHERS_MOVE:
             continue
