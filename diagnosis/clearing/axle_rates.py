@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from diagnosis.clearing.cells import Array, Cells, Frame
 from diagnosis.clearing.responses import clear_change, growth, largest_change
 from diagnosis.clearing.still import ALIKE, OVERLAP, beyond, dead_bands, stands
+from diagnosis.clearing.valve_lag import in_time
 
 Flags = NDArray[np.bool_]
 
@@ -60,11 +61,28 @@ class Rates(NamedTuple):
 
 
 def rates_of(cells: Cells, rate: Array, opening: Array) -> Rates:
-    """Steering rates per opening beyond what of it moves nothing, while no fault is stated; arrays (cells, axles)."""
-    dead, frame = dead_bands(rate, opening), Frame(cells.size, max(1, round(_RATE_S / cells.dt)), cells.frame.hop)
+    """Steering rates per opening beyond what of it moves nothing, while no fault is stated; arrays (cells, axles).
+
+    Off and changed by no more than with the opening as late as it is answered: of short strokes much is the valve's lag.
+    """
     use = np.isfinite(rate) & np.isfinite(opening)
     for k, axle in enumerate(cells.machine.axles):
         use[:, k] &= np.asarray(~cells.told(axle) | cells.mostly_explained(axle), dtype=np.bool_)
+    found = _rates(cells, rate, opening, use)
+    late = in_time(rate, opening, use, cells.dt)
+    answered = _rates(cells, rate, late, use & np.isfinite(late))
+    told = np.isfinite(answered.off).any(axis=0)
+    off = np.where(told, _nearest([found.off, answered.off]), found.off)
+    changes, parted = (
+        [a if b is None else b if a is None else min(a, b) for a, b in zip(*both, strict=True)]
+        for both in ((found.changes, answered.changes), (found.parted, answered.parted))
+    )
+    return found._replace(off=off, changes=changes, parted=parted)
+
+
+def _rates(cells: Cells, rate: Array, opening: Array, use: Flags) -> Rates:
+    """The rates per these openings where they count, arrays (cells, axles)."""
+    dead, frame = dead_bands(rate, opening), Frame(cells.size, max(1, round(_RATE_S / cells.dt)), cells.frame.hop)
     unsure = np.maximum(_UNSURE, _EDGE * dead)
     steered, turned, opened = beyond(rate, opening, use, dead)
     # at the edge of a dead band, what of an opening moves something is not known

@@ -30,8 +30,8 @@ Flags = NDArray[np.bool_]
 
 FLOOR_RAD = 0.06  # deviations are shares of at least this angle
 _SMALL = 0.1  # of that angle: an axle that is steered by less, root mean square, shows nothing
-#: Limits of the rate in windows and over the mission, as multiples of the loss that counts, by whether angle and opening are measured twice.
-RATE = {False: (2.0, 0.6), True: (1.6, 0.6)}
+#: Limits of the rate in windows and over the mission, as multiples of the loss that counts.
+RATE = 1.1, 0.6
 #: Of the loss that counts, and times the other axle's: a change of one axle alone. Dead bands that are not known hide half of one.
 _CHANGED, _ALONE = 0.3, 1.5
 _CHANGED_TWICE = (
@@ -41,9 +41,6 @@ _ONE_AXLE = 0.75  # of the loss that counts: a change of the only axle, whose oi
 #: Of the loss that counts, and times the other axle's: a deviation of one axle alone in windows. Of 36 healthy tuning missions of nine machines
 #: the axles' largest ones were alike within a factor of 2.6.
 _BRIEF, _BRIEF_ALONE = 0.9, 3.0
-#: The same where both sides are measured twice: what lies behind the valve shows in the rate alone. Of 28 healthy tuning missions of 14 machines none
-#: that is cleared had more.
-_BRIEF_TWICE = 1.2
 #: Axles of which the others' median is a measure; of the loss that counts, and times the others': what one alone is off it by in windows. Of five
 #: healthy tuning missions of four steered wheels they were alike within a factor of 1.4.
 _SEVERAL, _APART, _APART_ALONE = 3, 0.75, 1.5
@@ -90,19 +87,21 @@ def axle_checks(cells: Cells, clear_at: float) -> Iterator[Checked]:
             yield _still(cells, j, limit)
             twice = both[j]
             off = _alone(rates.off, j) if steady[j] else np.abs(rates.off[:, j])
-            most = brief_limit(rates, j, share, twice=steady[j])
+            most = brief_limit(rates, j, share)
             deviates = worst(cells, (*about, either, Check.RATE), off[place], most)
+            # what all axles lose together is rather of their supply or their load, which takes no more than that of a healthy machine
+            common = worst(cells, (*about, either, Check.RATE), np.abs(rates.off[place, j]), RATE[0] * share)
             alone_off = worst(cells, (*about, either, Check.RATE), beside[place, j], alone_limit(beside, j, share))
             changed = lasts(cells, (*about, either, Check.RATE), rates.changes[j], changes[j])
             between = (
                 1.0 if steady[j] else _CHANGED if len(cells.machine.axles) > 1 and not joint else _ONE_AXLE
             ) * share
             parted = lasts(cells, (*about, either, Check.RATE), None if told else rates.parted[j], between)
-            yield max([deviates, alone_off, *(c for c in (changed, parted) if c.worst is not None)], key=times)
+            yield max([deviates, common, alone_off, *(c for c in (changed, parted) if c.worst is not None)], key=times)
             against = Check.LASTING_RATE if len(cells.machine.axles) > 1 and not joint else Check.PLANT_RATE
             # both sides of which are measured twice needs nothing to compare with
             if not twice or (against is Check.LASTING_RATE and rates.apart[j] is not None):
-                yield lasts(cells, (*about, either, against), rates.apart[j], RATE[twice][1] * share)
+                yield lasts(cells, (*about, either, against), rates.apart[j], RATE[1] * share)
 
 
 def _beside_second(cells: Cells, axle: str, angle: Array, second: Array, clear_at: float) -> Checked:
@@ -140,13 +139,10 @@ def alone_limit(beside: Array, j: int, share: float) -> float:
     return alone([float(x) for x in largest(beside)], j, np.inf, _APART * share, _APART_ALONE)
 
 
-def brief_limit(rates: Rates, j: int, share: float, *, twice: bool) -> float:
-    """Deviation of an axle's rate in windows that counts [ln]: less of it where the other axle hardly deviates.
-
-    `share` is the loss that counts [ln]; `twice`: both sides of the axle are measured twice.
-    """
-    most, least = RATE[twice][0] * share, (_BRIEF_TWICE if twice else _BRIEF) * share
-    return alone([float(x) for x in largest(np.abs(rates.off))], j, most, least, _BRIEF_ALONE, others=1)
+def brief_limit(rates: Rates, j: int, share: float) -> float:
+    """Deviation of an axle's rate in windows that counts [ln]: less of it where the other axle hardly deviates; `share` is the loss that counts [ln]."""
+    most = [float(x) for x in largest(np.abs(rates.off))]
+    return alone(most, j, RATE[0] * share, _BRIEF * share, _BRIEF_ALONE, others=1)
 
 
 def _still(cells: Cells, j: int, limit: float) -> Checked:

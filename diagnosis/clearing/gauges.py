@@ -218,8 +218,8 @@ def _axles(cells: Cells) -> Iterator[Gauges]:
         ratio = None
         lasting: dict[Deviation, float] = {}
         if _known(used[:, j]):
-            brief = axles.brief_limit(rates, j, share, twice=twice and measured)
-            long = axles.RATE[twice and measured][1] * share
+            brief = axles.brief_limit(rates, j, share)
+            long = axles.RATE[1] * share
             off = np.where(cells.explained(name, rates.frame), np.nan, rates.off[:, j])
             ratio = Ratio(
                 rates.frame,
