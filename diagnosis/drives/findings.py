@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.channels.sample_status import BLIND, PAIR
+from diagnosis.channels.zero_level import zero_level
 from diagnosis.drives.models import ROW, RowModel
 from diagnosis.drives.path import most_probable, state_evidence
 from diagnosis.drives.speed_pair import SpeedPair
@@ -143,7 +144,7 @@ def _isolated(run: Run, pair: SpeedPair, model: RowModel, limits: Limits) -> Iso
     gain = float(evidence[row] - evidence[HEALTHY])
     if gain < thinnest(model.switch_cost, ends=run.stop < pair.samples.y.size):
         return None
-    if row == STUCK and abs(float(np.mean(y))) <= max(3 * model.constant_noise, limits.min_sat):
+    if row == STUCK and abs(float(np.mean(y))) <= max(3 * model.constant_noise, zero_level(model.span, limits.min_sat)):
         row = NO_SIGNAL
     p = row_probabilities(evidence)
     if row == NO_SIGNAL:

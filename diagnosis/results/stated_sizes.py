@@ -117,17 +117,21 @@ def known_probability(
         for s in report["states"]:
             if (s["component"], s["side"]) == (component, side) and s["state"] in DECIDED:
                 known[_rows(t, step, s["start_s"], s["stop_s"])] = True
-        decided = known.copy()
-        for fault in report["intervals"]:
-            if fault["component"] == component and side in Side(fault["side"]).sides:
-                rows = _rows(t, step, fault["start_s"], fault["stop_s"])
-                told = decided[rows] if decided[rows].any() else np.ones_like(decided[rows])  # by no state of this side
-                known[rows] |= told
-                faulty = 1.0 - sum(h["p"] for h in fault["hypotheses"] if h["mode"] == State.HEALTHY)
-                if fault["side"] == Side.SENSOR_OR_ACTUATOR:
-                    values[rows] = np.fmax(values[rows], 0.5 * faulty)
-                elif _least_half(np.nan_to_num(values[rows][told])) < min(_EVEN, faulty):
-                    values[rows] = np.fmax(values[rows], faulty)
+        decided, drawn = known.copy(), columns[name]
+        mine = [f for f in report["intervals"] if f["component"] == component and side in Side(f["side"]).sides]
+        spans = [_rows(t, step, f["start_s"], f["stop_s"]) for f in mine]
+        claims = np.zeros(t.size, np.uint16)
+        for rows in spans:
+            claims[rows] += 1
+        for fault, rows in zip(mine, spans, strict=True):
+            told = decided[rows] if decided[rows].any() else np.ones_like(decided[rows])  # by no state of this side
+            known[rows] |= told
+            faulty = 1.0 - sum(h["p"] for h in fault["hypotheses"] if h["mode"] == State.HEALTHY)
+            own = told & (claims[rows] == 1)  # what another fault shows meanwhile is no picture of this one
+            if fault["side"] == Side.SENSOR_OR_ACTUATOR:
+                values[rows] = np.fmax(values[rows], 0.5 * faulty)
+            elif min(_least_half(np.nan_to_num(drawn[rows][x])) for x in (told, own) if x.any()) < min(_EVEN, faulty):
+                values[rows] = np.fmax(values[rows], faulty)
         out[name] = np.where(known, values, values.dtype.type(np.nan))
     return out
 

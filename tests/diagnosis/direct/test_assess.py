@@ -384,6 +384,13 @@ def test_fault_that_grows_is_one_fault(seed: int) -> None:
     assert found.epsilon.value == pytest.approx(0.6, abs=0.02)
 
 
+@pytest.mark.parametrize(("level", "mode"), [(0.015, FaultMode.STUCK), (0.001, FaultMode.NO_SIGNAL)])
+def test_a_value_beyond_the_zero_of_a_sensor_is_one_that_it_is_stuck_at(level: float, mode: FaultMode) -> None:
+    """However fast the machine is, so that the smallest saturation term that counts is larger."""
+    assessment = judged(Side.SENSOR, l4(1.0, level), 1)
+    assert single(assessment).mode is mode
+
+
 def test_silent_channel_is_one_fault_through_a_standstill() -> None:
     rng = np.random.default_rng(2)
     rest = (np.arange(N) > 5000) & (np.arange(N) < 7000)

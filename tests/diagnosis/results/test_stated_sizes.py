@@ -96,6 +96,17 @@ def test_so_has_one_that_the_columns_show_at_its_beginning_alone() -> None:
     np.testing.assert_allclose(found[name][200:300], 0.95)
 
 
+def test_so_has_one_that_they_show_only_while_another_fault_lasts() -> None:
+    hypotheses = [{"side": "sensor", "mode": "noisy", "p": 0.95}, {"side": "none", "mode": "healthy", "p": 0.05}]
+    fault = samples.fault(mode="noisy", start_s=20.0, stop_s=30.0, probability=0.95, hypotheses=hypotheses)
+    other = samples.fault(mode="inefficient", start_s=22.0, stop_s=29.0)
+    report = samples.report_with() | {"intervals": [fault, other], "states": [state("noisy", 20.0, 30.0)]}
+    name = "evidence.FR.sensor.probability"
+    seen = np.where((T >= 22.0) & (T < 29.0), 0.9, 0.3).astype(np.float32)
+    found = known_probability(report, T, 0.1, {name: seen})  # type: ignore[arg-type]
+    np.testing.assert_allclose(found[name][200:300], 0.95)
+
+
 def test_rows_that_were_weighed_over_a_whole_fault_have_its_probabilities_during_it_alone() -> None:
     hypotheses = [
         {"side": "sensor", "mode": "stuck", "p": 0.7},
