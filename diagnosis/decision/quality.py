@@ -139,7 +139,7 @@ def checks(
 
 
 def _row(check: str, result: str, effect: str = "none", ok: bool = True) -> QualityRow:
-    return {"check": check, "result": with_minus_signs(result), "effect": effect, "ok": ok}
+    return {"check": check, "result": result, "effect": effect, "ok": ok}
 
 
 def _sample_rate(jitter_ms: float, step_ns: int) -> QualityRow:
@@ -196,13 +196,15 @@ def _wheel_model(model: WheelModelFit | None, words: MachineWords) -> list[Quali
     if model is None:
         return []
     effect = "none" if model.reliable else "gains and drives are not assessed"
-    return [_row(f"{words.part.capitalize()} model", model.note, effect, model.reliable)]
+    return [_row(f"{words.part.capitalize()} model", with_minus_signs(model.note), effect, model.reliable)]
 
 
 def _notes(texts: Iterable[str], clocks: Sequence[SourceClock]) -> list[QualityRow]:
     """Notes of readers and timeline, each once, without those on clocks, which have rows of their own."""
     on_clocks = {clock.sentence for clock in clocks}
-    return [_row("Note", text, "see text") for text in alike_notes(t for t in texts if t not in on_clocks)]
+    return [
+        _row("Note", with_minus_signs(text), "see text") for text in alike_notes(t for t in texts if t not in on_clocks)
+    ]
 
 
 def _effect_of(clock: SourceClock) -> tuple[str, bool]:

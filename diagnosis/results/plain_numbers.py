@@ -6,8 +6,8 @@ import re
 from math import isfinite
 
 _HYPHEN = re.compile(
-    r"(?<![\w.,:;\[/\]})'\"-])-(?=\d)"
-)  # before a number, and neither within a name or a date nor of a range
+    r"(?<![\w.,:;\[/\]})'\"-])-(?=\d+(?:[.,]\d+)*(?![\w/]|[.,-]\w))"
+)  # before a number, and neither in or before a name or a date nor of a range
 
 
 def plain(value: float, digits: int = 3) -> str:

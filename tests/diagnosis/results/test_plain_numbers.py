@@ -30,6 +30,7 @@ def test_below_nothing_is_a_minus_sign() -> None:
     [
         ("read -0.6 m/s, then (-3.7 ms) and × -1", "read −0.6 m/s, then (−3.7 ms) and × −1"),
         ("on 2025-10-09, wheel-2, 3-4, [-1] of /joint-1", "on 2025-10-09, wheel-2, 3-4, [-1] of /joint-1"),
+        ("drive -1.mcap, log -2/a.db3 and -3rd: -1.5.", "drive -1.mcap, log -2/a.db3 and -3rd: −1.5."),
         ("'/a'-1 and \"b\"-1 --5", "'/a'-1 and \"b\"-1 --5"),
     ],
 )
