@@ -58,7 +58,7 @@ def contradictions(report: Mapping[str, Any], columns: Mapping[str, NDArray[Any]
     ]
     for fault in report["intervals"]:
         name = f"{fault['id']} {fault['component']} {fault['side']} {fault['mode']}"
-        out += [f"{name}: {text}" for text in (*_chances(fault), *_sizes(fault), *_urgency(fault, report))]
+        out += [f"{name}: {text}" for text in (*_chances(fault), *_sizes(fault, report), *_urgency(fault, report))]
         out += [f"{name}: {text}" for text in (*_times(fault, report), *_words(fault), *_followed(fault))]
         out += [f"{name}: {text}" for text in of_faults(fault, report, columns or {})]
     out += of_states(report, columns or {})
@@ -188,7 +188,7 @@ def _chances(fault: Mapping[str, Any]) -> Iterator[str]:
         yield f"{fault['severity']} although healthy is more probable ({healthy:.2f})"
 
 
-def _sizes(fault: Mapping[str, Any]) -> Iterator[str]:
+def _sizes(fault: Mapping[str, Any], report: Mapping[str, Any]) -> Iterator[str]:
     epsilon, sat = fault["epsilon"], fault["sat"]
     if epsilon is not None:
         if not epsilon["low"] <= epsilon["value"] <= epsilon["high"]:
@@ -203,7 +203,8 @@ def _sizes(fault: Mapping[str, Any]) -> Iterator[str]:
         if fault["mode"] == "no_signal" and epsilon["value"] < 0.9:
             yield f"no signal with ε̂ {epsilon['value']:.2f}"
     if sat is not None:
-        if fault["mode"] == "no_signal" and abs(sat["mean"]) > 0.05:
+        least = 0.05 if sat["unit"] == OPENING else min(0.05, 0.5 * report["limits"]["min_sat"])
+        if fault["mode"] == "no_signal" and abs(sat["mean"]) > least:
             yield f"no signal, and a reading of {sat['mean']:.2f} {sat['unit']}"
         if not sat["low"] <= sat["mean"] <= sat["high"]:
             yield "saturation term outside of its bounds"

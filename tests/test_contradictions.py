@@ -269,8 +269,14 @@ def _sure_of_health(d: Document, columns: Columns) -> None:
     columns[name] = np.zeros_like(columns[name])
 
 
+def _healthy_modes(d: Document, columns: Columns) -> None:
+    names = [f"evidence.{f['component']}.{f['side']}.p_healthy" for f in d["intervals"] if f["severity"] == "high"]
+    name = next(n for n in names if n in columns)
+    columns[name] = np.ones_like(columns[name])
+
+
 @pytest.mark.parametrize(
-    "spoil", [_another_loss, _narrow_band, _loss_while_healthy, _loss_while_unknown, _sure_of_health]
+    "spoil", [_another_loss, _narrow_band, _loss_while_healthy, _loss_while_unknown, _sure_of_health, _healthy_modes]
 )
 def test_plots_that_show_something_else_than_the_findings_are_seen(
     result: tuple[Document, Columns], spoil: Callable[[Document, Columns], None]

@@ -146,8 +146,19 @@ def _why_undecided(report: ReportDocument) -> dict[tuple[str, str], list[str]]:
 
 def _cells(row: LoopRow, commanded: bool) -> list[str]:
     error, effort = row["tracking_error"], row["control_effort"]
-    cells = [number(error["mission"]), number(error["driving"])]
-    return cells + [number(None if x is None else 100 * x) for x in (effort["mission"], effort["driving"]) if commanded]
+    cells = [_three_digits(error["mission"]), _three_digits(error["driving"])]
+    return cells + [_per_cent(x) for x in (effort["mission"], effort["driving"]) if commanded]
+
+
+def _per_cent(share: float | None) -> str:
+    return _three_digits(None if share is None else 100 * share)
+
+
+def _three_digits(value: float | None) -> str:
+    """A measured value with all of its three digits, zeros too, as the others of its column have them."""
+    text = number(value)
+    zeros = "" if value is None or "e" in f"{value:.3g}" else f"{value:#.3g}".removesuffix(".")
+    return zeros.replace("-", "−") if "." in zeros else text
 
 
 #: Unit of each limit of the machine file; absent: a plain number. ``{speed}`` is the machine's own.
@@ -187,7 +198,7 @@ def loop_tables(metrics: MetricsRow, words: MachineWords) -> Context:
     """Tracking error and control effort, beside the paper's table."""
     rows = [*metrics["wheels"].items(), ("Average", metrics["average"])]
     paper = [
-        (p["controller"], [number(p["tracking_error"]), number(100 * p["control_effort"]), number(p["parameters"])])
+        (p["controller"], [number(p["tracking_error"]), _per_cent(p["control_effort"]), number(p["parameters"])])
         for p in (metrics["paper"] if words.drive == "valve" else ())
     ]
     some = any(q["mission"] is not None for _, r in rows for q in (r["tracking_error"], r["control_effort"]))
