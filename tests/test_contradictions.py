@@ -175,6 +175,14 @@ def _no_reason(d: Document) -> None:
     fault["epsilon"]["low"] = 0.0
 
 
+def _unfilled(d: Document) -> None:
+    d["intervals"][0]["evidence"].append("It stayed there for {2.97 s}.")
+
+
+def _longer(d: Document) -> None:
+    d["intervals"][0]["evidence"].append("Over 2000 s it fits.")
+
+
 @pytest.mark.parametrize(
     "spoil",
     [
@@ -191,7 +199,7 @@ def _no_reason(d: Document) -> None:
             _unmoved,
             _moment,
         ),
-        *(_not_judged, _lasting, _in_both, _two_remedies, _other_act, _no_reason, _logged_already),
+        *(_not_judged, _lasting, _in_both, _two_remedies, _other_act, _no_reason, _logged_already, _unfilled, _longer),
     ],
 )
 def test_a_spoilt_result_is_seen(result: tuple[Document, Columns], spoil: Callable[[Document], None]) -> None:

@@ -17,7 +17,7 @@ from diagnosis.results.document import MissingRow, QualityRow, SignalRow
 from diagnosis.results.left_out import is_left_out
 from diagnosis.results.log_rows import ClockRow
 from diagnosis.results.machine_words import MachineWords
-from diagnosis.results.plain_numbers import with_minus_signs
+from diagnosis.results.plain_numbers import plain, with_minus_signs
 from diagnosis.results.wheel_model import WheelModelFit
 from replay.arrays.blocks import blocks, release
 from replay.arrays.processors import each
@@ -146,7 +146,7 @@ def _sample_rate(jitter_ms: float, step_ns: int) -> QualityRow:
     sharp = jitter_ms < step_ns * 2.5e-6
     return _row(
         "Sample rate",
-        f"{1e9 / step_ns:.4g} Hz, jitter {jitter_ms:.3g} ms (99 %)",
+        f"{plain(1e9 / step_ns, 4)} Hz, jitter {plain(jitter_ms)} ms (99 %)",
         "none" if sharp else "the jitter limits the accuracy of onsets",
         sharp,
     )
@@ -173,7 +173,7 @@ def _gap_check(rows: Sequence[SignalRow]) -> QualityRow:
     shown = ", ".join(names[:4]) + (f" and {len(names) - 4} more" if len(names) > 4 else "")
     return _row(
         "Gaps",
-        f"{shown}: longest {max(gaps.values()):.3g} s",
+        f"{shown}: longest {plain(max(gaps.values()))} s",
         "no samples there: no data, or no signal where only one channel is silent",
         False,
     )
@@ -213,7 +213,7 @@ def _effect_of(clock: SourceClock) -> tuple[str, bool]:
         return "delays between the files are not known: its signals are not used", False
     if clock.uncertainty_s is None:
         return "times depend on the offset and drift in the machine file", True
-    return f"times of the files agree within ±{1e3 * clock.uncertainty_s:.2g} ms (95 %)", True
+    return f"times of the files agree within ±{plain(1e3 * clock.uncertainty_s, 2)} ms (95 %)", True
 
 
 def clock_row(clock: SourceClock | None) -> ClockRow | None:

@@ -18,6 +18,7 @@ from dataclasses import replace
 
 from diagnosis.results.assessment import Finding
 from diagnosis.results.machine_words import MachineWords
+from diagnosis.results.plain_numbers import plain
 from diagnosis.results.result import Epsilon, FaultInterval
 from diagnosis.results.sizes import loss_known
 from diagnosis.results.vocabulary import Kind, Severity, Tier, Verdict
@@ -171,7 +172,7 @@ def often_dead(faults: Sequence[FaultInterval]) -> list[list[FaultInterval]]:
 def halved_words(side: Side, mode: FaultMode, epsilon: Epsilon | None) -> str:
     """That a part may have lost half or more, by the upper bound of ε̂, surely gives twice as much as it should, or may give so much noise; else empty."""
     if epsilon is not None and mode is FaultMode.OUTSIDE_TABLE and epsilon.high <= DOUBLE:
-        return f"{'reads' if side is Side.SENSOR else 'gives'} at least {1.0 - epsilon.high:.2g} times what it should"
+        return f"{'reads' if side is Side.SENSOR else 'gives'} at least {plain(1.0 - epsilon.high, 2)} times what it should"
     if epsilon is None or epsilon.high < HALF:
         return ""
     if mode.varying:

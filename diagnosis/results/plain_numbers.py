@@ -12,7 +12,7 @@ _HYPHEN = re.compile(
 
 def plain(value: float, digits: int = 3) -> str:
     """A value in significant digits without an exponent: ``127``, ``0.0031``, ``−2``; below a millionth 0."""
-    text = f"{value:.{digits}g}"
+    text = f"{value + 0.0:.{digits}g}"  # nothing has no sign
     if "e" not in text or not isfinite(value):
         return text.replace("-", "−")
     whole = f"{float(text):.6f}".rstrip("0").rstrip(".")

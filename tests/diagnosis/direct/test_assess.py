@@ -282,7 +282,7 @@ def test_channel_silent_while_its_siblings_live_is_no_signal() -> None:
     assessment = assess_pair(pair(Side.SENSOR, y, x), LIMITS)
     found = single(assessment)
     assert (found.mode, found.start, found.stop) == (FaultMode.NO_SIGNAL, 4000, 6000)
-    assert "delivered nothing for 2.000 s while other channels" in found.evidence[0]
+    assert "delivered nothing for {2.000 s} while other channels" in found.evidence[0]
     assert not np.isnan(found.probability)
 
 

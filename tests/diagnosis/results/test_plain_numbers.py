@@ -14,6 +14,8 @@ from diagnosis.results.plain_numbers import plain, with_minus_signs
         (-1.2e-5, 2, "−0.000012"),
         (1e-9, 2, "0"),
         (0.0, 2, "0"),
+        (-0.0, 2, "0"),
+        (-6.1e-8, 2, "0"),
     ],
 )
 def test_numbers_have_no_exponent(value: float, digits: int, text: str) -> None:
