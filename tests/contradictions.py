@@ -233,6 +233,12 @@ def _urgency(fault: Mapping[str, Any], report: Mapping[str, Any]) -> Iterator[st
     limits = report["limits"]
     sure = sum(h["p"] for h in named) >= limits["min_probability"]
     brief = fault["side"] == "sensor" and fault["stop_s"] - fault["start_s"] <= limits["brief"]
+    waits = any(
+        "next service" in text
+        for text in (fault["advice"], *(a["text"] for a in report["verdict"]["actions"] if fault["id"] in a["faults"]))
+    )
+    if waits and not report["verdict"]["cleared"] and fault["stop_s"] - fault["start_s"] > limits["brief"] + _SPARE_S:
+        yield "it waits for the next service, and the machine is not cleared"
     if high and risk < _AT_RISK:
         yield f"stopped for, although stuck, silent or lost is {risk:.2f} probable"
     if (

@@ -38,13 +38,18 @@ HALF = 0.5  # of ε: a part that may have lost so much is no fault to drive on w
 _ALONE = "This alone is no reason to stop; check it before it grows."
 DOUBLE = -1.0  # of ε: one that gives twice what it should, and more, likewise
 _HARDLY_DOUBTED = 0.8
+_LATER = "Probable, not certain: check it at the next service, and compare with the next mission."
 #: The same in a mission that gives no leave for other reasons.
+SOONER = (
+    "Probable, not certain; but this mission does not clear the machine: check it before the machine goes out again."
+)
 HELD = (
     "Alone it would keep no machine in, but this mission does not clear it: check it before the machine goes out again."
 )
 #: The same of one that is dead briefly again and again, and how often, and for how long in all, that is: a contact is loose.
 AGAIN = "Each time it is tolerable (the paper’s Assumption 1), so often it is not: check plug and cable before the machine goes out again."
 _OFTEN, _OFTEN_S = 5, 3.0
+_HELD = {_ALONE: HELD, _LATER: SOONER}
 _BEFORE, _WITH = (
     "check it before the machine goes out again.",
     "check it with the repair, and compare with the next mission.",
@@ -79,7 +84,7 @@ def severity_of(
             return Severity.MEDIUM, words.fill(f"{what}: check it before the machine goes out again.")
         if halved:
             return Severity.LOW, f"Probable, not certain; but it {halved}: {_BEFORE}"
-        return Severity.LOW, "Probable, not certain: check it at the next service, and compare with the next mission."
+        return Severity.LOW, _LATER
     if total:
         return _severity_of_total(finding, seconds, limits, words, kind)
     marked = finding.epsilon is not None and finding.epsilon.value >= _MARKED_EPSILON
@@ -146,6 +151,8 @@ def advised(intervals: Sequence[FaultInterval], status: Verdict, *, cleared: boo
         return tuple(
             replace(f, advice=f.advice.removesuffix(_BEFORE) + _WITH)
             if f.severity is Severity.LOW and f.advice.endswith(_BEFORE)
+            else replace(f, advice=f"Probable, not certain: {_WITH}")
+            if f.advice == _LATER
             else f
             for f in intervals
         )
@@ -153,7 +160,11 @@ def advised(intervals: Sequence[FaultInterval], status: Verdict, *, cleared: boo
         return tuple(intervals)
     again = [f for same in often_dead(intervals) for f in same]
     return tuple(
-        replace(f, advice=HELD) if f.advice == _ALONE else replace(f, advice=AGAIN) if any(f is g for g in again) else f
+        replace(f, advice=_HELD[f.advice])
+        if f.advice in _HELD
+        else replace(f, advice=AGAIN)
+        if any(f is g for g in again)
+        else f
         for f in intervals
     )
 

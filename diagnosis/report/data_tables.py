@@ -11,6 +11,7 @@ from diagnosis.report.units import DEGREES, on_page
 from diagnosis.results.clearing import MAY_EXPLAIN, Check, lasts_in, share_covered, size_words
 from diagnosis.results.clearing_rows import ClearingRow
 from diagnosis.results.document import IntervalRow, MissingRow, ReportDocument, SignalRow
+from diagnosis.results.durations import covered_s
 from diagnosis.results.fault_rows import state_label
 from diagnosis.results.log_rows import FileRow
 from diagnosis.results.loop_rows import LoopRow, MetricsRow
@@ -57,11 +58,11 @@ def _of_remarks(faults: Sequence[IntervalRow], part: tuple[str, str], faulty: fl
     """How much of a part's faulty time [s] is of remarks, which count for none on the timeline; empty where none is."""
     component, side = part
     own = [
-        f["stop_s"] - f["start_s"]
+        (f["start_s"], f["stop_s"])
         for f in faults
         if f["severity"] == Severity.INFO and f["component"] == component and side in Side(f["side"]).sides
     ]
-    time = min(sum(own), faulty)
+    time = min(covered_s(own), faulty)
     return (
         [f"{time:.1f} s of its faulty time are remarks, which count for none on the timeline"]
         if time >= _TOLD_S
