@@ -49,7 +49,7 @@ from diagnosis.results.document import MachineRow, ReportDocument
 from diagnosis.results.machine_event import openings_doubted, speeds_doubted
 from diagnosis.results.machine_words import machine_words
 from diagnosis.results.result import MissionResult
-from diagnosis.results.stated_sizes import known_probability, mode_columns, size_columns
+from diagnosis.results.stated_sizes import known_modes, known_probability, mode_columns, size_columns
 from diagnosis.results.vocabulary import Tier
 from replay.arrays.column_store import ColumnStore
 from replay.arrays.envelope import bucket_of
@@ -210,7 +210,11 @@ def _walk(
     timeline.store.end_stage()
     windows = closeups_of(shown, replay, machine, found.assessments, judged.intervals)
     if windows is not None:
-        near = known_probability(report, windows.step * timeline.dt, timeline.dt, windows.columns)
+        near = {
+            name: x
+            for known in (known_probability, known_modes)
+            for name, x in known(report, windows.step * timeline.dt, timeline.dt, windows.columns).items()
+        }
         windows = replace(windows, columns={**windows.columns, **near})
     return MissionResult(report, _columns(judged, report, shown), windows)
 
@@ -339,5 +343,6 @@ def _columns(judged: Judged, report: ReportDocument, timeline: Timeline) -> dict
     columns.update(size_columns(report, columns["t"], timeline.dt, parts))
     columns.update(mode_columns(report, columns["t"], timeline.dt, _without_modes(parts, columns)))
     columns.update(known_probability(report, columns["t"], timeline.dt, columns))
+    columns.update(known_modes(report, columns["t"], timeline.dt, columns))
     columns.update(path_of(timeline, judged.machine))
     return columns

@@ -169,6 +169,11 @@ def advised(intervals: Sequence[FaultInterval], status: Verdict, *, cleared: boo
     )
 
 
+def waits_for_no_mission(f: FaultInterval) -> bool:
+    """Whether a fault's advice has it checked before the machine is out again."""
+    return any(words in f.advice for words in ("before the machine goes out", "before the next mission"))
+
+
 def often_dead(faults: Sequence[FaultInterval]) -> list[list[FaultInterval]]:
     """Faults of parts that give nothing usable again and again, each time briefly enough to be tolerated, by part."""
     brief: dict[tuple[str, str], list[FaultInterval]] = {}

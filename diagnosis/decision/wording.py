@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from diagnosis.decision.severity import AGAIN, HELD, SOONER, halved_words, unanswered
+from diagnosis.decision.severity import halved_words, unanswered, waits_for_no_mission
 from diagnosis.results.candidates import UNCLEAR, candidates, unclear_words
 from diagnosis.results.consequences import Stated, causes_of
 from diagnosis.results.document import ActionRow
@@ -102,11 +102,11 @@ def _order(faults: Sequence[FaultInterval], *, stop: bool) -> str:
         return "Then check"
     if (
         unanswered(worst)
-        or any(f.advice in (AGAIN, HELD, SOONER) for f in faults)
+        or any(waits_for_no_mission(f) for f in faults)
         or any(halved_words(f.side, f.mode, f.epsilon) for f in faults)
     ):
         return "Before the machine goes out, check"
-    return "Check at the next service" if worst.mode.total else "Check"
+    return "Check at the next service" if "at the next service" in worst.advice else "Check"
 
 
 def remedy_words(of: Sequence[FaultInterval], faults: Sequence[FaultInterval], words: MachineWords) -> str:

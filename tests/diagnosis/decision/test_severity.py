@@ -220,9 +220,16 @@ def test_what_is_probable_waits_for_a_service_only_where_the_machine_is_cleared(
     assert [f.severity for f in faults] == [Severity.LOW]
     assert told in faults[0].advice
     (action,) = actions_of(faults, HYDRAULIC)
-    assert action["text"].startswith("Check at the next service") == (
-        told == "at the next service" or status is Verdict.STOP
-    )
+    assert action["text"].startswith("Check at the next service") == (told == "at the next service")
+
+
+def test_an_action_waits_for_no_service_where_the_advice_does_not() -> None:
+    rows = split(("sensor", "stuck", 0.5), ("sensor", "inefficient", 0.49))
+    either = replace(finding(Side.SENSOR, FaultMode.STUCK, p=0.5), hypotheses=rows)
+    (fault,) = intervals_of({("FR", "sensor"): assessed(either)}, MACHINE, HYDRAULIC, 0, STEP)
+    assert fault.advice.endswith("check it before the next mission.")
+    (action,) = actions_of((fault,), HYDRAULIC)
+    assert action["text"].startswith("Before the machine goes out, check the FR speed sensor")
 
 
 @pytest.mark.parametrize(
