@@ -224,7 +224,7 @@ def test_what_is_probable_waits_for_a_service_only_where_the_machine_is_cleared(
 
 
 def test_an_action_waits_for_no_service_where_the_advice_does_not() -> None:
-    rows = split(("sensor", "stuck", 0.5), ("sensor", "inefficient", 0.49))
+    rows = split(("sensor", "stuck", 0.5), ("sensor", "noisy", 0.49))
     either = replace(finding(Side.SENSOR, FaultMode.STUCK, p=0.5), hypotheses=rows)
     (fault,) = intervals_of({("FR", "sensor"): assessed(either)}, MACHINE, HYDRAULIC, 0, STEP)
     assert fault.advice.endswith("check it before the next mission.")
