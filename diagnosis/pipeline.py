@@ -17,6 +17,7 @@ from diagnosis.channels.recording_gaps import recording_gaps, without_gaps
 from diagnosis.channels.resting_position import with_zeroed_positions
 from diagnosis.channels.shared_gain import without_shared_gain
 from diagnosis.channels.silence import with_silent_sensors
+from diagnosis.clearing.added_findings import with_findings
 from diagnosis.clearing.backwards import shown_alone, without_claims
 from diagnosis.clearing.beside import (
     less_sure_beside_dead_sensors,
@@ -26,7 +27,7 @@ from diagnosis.clearing.beside import (
 from diagnosis.clearing.contradicted import without_contradicted
 from diagnosis.clearing.made_by_axles import without_made_by_axles
 from diagnosis.clearing.nothing_moves import supply_gone
-from diagnosis.clearing.standing_out import what_stands_out, with_findings, without_explained, without_followers
+from diagnosis.clearing.standing_out import what_stands_out, without_explained, without_followers
 from diagnosis.decision import quality
 from diagnosis.decision.as_a_whole import as_a_whole
 from diagnosis.decision.changing_rows import with_chains_as_one
@@ -48,7 +49,7 @@ from diagnosis.results.document import MachineRow, ReportDocument
 from diagnosis.results.machine_event import openings_doubted, speeds_doubted
 from diagnosis.results.machine_words import machine_words
 from diagnosis.results.result import MissionResult
-from diagnosis.results.stated_sizes import known_probability, mode_columns, size_columns
+from diagnosis.results.stated_sizes import known_modes, known_probability, mode_columns, size_columns
 from diagnosis.results.vocabulary import Tier
 from replay.arrays.column_store import ColumnStore
 from replay.arrays.envelope import bucket_of
@@ -209,7 +210,11 @@ def _walk(
     timeline.store.end_stage()
     windows = closeups_of(shown, replay, machine, found.assessments, judged.intervals)
     if windows is not None:
-        near = known_probability(report, windows.step * timeline.dt, timeline.dt, windows.columns)
+        near = {
+            name: x
+            for known in (known_probability, known_modes)
+            for name, x in known(report, windows.step * timeline.dt, timeline.dt, windows.columns).items()
+        }
         windows = replace(windows, columns={**windows.columns, **near})
     return MissionResult(report, _columns(judged, report, shown), windows)
 
@@ -284,10 +289,11 @@ def _with_what_stands_out(judged: Judged) -> Judged:
     more = as_late_axles(what_stands_out(judged.checks, judged.cells, found.words), judged.cells, found.words)
     if not (more := without_explained(more, found.events, judged.machine.axles)):
         return judged
-    machine = judged.machine
-    seen = less_sure_beside_wrong_angles(with_findings(found.assessments, more), machine.wheels, machine.axles)
+    machine, dt = judged.machine, judged.mission.timeline.dt
+    seen = with_findings(found.assessments, more, dt)
+    seen = less_sure_beside_wrong_angles(seen, machine.wheels, machine.axles)
     seen = less_sure_beside_dead_sensors(seen, machine.wheels, found.words)
-    events = without_made_by_axles(found.events, seen, machine.axles, judged.mission.timeline.dt)
+    events = without_made_by_axles(found.events, seen, machine.axles, dt)
     told = replace(found, assessments=seen, events=events)
     open_ = tuple(c for c in judged.checks if c.component in more and not c.passed)
     return replace(judged, found=told, named_by=open_)
@@ -337,5 +343,6 @@ def _columns(judged: Judged, report: ReportDocument, timeline: Timeline) -> dict
     columns.update(size_columns(report, columns["t"], timeline.dt, parts))
     columns.update(mode_columns(report, columns["t"], timeline.dt, _without_modes(parts, columns)))
     columns.update(known_probability(report, columns["t"], timeline.dt, columns))
+    columns.update(known_modes(report, columns["t"], timeline.dt, columns))
     columns.update(path_of(timeline, judged.machine))
     return columns

@@ -12,7 +12,6 @@ from diagnosis.results.document import MachineRow, WheelPlace
 from diagnosis.results.left_out import is_left_out
 from diagnosis.results.log_rows import FileRow, LogRow
 from diagnosis.results.machine_words import machine_words
-from diagnosis.results.plain_numbers import with_minus_signs
 from replay.arrays.envelope import bucket_of
 from replay.machine.config import Machine
 from replay.mission import Mission, MissionFile
@@ -57,8 +56,8 @@ def _file(file: MissionFile) -> FileRow:
         "sha256": file.sha256,
         "bytes": file.bytes,
         "format": file.format,
-        "damage": [with_minus_signs(text) for text in file.summary.damage],
-        "notes": [with_minus_signs(text) for text in file.summary.notes],
+        "damage": [str(text) for text in file.summary.damage],
+        "notes": [*file.summary.notes],
         "clock": quality.clock_row(file.clock),
     }
     if left_out := [str(text) for text in file.summary.damage if is_left_out(text)]:

@@ -58,7 +58,7 @@ def contradictions(report: Mapping[str, Any], columns: Mapping[str, NDArray[Any]
     ]
     for fault in report["intervals"]:
         name = f"{fault['id']} {fault['component']} {fault['side']} {fault['mode']}"
-        out += [f"{name}: {text}" for text in (*_chances(fault), *_sizes(fault), *_urgency(fault, report))]
+        out += [f"{name}: {text}" for text in (*_chances(fault), *_sizes(fault, report), *_urgency(fault, report))]
         out += [f"{name}: {text}" for text in (*_times(fault, report), *_words(fault), *_followed(fault))]
         out += [f"{name}: {text}" for text in of_faults(fault, report, columns or {})]
     out += of_states(report, columns or {})
@@ -87,6 +87,8 @@ def _verdict(report: Mapping[str, Any]) -> Iterator[str]:
             yield "not cleared, and nobody is told what would clear it"
     if verdict["status"] == "not_assessed" and len(re.findall(r"[.](?= [A-Z]|$)", verdict["text"])) > 2:
         yield f"more than two sentences: {verdict['text']!r}"
+    if "a check is open" in verdict["title"] and "other checks" in verdict["text"]:
+        yield f"title {verdict['title']!r}, and more than one are open"
     parts = {(f["component"], f["side"]) for f in faults if f["severity"] != "info"}
     repair = {(f["component"], f["side"]) for f in faults if f["severity"] == "high"}
     told = [len(repair), len(parts - repair)]
@@ -188,7 +190,7 @@ def _chances(fault: Mapping[str, Any]) -> Iterator[str]:
         yield f"{fault['severity']} although healthy is more probable ({healthy:.2f})"
 
 
-def _sizes(fault: Mapping[str, Any]) -> Iterator[str]:
+def _sizes(fault: Mapping[str, Any], report: Mapping[str, Any]) -> Iterator[str]:
     epsilon, sat = fault["epsilon"], fault["sat"]
     if epsilon is not None:
         if not epsilon["low"] <= epsilon["value"] <= epsilon["high"]:
@@ -203,7 +205,8 @@ def _sizes(fault: Mapping[str, Any]) -> Iterator[str]:
         if fault["mode"] == "no_signal" and epsilon["value"] < 0.9:
             yield f"no signal with ε̂ {epsilon['value']:.2f}"
     if sat is not None:
-        if fault["mode"] == "no_signal" and abs(sat["mean"]) > 0.05:
+        least = 0.05 if sat["unit"] == OPENING else min(0.05, 0.5 * report["limits"]["min_sat"])
+        if fault["mode"] == "no_signal" and abs(sat["mean"]) > least:
             yield f"no signal, and a reading of {sat['mean']:.2f} {sat['unit']}"
         if not sat["low"] <= sat["mean"] <= sat["high"]:
             yield "saturation term outside of its bounds"
@@ -232,6 +235,12 @@ def _urgency(fault: Mapping[str, Any], report: Mapping[str, Any]) -> Iterator[st
     limits = report["limits"]
     sure = sum(h["p"] for h in named) >= limits["min_probability"]
     brief = fault["side"] == "sensor" and fault["stop_s"] - fault["start_s"] <= limits["brief"]
+    waits = any(
+        "next service" in text
+        for text in (fault["advice"], *(a["text"] for a in report["verdict"]["actions"] if fault["id"] in a["faults"]))
+    )
+    if waits and not report["verdict"]["cleared"] and fault["stop_s"] - fault["start_s"] > limits["brief"] + _SPARE_S:
+        yield "it waits for the next service, and the machine is not cleared"
     if high and risk < _AT_RISK:
         yield f"stopped for, although stuck, silent or lost is {risk:.2f} probable"
     if (

@@ -97,6 +97,8 @@ def _words(document: FleetDocument) -> Iterator[str]:
             r"\bassess\w*|without (control )?signal|too briefly", re.sub(r"[Nn]ot assessed", "", text)
         ):
             yield f"the fleet says {text[max(0, found.start() - 40) : found.end() + 20]!r}"
+    if found := re.search(r"([\d.]+ %) +of driving time judged +not known[^.]{,40}", page):
+        yield f"a figure that is said to be not known: {found.group(0)!r}"
 
 
 def _endings(document: FleetDocument) -> Iterator[str]:

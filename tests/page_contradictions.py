@@ -99,6 +99,9 @@ def of_standings(report: Mapping[str, Any]) -> Iterator[str]:
         return
     cleared = 0 if found.group(1) == "none" else int(found.group(1))
     lanes = timeline(report, report["log"]["duration_s"])  # type: ignore[arg-type]
+    for lane in lanes.lanes:
+        if lane.faulty.endswith("%") and float(lane.faulty.split()[0]) > 100.0:
+            yield f"{lane.component} {lane.part} is faulty for {lane.faulty} of the time"
     told = re.search(r"(\d+) cleared", lanes.summary)
     remarked = {(f["component"], side) for f in report["intervals"] if f["severity"] == "info" for side in _sides(f)}
     if (

@@ -57,6 +57,17 @@ def of_faults(
                 means.append(float(np.nansum([np.nanmean(x) for x in both if np.isfinite(x).any()])))
         if means and max(means) < 0.5:
             yield f"its plot shows it not healthy with {max(means):.2f} on average"
+        modes = columns.get(base + "p_healthy")
+        late = inside & _rows(columns, max(middle, fault["detected_s"] or 0.0), fault["stop_s"])
+        if (
+            modes is not None
+            and fault["severity"] != "info"
+            and fault["side"] == side
+            and np.isfinite(modes[late]).any()
+        ):
+            sound = min(float(np.nanmean(modes[x])) for x in (inside, late) if np.isfinite(modes[x]).any())
+            if sound > 0.5:
+                yield f"its plot of modes shows it healthy with {sound:.2f} on average"
 
 
 def of_states(report: Mapping[str, Any], columns: Mapping[str, NDArray[Any]]) -> Iterator[str]:

@@ -37,7 +37,7 @@ def of_lengths(report: Mapping[str, Any]) -> Iterator[str]:
     for fault in report["intervals"]:
         seconds = fault["stop_s"] - fault["start_s"]
         for text in fault["evidence"]:
-            for said, rest in re.findall(r"\b(?:for|over) ([\d.]+) s\b(.{0,20})", text):
+            for said, rest in re.findall(r"\b(?:[Ff]or|[Oo]ver) ([\d.]+) s\b(.{0,20})", text):
                 elsewhere = re.match(r" (?:before it|after it|of driving|in all|in and around it)", rest)
                 grew = "Before that it grew" in text
                 if float(said) > 1.02 * seconds + 0.06 and not elsewhere and not grew:

@@ -175,6 +175,14 @@ def _no_reason(d: Document) -> None:
     fault["epsilon"]["low"] = 0.0
 
 
+def _unfilled(d: Document) -> None:
+    d["intervals"][0]["evidence"].append("It stayed there for {2.97 s}.")
+
+
+def _longer(d: Document) -> None:
+    d["intervals"][0]["evidence"].append("Over 2000 s it fits.")
+
+
 @pytest.mark.parametrize(
     "spoil",
     [
@@ -191,7 +199,7 @@ def _no_reason(d: Document) -> None:
             _unmoved,
             _moment,
         ),
-        *(_not_judged, _lasting, _in_both, _two_remedies, _other_act, _no_reason, _logged_already),
+        *(_not_judged, _lasting, _in_both, _two_remedies, _other_act, _no_reason, _logged_already, _unfilled, _longer),
     ],
 )
 def test_a_spoilt_result_is_seen(result: tuple[Document, Columns], spoil: Callable[[Document], None]) -> None:
@@ -269,8 +277,14 @@ def _sure_of_health(d: Document, columns: Columns) -> None:
     columns[name] = np.zeros_like(columns[name])
 
 
+def _healthy_modes(d: Document, columns: Columns) -> None:
+    names = [f"evidence.{f['component']}.{f['side']}.p_healthy" for f in d["intervals"] if f["severity"] == "high"]
+    name = next(n for n in names if n in columns)
+    columns[name] = np.ones_like(columns[name])
+
+
 @pytest.mark.parametrize(
-    "spoil", [_another_loss, _narrow_band, _loss_while_healthy, _loss_while_unknown, _sure_of_health]
+    "spoil", [_another_loss, _narrow_band, _loss_while_healthy, _loss_while_unknown, _sure_of_health, _healthy_modes]
 )
 def test_plots_that_show_something_else_than_the_findings_are_seen(
     result: tuple[Document, Columns], spoil: Callable[[Document, Columns], None]

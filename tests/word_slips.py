@@ -11,6 +11,7 @@ _SLIPS = {
     "empty brackets": r"\(\s*\)",
     "one of many": r"\b1 (faults|parts|wheels|missions|samples|reasons|checks|seconds)\b",
     "another word for what is said so elsewhere": r"judged too briefly|control signal|assessed the part",
+    "a word that was not filled in": r"\{(?:[a-z_.]+|[\d.]+ s)\}",
     "a hyphen for a minus": r"(?:^|[\s(×=])-\d",
     "a number with an exponent": r"\d[eE][+-]\d",
     "a number that is none": r"\b(nan|inf|None)\b",

@@ -12,6 +12,7 @@ from diagnosis.body.positions import agreement, news, way_readings
 from diagnosis.body.rolling import Rolling
 from diagnosis.body.sources import BodySensors
 from diagnosis.body.track import Readings, Track, track_of
+from diagnosis.results.plain_numbers import plain
 
 Array = NDArray[np.float64]
 
@@ -69,7 +70,7 @@ def body_speed(sensors: BodySensors, rolling: Rolling) -> BodySpeed:
         elif np.isnan(ratio := agreement(fixes, rolling)):
             reason = "the wheels hardly turn"
         elif not _AGREES[0] < ratio < _AGREES[1]:
-            reason = f"it moves {ratio:.2g} times as far as the wheels roll (in the air, slipping, or not this machine)"
+            reason = f"it moves {plain(ratio, 2)} times as far as the wheels roll (in the air, slipping, or not this machine)"
         elif name == "odometry" and from_wheels(fixes, rolling):
             reason = "it is computed from the wheels' own speeds"
         if reason:
@@ -85,7 +86,7 @@ def body_speed(sensors: BodySensors, rolling: Rolling) -> BodySpeed:
 
 
 def _said(name: str, track: Track) -> str:
-    text = f"Speed of the body by {name}: ±{float(np.median(track.std)):.2g} m/s, {track.delay:.1f} s late"
+    text = f"Speed of the body by {name}: ±{plain(float(np.median(track.std)), 2)} m/s, {track.delay:.1f} s late"
     return f"{text}, jumps: {track.jumps}." if track.jumps else f"{text}."
 
 
@@ -100,7 +101,9 @@ def _over_ground(
         return
     ratio = float(np.median(np.abs(values[driving]) / np.abs(common[driving])))
     if not _AGREES[0] < ratio < _AGREES[1]:
-        notes.append(f"Body sensor speed over ground left out: it is {ratio:.2g} times as fast as the wheels roll.")
+        notes.append(
+            f"Body sensor speed over ground left out: it is {plain(ratio, 2)} times as fast as the wheels roll."
+        )
         return
     rate = rolling.curvature * rolling.speed if yaw_rate is None else np.nan_to_num(yaw_rate)
 
@@ -164,7 +167,7 @@ def _yaw_rate(sensors: BodySensors, rolling: Rolling, notes: list[str]) -> Array
         return None
     ratio = float(np.median(rate[turning] / steered[turning]))
     if not _YAW_AGREES[0] < ratio < _YAW_AGREES[1]:
-        notes.append(f"Measured yaw rate left out: it is {ratio:.2g} times that of speed and steering.")
+        notes.append(f"Measured yaw rate left out: it is {plain(ratio, 2)} times that of speed and steering.")
         return None
     notes.append(
         "Measured yaw rate used: it gives the heading, and where it contradicts the steering nothing is believed."

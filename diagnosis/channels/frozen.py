@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.results.assessment import CODE, Assessment, Finding
+from diagnosis.results.plain_numbers import plain
 from diagnosis.results.result import Epsilon, Hypothesis, Sat
 from diagnosis.results.vocabulary import Tier
 from replay.arrays.blocks import blocks
@@ -76,7 +77,7 @@ def frozen_sensor(y: Array, value: float, others: Array, name: str, dt: float) -
     p = _SURE if value or _noisy(others, dt) else _LIKELY
     silent = Hypothesis(Side.ACTUATOR.value, FaultMode.NO_SIGNAL.value, 1.0 - p)
     sentences = (
-        f"{name} read {value:.4g} {{speed_unit}} in all {known.size} samples of the mission, while the {{wheel}} was commanded to move and "
+        f"{name} read {plain(value, 4)} {{speed_unit}} in all {known.size} samples of the mission, while the {{wheel}} was commanded to move and "
         "other {wheels} moved.",
         *(() if p == _SURE else ("A {wheel} at standstill gives the same reading, so its drive may be dead instead.",)),
     )

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from diagnosis.channels.liveness import alive, alive_sources
 from diagnosis.results.assessment import CODE, Assessment, Finding
 from diagnosis.results.result import Epsilon, Hypothesis
+from diagnosis.results.sentence import lasting
 from diagnosis.results.vocabulary import Tier
 from replay.arrays.runs import runs_of
 from replay.faults import FaultMode, Side, State
@@ -117,8 +118,8 @@ def with_silence(assessment: Assessment, spans: Sequence[Span], name: str, dt: f
     states = assessment.states.copy()
     for a, b in left:
         states[a:b] = CODE[State.NO_SIGNAL]
-    text = "{name} delivered nothing for {seconds:.1f} s while other signals of its source came."
-    more = [_finding(a, b, text.format(name=name, seconds=(b - a) * dt)) for a, b in left]
+    text = "{name} delivered nothing for {time} while other signals of its source came."
+    more = [_finding(a, b, text.format(name=name, time=lasting((b - a) * dt, 1))) for a, b in left]
     return replace(assessment, states=states, findings=tuple(sorted([*told, *more], key=lambda f: f.start)))
 
 

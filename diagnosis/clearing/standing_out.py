@@ -24,7 +24,7 @@ from diagnosis.clearing.second_angles import scaled_angles
 from diagnosis.clearing.spikes import fault_of_spikes
 from diagnosis.clearing.still import rate_of
 from diagnosis.clearing.untold_faults import fault_of_angle, fault_of_axle, fault_of_wheel
-from diagnosis.results.assessment import CODE, Assessment, Finding
+from diagnosis.results.assessment import Assessment, Finding
 from diagnosis.results.clearing import Check, Checked
 from diagnosis.results.limited import limited
 from diagnosis.results.machine_event import MachineEvent
@@ -53,12 +53,7 @@ _BY_FAR = 5.0  # ... unless a wheel deviates this many times as far
 _BY_FILE, _AS_FILED = 1.5, 0.5  # times the limit: a wheel that is off the machine file, and others that are not
 _STILL, _DRAGS = 2.0, 1.3  # times the limit: an axle that does not answer, and one that may drag wheels along
 _WHEELS = 3  # fewer have no others to be compared with
-_BESIDE = 0.65  # how often a partial fault beside one of the other side was right
-_LESS_SURE = "The other side has a fault that no row explains, which makes this one less probable."
 _HALF = 0.5  # of the time of a fault
-#: States that a fault takes the place of; that a wheel slips, or its sensor is faulty, says no more than not assessed does.
-_OPEN = (CODE[State.HEALTHY], CODE[State.NOT_ASSESSED], CODE[State.SLIP])
-_COMMANDED = (*_OPEN, CODE[State.NOT_EXCITED])  # an axle that stands still under its command is excited
 
 
 def what_stands_out(checks: Sequence[Checked], cells: Cells, words: MachineWords) -> dict[str, Finding]:
@@ -157,33 +152,6 @@ def without_explained(
     if not events:
         return dict(found)
     return {part: f for part, f in found.items() if part in axles and all(e.model or e.body for e in events)}
-
-
-def with_findings(assessments: Mapping[Part, Assessment], found: Mapping[str, Finding]) -> dict[Part, Assessment]:
-    """Assessments with one more fault of the sides that it may be of; what a model finds on the other side beside it is less sure."""
-    out = {}
-    for (component, side), a in assessments.items():
-        finding = found.get(component)
-        if finding is None:
-            out[component, side] = a
-        elif Side(side) in finding.side.sides:
-            out[component, side] = _with(a, finding)
-        else:
-            own = (
-                limited(f, _BESIDE, _LESS_SURE) if f.tier is Tier.MODEL and not f.mode.total else f for f in a.findings
-            )
-            out[component, side] = replace(a, findings=tuple(own))
-    return out
-
-
-def _with(a: Assessment, finding: Finding) -> Assessment:
-    """An assessment with one more fault."""
-    states = a.states.copy()
-    inside = states[finding.start : finding.stop]
-    inside[np.isin(inside, _COMMANDED if finding.mode is FaultMode.NO_SIGNAL else _OPEN)] = CODE[
-        State(finding.mode.value)
-    ]
-    return replace(a, states=states, findings=tuple(sorted((*a.findings, finding), key=lambda f: f.start)))
 
 
 def _times(check: Checked) -> float:

@@ -26,6 +26,7 @@ from diagnosis.results.machine_event import (
     not_at_rest,
     other_response,
 )
+from diagnosis.results.plain_numbers import plain
 from diagnosis.results.said import Said, Stated
 from replay.arrays.runs import runs_of
 
@@ -186,7 +187,7 @@ def _beyond_the_top(cells: Cells) -> Iterator[MachineEvent]:
         and np.isfinite(v).sum() * cells.dt >= _SPELL_S
     ):
         yield beyond_the_top(
-            f"The {{wheels}} reach {usual:.3g} {{speed_unit}}, {usual / cells.machine.max_speed:.1f} times [geometry] max_speed"
+            f"The {{wheels}} reach {plain(usual)} {{speed_unit}}, {usual / cells.machine.max_speed:.1f} times [geometry] max_speed"
         )
 
 
@@ -207,7 +208,7 @@ def _at_rest(cells: Cells) -> Iterator[MachineEvent]:
         a, b = max(spells, key=lambda s: s[1] - s[0])
         when = Stated.of(a * cells.dt, b * cells.dt)
         text = (
-            f"All {{wheels}} read about {float(np.nanmedian(v[a:b])):.2g} {{speed_unit}} at {when}, while they are told to "
+            f"All {{wheels}} read about {plain(float(np.nanmedian(v[a:b])), 2)} {{speed_unit}} at {when}, while they are told to "
             "stand and no {valve} is open"
         )
         yield Said(text, (when.span,)).event(not_at_rest)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
+from diagnosis.results.plain_numbers import plain
 from diagnosis.results.sizes import amount
 from replay.machine.config import Machine
 
@@ -12,7 +13,7 @@ _WORDS: Mapping[str, Callable[[Machine], str]] = {
     "gear_ratio": lambda m: f"gear ratio {m.gear_ratio:g}",
     "max_speed": lambda m: (
         f"top speed {m.max_speed:g} {m.speed_unit}, and with it the limits: a {m.part} is driven above "
-        f"{m.limits.driving_speed:.3g} {m.speed_unit}"
+        f"{plain(m.limits.driving_speed)} {m.speed_unit}"
     ),
     "max_steer": lambda m: f"largest steering angle {amount(m.max_steer, 'rad')}",
     "flow": lambda m: f"pump flow for {m.plant.flow:g} m/s over all wheels",

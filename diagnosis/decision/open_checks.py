@@ -26,8 +26,12 @@ def furthest_first(checks: Sequence[Checked]) -> list[Checked]:
 
 def open_words(checks: Sequence[Checked]) -> str:
     """Why checks clear nothing, by the one that is furthest beyond its limit; the list below the verdict has the others."""
-    others = len({(c.component, c.check) for c in checks}) > 1
-    return furthest_first(checks)[0].text + ("; other checks of the all-clear are open, too" if others else "")
+    return furthest_first(checks)[0].text + ("; other checks of the all-clear are open, too" if several(checks) else "")
+
+
+def several(checks: Sequence[Checked]) -> bool:
+    """Whether more than one thing deviates."""
+    return len({(c.component, c.check) for c in checks}) > 1
 
 
 def stands_out(checks: Sequence[Checked]) -> str:

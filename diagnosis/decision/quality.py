@@ -17,7 +17,7 @@ from diagnosis.results.document import MissingRow, QualityRow, SignalRow
 from diagnosis.results.left_out import is_left_out
 from diagnosis.results.log_rows import ClockRow
 from diagnosis.results.machine_words import MachineWords
-from diagnosis.results.plain_numbers import with_minus_signs
+from diagnosis.results.plain_numbers import plain, with_minus_signs
 from diagnosis.results.wheel_model import WheelModelFit
 from replay.arrays.blocks import blocks, release
 from replay.arrays.processors import each
@@ -139,14 +139,14 @@ def checks(
 
 
 def _row(check: str, result: str, effect: str = "none", ok: bool = True) -> QualityRow:
-    return {"check": check, "result": with_minus_signs(result), "effect": effect, "ok": ok}
+    return {"check": check, "result": result, "effect": effect, "ok": ok}
 
 
 def _sample_rate(jitter_ms: float, step_ns: int) -> QualityRow:
     sharp = jitter_ms < step_ns * 2.5e-6
     return _row(
         "Sample rate",
-        f"{1e9 / step_ns:.4g} Hz, jitter {jitter_ms:.3g} ms (99 %)",
+        f"{plain(1e9 / step_ns, 4)} Hz, jitter {plain(jitter_ms)} ms (99 %)",
         "none" if sharp else "the jitter limits the accuracy of onsets",
         sharp,
     )
@@ -173,7 +173,7 @@ def _gap_check(rows: Sequence[SignalRow]) -> QualityRow:
     shown = ", ".join(names[:4]) + (f" and {len(names) - 4} more" if len(names) > 4 else "")
     return _row(
         "Gaps",
-        f"{shown}: longest {max(gaps.values()):.3g} s",
+        f"{shown}: longest {plain(max(gaps.values()))} s",
         "no samples there: no data, or no signal where only one channel is silent",
         False,
     )
@@ -196,13 +196,15 @@ def _wheel_model(model: WheelModelFit | None, words: MachineWords) -> list[Quali
     if model is None:
         return []
     effect = "none" if model.reliable else "gains and drives are not assessed"
-    return [_row(f"{words.part.capitalize()} model", model.note, effect, model.reliable)]
+    return [_row(f"{words.part.capitalize()} model", with_minus_signs(model.note), effect, model.reliable)]
 
 
 def _notes(texts: Iterable[str], clocks: Sequence[SourceClock]) -> list[QualityRow]:
     """Notes of readers and timeline, each once, without those on clocks, which have rows of their own."""
     on_clocks = {clock.sentence for clock in clocks}
-    return [_row("Note", text, "see text") for text in alike_notes(t for t in texts if t not in on_clocks)]
+    return [
+        _row("Note", with_minus_signs(text), "see text") for text in alike_notes(t for t in texts if t not in on_clocks)
+    ]
 
 
 def _effect_of(clock: SourceClock) -> tuple[str, bool]:
@@ -211,7 +213,7 @@ def _effect_of(clock: SourceClock) -> tuple[str, bool]:
         return "delays between the files are not known: its signals are not used", False
     if clock.uncertainty_s is None:
         return "times depend on the offset and drift in the machine file", True
-    return f"times of the files agree within ±{1e3 * clock.uncertainty_s:.2g} ms (95 %)", True
+    return f"times of the files agree within ±{plain(1e3 * clock.uncertainty_s, 2)} ms (95 %)", True
 
 
 def clock_row(clock: SourceClock | None) -> ClockRow | None:

@@ -16,6 +16,7 @@ from diagnosis.clearing.yaw import turning_ends
 from diagnosis.decision.turn_scale import ANGLE, GYRO, SECOND_ANGLES, Meant, factor_of, meant
 from diagnosis.response.body import BodySpeed, body_speeds
 from diagnosis.results.machine_event import MachineEvent, other_angle, other_turn, other_yaw_rate
+from diagnosis.results.plain_numbers import plain
 from replay.machine.geometry import Geometry
 from replay.machine.units import known_unit
 
@@ -118,7 +119,7 @@ class Scale(NamedTuple):
             return self._of_turns(one)
         what = "the unit or gain of the wheel speeds"
         if self.diameter is not None:
-            what = f"the wheel diameter ({self.diameter:g} m; {self.diameter * one.factor:.3g} m would fit)"
+            what = f"the wheel diameter ({self.diameter:g} m; {plain(self.diameter * one.factor)} m would fit)"
         others = f", or {one.lengths}" if one.lengths else ""
         return (
             f"By {one.by} the machine is {one.factor:.2f} times as fast as by its wheels throughout, which is no part's fault, for all "
@@ -143,7 +144,7 @@ class Scale(NamedTuple):
             return f"{head}{said.by} turns it as the gyro has it, so that {reads}{wheelbase}."
         alike = ""
         if self.diameter is not None:
-            alike = f"; a wheel diameter that controller and machine file have wrong alike ({self.diameter * one.factor:.3g} m would fit) looks the same"
+            alike = f"; a wheel diameter that controller and machine file have wrong alike ({plain(self.diameter * one.factor)} m would fit) looks the same"
         if said.part == GYRO:
             return head + (
                 f"{said.by} turns it as steering angle and wheelbase have it, so that the scale of the gyro is wrong (it would be multiplied by "

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence, Set
 
 from diagnosis.decision.caveats import Reservations
-from diagnosis.decision.open_checks import open_words
+from diagnosis.decision.open_checks import open_words, several
 from diagnosis.decision.short import main_reason, main_state
 from diagnosis.decision.wording import fault_words, join_words
 from diagnosis.results.assessment import Assessment
@@ -20,14 +20,15 @@ Part = tuple[str, str]
 
 _SOUND = "No speed sensor fault seen"
 _OPEN = "No speed sensor fault seen, but a check is open"
+_SEVERAL_OPEN = "No speed sensor fault seen, but checks are open"
 _DOUBTED = "A sensor is in doubt"
 _REST, _WITH_STEERING = "drives not judged", "drives and steering not judged"
 _RATES = (Check.RATE, Check.LASTING_RATE, Check.PLANT_RATE)
 _NAMED = 2  # drives; where more are all of the machine, their names say nothing
 #: Titles of such a mission.
 TITLES = tuple(
-    f"{title}{';' if title is _OPEN else ','} {rest}"
-    for title in (_SOUND, _OPEN, _DOUBTED)
+    f"{title}{';' if title in (_OPEN, _SEVERAL_OPEN) else ','} {rest}"
+    for title in (_SOUND, _OPEN, _SEVERAL_OPEN, _DOUBTED)
     for rest in (_REST, _WITH_STEERING)
 )
 
@@ -77,7 +78,10 @@ def sensors_alone(
         return f"{_SOUND}, {rest_of_it}", f"{seen}; {unjudged}"
     # a bump, or slip, may be all of it; and a rate per opening is first of all its valve's
     if not faults and not any(c.component in axles and c.check not in _RATES for c in checks):
-        return f"{_OPEN}; {rest_of_it}", f"{seen}, but {open_words(checks)}; {unjudged}"
+        return (
+            f"{_SEVERAL_OPEN if several(checks) else _OPEN}; {rest_of_it}",
+            f"{seen}, but {open_words(checks)}; {unjudged}",
+        )
     doubt = join_words(
         [
             *(

@@ -18,6 +18,7 @@ from dataclasses import replace
 
 from diagnosis.results.assessment import Finding
 from diagnosis.results.machine_words import MachineWords
+from diagnosis.results.plain_numbers import plain
 from diagnosis.results.result import Epsilon, FaultInterval
 from diagnosis.results.sizes import loss_known
 from diagnosis.results.vocabulary import Kind, Severity, Tier, Verdict
@@ -37,13 +38,18 @@ HALF = 0.5  # of ε: a part that may have lost so much is no fault to drive on w
 _ALONE = "This alone is no reason to stop; check it before it grows."
 DOUBLE = -1.0  # of ε: one that gives twice what it should, and more, likewise
 _HARDLY_DOUBTED = 0.8
+_LATER = "Probable, not certain: check it at the next service, and compare with the next mission."
 #: The same in a mission that gives no leave for other reasons.
+SOONER = (
+    "Probable, not certain; but this mission does not clear the machine: check it before the machine goes out again."
+)
 HELD = (
     "Alone it would keep no machine in, but this mission does not clear it: check it before the machine goes out again."
 )
 #: The same of one that is dead briefly again and again, and how often, and for how long in all, that is: a contact is loose.
 AGAIN = "Each time it is tolerable (the paper’s Assumption 1), so often it is not: check plug and cable before the machine goes out again."
 _OFTEN, _OFTEN_S = 5, 3.0
+_HELD = {_ALONE: HELD, _LATER: SOONER}
 _BEFORE, _WITH = (
     "check it before the machine goes out again.",
     "check it with the repair, and compare with the next mission.",
@@ -78,7 +84,7 @@ def severity_of(
             return Severity.MEDIUM, words.fill(f"{what}: check it before the machine goes out again.")
         if halved:
             return Severity.LOW, f"Probable, not certain; but it {halved}: {_BEFORE}"
-        return Severity.LOW, "Probable, not certain: check it at the next service, and compare with the next mission."
+        return Severity.LOW, _LATER
     if total:
         return _severity_of_total(finding, seconds, limits, words, kind)
     marked = finding.epsilon is not None and finding.epsilon.value >= _MARKED_EPSILON
@@ -145,6 +151,8 @@ def advised(intervals: Sequence[FaultInterval], status: Verdict, *, cleared: boo
         return tuple(
             replace(f, advice=f.advice.removesuffix(_BEFORE) + _WITH)
             if f.severity is Severity.LOW and f.advice.endswith(_BEFORE)
+            else replace(f, advice=f"Probable, not certain: {_WITH}")
+            if f.advice == _LATER
             else f
             for f in intervals
         )
@@ -152,9 +160,18 @@ def advised(intervals: Sequence[FaultInterval], status: Verdict, *, cleared: boo
         return tuple(intervals)
     again = [f for same in often_dead(intervals) for f in same]
     return tuple(
-        replace(f, advice=HELD) if f.advice == _ALONE else replace(f, advice=AGAIN) if any(f is g for g in again) else f
+        replace(f, advice=_HELD[f.advice])
+        if f.advice in _HELD
+        else replace(f, advice=AGAIN)
+        if any(f is g for g in again)
+        else f
         for f in intervals
     )
+
+
+def waits_for_no_mission(f: FaultInterval) -> bool:
+    """Whether a fault's advice has it checked before the machine is out again."""
+    return any(words in f.advice for words in ("before the machine goes out", "before the next mission"))
 
 
 def often_dead(faults: Sequence[FaultInterval]) -> list[list[FaultInterval]]:
@@ -171,7 +188,7 @@ def often_dead(faults: Sequence[FaultInterval]) -> list[list[FaultInterval]]:
 def halved_words(side: Side, mode: FaultMode, epsilon: Epsilon | None) -> str:
     """That a part may have lost half or more, by the upper bound of ε̂, surely gives twice as much as it should, or may give so much noise; else empty."""
     if epsilon is not None and mode is FaultMode.OUTSIDE_TABLE and epsilon.high <= DOUBLE:
-        return f"{'reads' if side is Side.SENSOR else 'gives'} at least {1.0 - epsilon.high:.2g} times what it should"
+        return f"{'reads' if side is Side.SENSOR else 'gives'} at least {plain(1.0 - epsilon.high, 2)} times what it should"
     if epsilon is None or epsilon.high < HALF:
         return ""
     if mode.varying:

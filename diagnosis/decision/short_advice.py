@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from diagnosis.results.assessment import Assessment, Lack
 from diagnosis.results.machine_words import MachineWords
+from diagnosis.results.plain_numbers import plain
 from diagnosis.results.vocabulary import Tier
 from replay.faults import Side, State
 from replay.machine.config import Limits
@@ -38,7 +39,7 @@ def act_of_wheel(
     sensor, tier, lack = part[1] == Side.SENSOR, assessment.tier, lack_of(assessment, state)
     if lack is Lack.OPENING_UNIT:
         return _OPENING_UNIT.format(kind="wheel")
-    faster = f"faster than {limits.driving_speed:.3g} {words.speed_unit}"
+    faster = f"faster than {plain(limits.driving_speed)} {words.speed_unit}"
     if driven is not None and driven < limits.min_assessed and tier is not Tier.NONE:
         return f"move {words.parts_moved} {faster} for at least {limits.min_assessed:g} s, and diagnose that log"
     second = "wheel.{c}.v_true (a second speed)"

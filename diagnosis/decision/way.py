@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from diagnosis.results.plain_numbers import plain
 from replay.arrays.envelope import shown
 from replay.machine.config import Machine
 from replay.signals.timeline import Timeline
@@ -75,7 +76,7 @@ def way_of(timeline: Timeline, machine: Machine) -> Way:
     out = [name for name in positions if name in dead and (not alive or name == "odometry")]
     path_note = " ".join(
         f"{_NAMES[name][0].upper()}{_NAMES[name][1:]} stands still where {_NAMES[dead[name][0]]} "
-        f"{'show' if dead[name][0] == 'wheels' else 'shows'} {dead[name][1]:.3g} m of way, and is not used."
+        f"{'show' if dead[name][0] == 'wheels' else 'shows'} {plain(dead[name][1])} m of way, and is not used."
         for name in out
     )
     note = ""

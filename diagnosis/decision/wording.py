@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from diagnosis.decision.severity import AGAIN, HELD, halved_words, unanswered
+from diagnosis.decision.severity import halved_words, unanswered, waits_for_no_mission
 from diagnosis.results.candidates import UNCLEAR, candidates, unclear_words
 from diagnosis.results.consequences import Stated, causes_of
 from diagnosis.results.document import ActionRow
-from diagnosis.results.durations import seconds_words
+from diagnosis.results.durations import covered_s, seconds_words
 from diagnosis.results.ending import Ending
 from diagnosis.results.fault_rows import mode_words
 from diagnosis.results.machine_words import MachineWords
@@ -24,6 +24,7 @@ _NAMED = 3  # parts in the verdict's sentence
 _PLACES, _WIDE = 2, 0.1  # at which a drive is stuck, and width of the bounds of one [of full opening], to be named
 _WIDE_LOSS = 0.4  # between bounds of a loss that need a word
 _SPELLS = 6  # of one part, of which each is named with its time
+_TWICE_S = 0.5  # for which one part is told to be two things at once: worth a word
 _KINDS = 2  # of faults of one part in it: more stand in the part's action
 
 
@@ -101,11 +102,11 @@ def _order(faults: Sequence[FaultInterval], *, stop: bool) -> str:
         return "Then check"
     if (
         unanswered(worst)
-        or any(f.advice in (AGAIN, HELD) for f in faults)
+        or any(waits_for_no_mission(f) for f in faults)
         or any(halved_words(f.side, f.mode, f.epsilon) for f in faults)
     ):
         return "Before the machine goes out, check"
-    return "Check at the next service" if worst.mode.total else "Check"
+    return "Check at the next service" if "at the next service" in worst.advice else "Check"
 
 
 def remedy_words(of: Sequence[FaultInterval], faults: Sequence[FaultInterval], words: MachineWords) -> str:
@@ -137,14 +138,22 @@ def fault_words(f: FaultInterval) -> str:
 
 def _course(faults: Sequence[FaultInterval], words: MachineWords) -> str:
     """What one part was, kind by kind, and for how long; what is unclear with its candidates where they are the same ones."""
-    return join_words([_how_long(kind, same, words) for kind, same in _kinds(faults).items()])
+    kinds = _kinds(faults)
+    said = join_words([_how_long(kind, same, words) for kind, same in kinds.items()])
+    twice = sum(map(_seconds, kinds.values())) - _seconds(faults)
+    return f"{said}, {seconds_words(twice)} of it at the same time" if twice >= _TWICE_S else said
+
+
+def _seconds(faults: Sequence[FaultInterval]) -> float:
+    """Time in which one part is faulty [s]."""
+    return covered_s((f.start_s, f.stop_s) for f in faults)
 
 
 def _summary(faults: Sequence[FaultInterval], words: MachineWords) -> str:
     """The same for the verdict's sentence: for how long it was faulty at all, where that was in many ways."""
     if len(_kinds(faults)) <= _KINDS:
         return _course(faults, words)
-    total = seconds_words(sum(f.stop_s - f.start_s for f in faults))
+    total = seconds_words(_seconds(faults))
     return f"faulty for {total} in {len(faults)} spells"
 
 
@@ -161,7 +170,7 @@ def _kinds(faults: Sequence[FaultInterval]) -> dict[str, list[FaultInterval]]:
 
 def _how_long(kind: str, faults: Sequence[FaultInterval], words: MachineWords) -> str:
     """What faults are, how much they take, the whole time of them on one part, and how many they are."""
-    total = seconds_words(sum(f.stop_s - f.start_s for f in faults))
+    total = seconds_words(_seconds(faults))
     held = "" if kind.startswith(UNCLEAR) else _held(faults, words)
     return f"{kind}{held}{_lost(faults)} for {total}{_times(faults)}"
 

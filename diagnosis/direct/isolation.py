@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.channels.sample_status import BLIND, PAIR
+from diagnosis.channels.zero_level import APART, zero_level
 from diagnosis.direct.behind_play import gain_behind_play
 from diagnosis.direct.calm import calm_row
 from diagnosis.direct.fault_runs import inner, motion_left
@@ -41,7 +42,6 @@ _CALM_P, _NEARLY_P = (
     0.95,
     0.65,
 )  # that a steady row is the fault's which leaves hardly anything; nearly as much as counts
-ZERO = 0.01  # of the span: as far apart may two healthy instruments have their zero
 _NOTHING = 0.05  # of the span, root mean square: a channel that shows more is not silent, however rough its usual noise
 
 
@@ -109,7 +109,7 @@ class Isolated:
 
 
 def run_samples(run: Run, found: IdentifiedPair, min_sat: float = 0.0) -> RunSamples:
-    """Samples of a run and what they look like; what keeps below `min_sat` [unit of y] is zero."""
+    """Samples of a run and what they look like; what keeps below `min_sat` [unit of y] about a sensor's or a valve's zero is zero."""
     y, x, status, _, white, passing, _ = found.samples.part(run.start, run.stop)
     use = np.isin(status, (PAIR, BLIND))
     model = found.model
@@ -119,7 +119,9 @@ def run_samples(run: Run, found: IdentifiedPair, min_sat: float = 0.0) -> RunSam
     slack = 3 * model.constant_noise / np.sqrt(min(use.sum(), 100)) + 0.6 * play if use.any() else 0.0
     size = float(np.sqrt(np.mean(y[use] ** 2))) if use.any() else 0.0
     loud = size > _NOTHING * found.pair.span
-    zero = not use.any() or size <= min_sat or (abs(float(np.median(y[use]))) <= slack and not loud)
+    middle = abs(float(np.median(y[use]))) if use.any() else 0.0
+    rests = zero_level(found.pair.span, min_sat) if found.pair.side is Side.SENSOR else min_sat
+    zero = (middle <= slack and not loud) or (middle <= max(slack, rests) and size <= min_sat)
     still = bool(use.any()) and _hardly_moves(y[use], x[use], 2 * noise, 2 * play)
     deviation = float(np.sqrt(np.mean((y[use] - x[use]) ** 2))) if use.any() else float("inf")
     return RunSamples(y, x, status, use, zero, loud, still, deviation, noise)
@@ -191,12 +193,12 @@ def isolate(run: Run, found: IdentifiedPair, min_sat: float) -> Isolated | None:
         run = replace(run, row=INEFFICIENT)
         estimate = _of_gain(delta, estimate_run(run, found)) or estimate
     restless = found.pair.side is Side.SENSOR and _changes(seen) > _RESTLESS
-    calm = _calm_row_of(seen, min_sat, ZERO * found.pair.span) if run.row in VARYING_ROWS else None
+    calm = _calm_row_of(seen, min_sat, APART * found.pair.span) if run.row in VARYING_ROWS else None
     if calm is not None and not (calm == STUCK and restless):
         other = estimate_run(replace(run, row=calm), found)
         if other is not None:
             both = p[run.row] + p[calm]
-            sure = _calm_row_of(seen, 0.5 * min_sat, ZERO * found.pair.span) == calm
+            sure = _calm_row_of(seen, 0.5 * min_sat, APART * found.pair.span) == calm
             sure_p = _CALM_P if sure else _NEARLY_P
             p[calm], p[run.row] = sure_p * both, (1.0 - sure_p) * both
             run, estimate = replace(run, row=calm), other

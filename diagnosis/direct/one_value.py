@@ -14,7 +14,9 @@ from numpy.typing import NDArray
 from diagnosis.channels.one_value import TURNS, Frozen, frozen_of, trembling
 from diagnosis.direct.identification import IdentifiedPair
 from diagnosis.results.assessment import CODE, Assessment, Finding
+from diagnosis.results.plain_numbers import plain
 from diagnosis.results.result import Epsilon, Hypothesis, Sat
+from diagnosis.results.sentence import lasting
 from diagnosis.results.vocabulary import Tier
 from replay.faults import FaultMode, Side, State
 from replay.signals.resolution import rounding_step
@@ -103,7 +105,7 @@ def _told(one: IdentifiedPair, r: Frozen) -> Finding:
         epsilon=Epsilon(1.0, 1.0, 1.0),
         sat=Sat(r.value, abs(r.value), r.value, r.value, "m/s"),
         evidence=(
-            f"{one.pair.y_name} stays at {r.value:.3g} {{speed_unit}} to the last digit for {length:.2f} s; the longest that it stays at "
+            f"{one.pair.y_name} stays at {plain(r.value)} {{speed_unit}} to the last digit for {lasting(length, 2)}; the longest that it stays at "
             f"another value is {r.usual_s:.2f} s, and all other speed sensors go on trembling.",
         ),
         tier=Tier.DIRECT,

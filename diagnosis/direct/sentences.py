@@ -10,7 +10,7 @@ from diagnosis.direct.isolation import Isolated
 from diagnosis.direct.shape import shape_sentence
 from diagnosis.estimation.fault_models import TOTAL_ROWS
 from diagnosis.results.result import Epsilon
-from diagnosis.results.sentence import About, Sentence
+from diagnosis.results.sentence import About, Sentence, lasting
 from diagnosis.results.sizes import amount, kept_to, probable_words
 from replay.faults import FaultMode
 
@@ -41,7 +41,7 @@ def sentences(isolated: Isolated, found: IdentifiedPair, mode: FaultMode, epsilo
     silent = int(np.count_nonzero(seen.status == SILENT))
     if silent:
         out.append(
-            f"{pair.y_name} delivered nothing for {silent * pair.dt:.3f} s while other channels of its source did."
+            f"{pair.y_name} delivered nothing for {lasting(silent * pair.dt, 3)} while other channels of its source did."
         )
     if seen.use.any():
         if mode in (FaultMode.NOISY, FaultMode.OUTSIDE_TABLE):
@@ -87,7 +87,7 @@ def _values(isolated: Isolated, found: IdentifiedPair, epsilon: Epsilon | None, 
         inner = y[1:-1] if y.size > 4 else y  # the first and the last sample may be beside it
         return [
             f"{pair.y_name} {kept_to(float(np.min(inner)), float(np.max(inner)), pair.unit)} "
-            f"for {seconds:.3f} s while {pair.x_name} {other}."
+            f"for {lasting(seconds, 3)} while {pair.x_name} {other}."
         ]
     if epsilon is None:
         return []
@@ -96,7 +96,7 @@ def _values(isolated: Isolated, found: IdentifiedPair, epsilon: Epsilon | None, 
             About.SHARE,
             f"{pair.y_name} followed {1 - epsilon.value:.3f} × {pair.x_name} ",
             bounds_words(1 - epsilon.high, 1 - epsilon.low),
-            f" over {seconds:.3f} s.",
+            f" over {lasting(seconds, 3)}.",
         )
     ]
     sat = isolated.estimate[1]

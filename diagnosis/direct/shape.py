@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from diagnosis.results.plain_numbers import plain
 from diagnosis.results.sizes import amount
 
 Array = NDArray[np.float64]
@@ -46,8 +47,8 @@ def shape_sentence(y: Array, x: Array, dt: float, names: tuple[str, str], unit: 
         both = float(np.mean((y - gain * x - add) ** 2))
         if _without(off, x) > _SHIFTED * both and abs(add) > _ADDED * float(np.sqrt(np.mean(x**2))):
             sign = "more" if add > 0.0 else "less"
-            return f"A scale and an offset: {channel} is {gain:.3g} × {reference}, and {amount(abs(float(add)), unit)} {sign}."
-        return f"A scale: {channel} is {1.0 + float(off @ x) / float(x @ x):.3g} × {reference}, without an offset."
+            return f"A scale and an offset: {channel} is {plain(gain)} × {reference}, and {amount(abs(float(add)), unit)} {sign}."
+        return f"A scale: {channel} is {plain(1.0 + float(off @ x) / float(x @ x))} × {reference}, without an offset."
     change = np.asarray(np.gradient(x, dt), dtype=np.float64)
     if (
         _without(off, change) < (1.0 - _EXPLAINED) * whole

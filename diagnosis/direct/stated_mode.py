@@ -7,8 +7,9 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from diagnosis.channels.zero_level import APART
 from diagnosis.direct.identification import IdentifiedPair
-from diagnosis.direct.isolation import ZERO, Isolated, RunSamples
+from diagnosis.direct.isolation import Isolated, RunSamples
 from diagnosis.results.fault_rows import ROWS
 from replay.arrays.runs import runs_of
 from replay.faults import FaultMode, Side
@@ -99,7 +100,7 @@ def _mode_of_gain(isolated: Isolated, noise: float, found: IdentifiedPair, limit
     if not outside and epsilon is not None and epsilon.value < limits.min_epsilon:
         return None
     reference = isolated.seen.x[isolated.seen.use]
-    if abs(1.0 - delta) * math.sqrt(float((reference**2).mean())) < max(0.5 * noise, ZERO * found.pair.span):
+    if abs(1.0 - delta) * math.sqrt(float((reference**2).mean())) < max(0.5 * noise, APART * found.pair.span):
         return None  # what is lost of hardly anything is the reference's own noise, or where both have their zero
     return FaultMode.OUTSIDE_TABLE if outside else FaultMode.INEFFICIENT
 

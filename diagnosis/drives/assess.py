@@ -25,6 +25,7 @@ from diagnosis.drives.power import load_powers, sensor_powers
 from diagnosis.drives.speed_pair import SpeedPair, speed_pair
 from diagnosis.results.assessment import CODE, Assessment, Finding, Reason, unassessed
 from diagnosis.results.evidence_columns import Pictured, steps_of
+from diagnosis.results.plain_numbers import plain
 from diagnosis.results.sizes import not_reported
 from diagnosis.results.vocabulary import Tier
 from replay.faults import Side, State
@@ -236,7 +237,7 @@ def _why_not_assessed(data: DriveData, load: LoadTrack | None) -> str:
     beyond, loaded = np.count_nonzero(load.covered == 0.0), np.count_nonzero(load.probability >= 0.5)
     if beyond > loaded:
         return (
-            f"healthy missions drove at {effort.slowest:.3g} to {effort.fastest:.3g} {{speed_unit}}; what effort a healthy drive takes at "
+            f"healthy missions drove at {plain(effort.slowest)} to {plain(effort.fastest)} {{speed_unit}}; what effort a healthy drive takes at "
             "other speeds is not known (`mfhca fit` with healthy missions at these speeds finds it)"
         )
     return "the drive takes more effort than in healthy missions; a sensor that reads low has the same effect"
@@ -245,8 +246,8 @@ def _why_not_assessed(data: DriveData, load: LoadTrack | None) -> str:
 def _notes(data: DriveData, pair: SpeedPair, controller: InverseController, below: int) -> tuple[str, ...]:
     """Figures that the judgement used."""
     figures = (
-        f"{data.names[0]} against the speed to which {data.names[2]} answered: noise {pair.noise:.3g} {{speed_unit}} "
-        f"({100 * pair.exact:.0f} % of the samples within {pair.core:.2g} {{speed_unit}}), integral time {controller.memory_s:.3g} s."
+        f"{data.names[0]} against the speed to which {data.names[2]} answered: noise {plain(pair.noise)} {{speed_unit}} "
+        f"({100 * pair.exact:.0f} % of the samples within {plain(pair.core, 2)} {{speed_unit}}), integral time {plain(controller.memory_s)} s."
     )
     if not below:
         return (figures,)

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.channels.sample_status import BLIND, PAIR
+from diagnosis.channels.zero_level import zero_level
 from diagnosis.drives.models import ROW, RowModel
 from diagnosis.drives.path import most_probable, state_evidence
 from diagnosis.drives.speed_pair import SpeedPair
@@ -26,8 +27,9 @@ from diagnosis.estimation.row_probability import row_probabilities
 from diagnosis.estimation.segments import Run, merge_equal
 from diagnosis.results.assessment import Finding
 from diagnosis.results.fault_rows import ROWS, codes
+from diagnosis.results.plain_numbers import plain
 from diagnosis.results.result import Hypothesis
-from diagnosis.results.sentence import About, Sentence
+from diagnosis.results.sentence import About, Sentence, lasting
 from diagnosis.results.sizes import kept_to, probable_words
 from diagnosis.results.vocabulary import Tier
 from replay.faults import FaultMode, Side
@@ -143,7 +145,7 @@ def _isolated(run: Run, pair: SpeedPair, model: RowModel, limits: Limits) -> Iso
     gain = float(evidence[row] - evidence[HEALTHY])
     if gain < thinnest(model.switch_cost, ends=run.stop < pair.samples.y.size):
         return None
-    if row == STUCK and abs(float(np.mean(y))) <= max(3 * model.constant_noise, limits.min_sat):
+    if row == STUCK and abs(float(np.mean(y))) <= max(3 * model.constant_noise, zero_level(model.span, limits.min_sat)):
         row = NO_SIGNAL
     p = row_probabilities(evidence)
     if row == NO_SIGNAL:
@@ -227,19 +229,19 @@ def _sentences(isolated: Isolated, pair: SpeedPair, delta: float) -> tuple[str, 
     out = []
     if row in TOTAL_ROWS and y.size:
         out.append(
-            f"{pair.name} {kept_to(float(np.min(y)), float(np.max(y)), 'm/s')} for {seconds:.2f} s, while the "
-            f"drive was commanded; healthy samples differ by {pair.noise:.2g} {{speed_unit}}."
+            f"{pair.name} {kept_to(float(np.min(y)), float(np.max(y)), 'm/s')} for {lasting(seconds, 2)}, while the "
+            f"drive was commanded; healthy samples differ by {plain(pair.noise, 2)} {{speed_unit}}."
         )
     elif row in TOTAL_ROWS:
-        out.append(f"{pair.name} delivered nothing for {seconds:.2f} s while the controller went on.")
+        out.append(f"{pair.name} delivered nothing for {lasting(seconds, 2)} while the controller went on.")
     else:
         out.append(
-            f"{pair.name} was {delta:.3f} times the speed that the controller answered to, over {seconds:.2f} s; the rest has a "
-            f"root mean square of {float(np.sqrt(np.mean((y - delta * x) ** 2))):.3g} {{speed_unit}}, healthy noise is {pair.noise:.2g} {{speed_unit}}."
+            f"{pair.name} was {delta:.3f} times the speed that the controller answered to, over {lasting(seconds, 2)}; the rest has a "
+            f"root mean square of {plain(float(np.sqrt(np.mean((y - delta * x) ** 2))))} {{speed_unit}}, healthy noise is {plain(pair.noise, 2)} {{speed_unit}}."
         )
     if deviation > pair.noise:
         out.append(
-            f"The logged speed is not the one that the controller acted on (difference {deviation:.3g} {{speed_unit}} root mean square), "
+            f"The logged speed is not the one that the controller acted on (difference {plain(deviation)} {{speed_unit}} root mean square), "
             "so the drive follows its command and the channel of the speed is faulty."
         )
     out.append(Sentence(About.TIMES, f"{pair.name} is {probable_words(isolated.gain)}."))

@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 from diagnosis.drives.inputs import DriveData
 from diagnosis.drives.load import LoadTrack
 from diagnosis.results.assessment import Finding
+from diagnosis.results.plain_numbers import plain
 from diagnosis.results.result import Epsilon, Hypothesis, Sat
-from diagnosis.results.sentence import About, Sentence
+from diagnosis.results.sentence import About, Sentence, lasting
 from diagnosis.results.vocabulary import Tier
 from replay.arrays.runs import runs_of
 from replay.faults import FaultMode, Side, State
@@ -190,22 +191,22 @@ def _finding(stretch: LoadStretch, data: DriveData) -> Finding:
 def _sentences(stretch: LoadStretch, onset: Onset, side: Side, data: DriveData) -> tuple[str, ...]:
     """What decided, in figures."""
     effort = (
-        f"{data.names[2]} was {stretch.mean_load:.3g} above the {stretch.mean_expected:.3g} that healthy missions needed for "
-        f"the same speed, over {stretch.seconds:.0f} s."
+        f"{data.names[2]} was {plain(stretch.mean_load)} above the {plain(stretch.mean_expected)} that healthy missions needed for "
+        f"the same speed, over {lasting(stretch.seconds, 0)}."
     )
     lines: list[str] = [Sentence(About.EFFORT, effort)]
     if data.open_loop:
         lines.append("The recorded controller met no fault of the sensor, so the drive itself took more effort.")
     elif side is Side.SENSOR:
         dropped = (
-            f"The measured speed dropped by {onset.seen:.3g} {{speed_unit}} at once; a sensor that lost this much gain drops by "
-            f"{onset.wanted:.3g} {{speed_unit}}, a loaded drive falls with its lag."
+            f"The measured speed dropped by {plain(onset.seen)} {{speed_unit}} at once; a sensor that lost this much gain drops by "
+            f"{plain(onset.wanted)} {{speed_unit}}, a loaded drive falls with its lag."
         )
         lines.append(Sentence(About.ONSET, dropped))
     elif side is Side.ACTUATOR:
         bent = (
-            f"A sensor that lost this much gain would have dropped by {onset.wanted:.3g} {{speed_unit}} at once; no more than "
-            f"{onset.seen:.3g} {{speed_unit}} was seen."
+            f"A sensor that lost this much gain would have dropped by {plain(onset.wanted)} {{speed_unit}} at once; no more than "
+            f"{plain(onset.seen)} {{speed_unit}} was seen."
         )
         lines.append(Sentence(About.ONSET, bent))
     else:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.estimation.lag import low_passed_at
+from diagnosis.results.plain_numbers import plain
 from diagnosis.results.result import Epsilon
 from diagnosis.results.sentence import About, Sentence
 from diagnosis.results.sizes import amount
@@ -155,7 +156,7 @@ def causes(y: Array, x: Array, at: NDArray[np.intp], measured: Measured) -> Iter
     words = Sentence(About.LATE, "It comes ", f"{1e3 * seconds:.0f}", f" ms after {reference}: a delay.")
     yield leaves(rest, _late(words, seconds))
     seconds, rest = _least(_lagged(at, x, measured), y, measured)
-    yield leaves(rest, _late(f"It follows {reference} with a time constant of {seconds:.2g} s: a lag.", seconds))
+    yield leaves(rest, _late(f"It follows {reference} with a time constant of {plain(seconds, 2)} s: a lag.", seconds))
 
 
 def _late(words: str, seconds: float) -> Cause:

@@ -11,6 +11,7 @@ from diagnosis.report.units import DEGREES, on_page
 from diagnosis.results.clearing import MAY_EXPLAIN, Check, lasts_in, share_covered, size_words
 from diagnosis.results.clearing_rows import ClearingRow
 from diagnosis.results.document import IntervalRow, MissingRow, ReportDocument, SignalRow
+from diagnosis.results.durations import covered_s
 from diagnosis.results.fault_rows import state_label
 from diagnosis.results.log_rows import FileRow
 from diagnosis.results.loop_rows import LoopRow, MetricsRow
@@ -57,11 +58,11 @@ def _of_remarks(faults: Sequence[IntervalRow], part: tuple[str, str], faulty: fl
     """How much of a part's faulty time [s] is of remarks, which count for none on the timeline; empty where none is."""
     component, side = part
     own = [
-        f["stop_s"] - f["start_s"]
+        (f["start_s"], f["stop_s"])
         for f in faults
         if f["severity"] == Severity.INFO and f["component"] == component and side in Side(f["side"]).sides
     ]
-    time = min(sum(own), faulty)
+    time = min(covered_s(own), faulty)
     return (
         [f"{time:.1f} s of its faulty time are remarks, which count for none on the timeline"]
         if time >= _TOLD_S
@@ -146,8 +147,19 @@ def _why_undecided(report: ReportDocument) -> dict[tuple[str, str], list[str]]:
 
 def _cells(row: LoopRow, commanded: bool) -> list[str]:
     error, effort = row["tracking_error"], row["control_effort"]
-    cells = [number(error["mission"]), number(error["driving"])]
-    return cells + [number(None if x is None else 100 * x) for x in (effort["mission"], effort["driving"]) if commanded]
+    cells = [_three_digits(error["mission"]), _three_digits(error["driving"])]
+    return cells + [_per_cent(x) for x in (effort["mission"], effort["driving"]) if commanded]
+
+
+def _per_cent(share: float | None) -> str:
+    return _three_digits(None if share is None else 100 * share)
+
+
+def _three_digits(value: float | None) -> str:
+    """A measured value with all of its three digits, zeros too, as the others of its column have them."""
+    text = number(value)
+    zeros = "" if value is None or "e" in f"{value:.3g}" else f"{value:#.3g}".removesuffix(".")
+    return zeros.replace("-", "−") if "." in zeros else text
 
 
 #: Unit of each limit of the machine file; absent: a plain number. ``{speed}`` is the machine's own.
@@ -187,7 +199,7 @@ def loop_tables(metrics: MetricsRow, words: MachineWords) -> Context:
     """Tracking error and control effort, beside the paper's table."""
     rows = [*metrics["wheels"].items(), ("Average", metrics["average"])]
     paper = [
-        (p["controller"], [number(p["tracking_error"]), number(100 * p["control_effort"]), number(p["parameters"])])
+        (p["controller"], [number(p["tracking_error"]), _per_cent(p["control_effort"]), number(p["parameters"])])
         for p in (metrics["paper"] if words.drive == "valve" else ())
     ]
     some = any(q["mission"] is not None for _, r in rows for q in (r["tracking_error"], r["control_effort"]))

@@ -15,6 +15,7 @@ from diagnosis.report.judged_parts import unpowered
 from diagnosis.report.standing import Standing, standings_of
 from diagnosis.results.candidates import label_of, symbol_of
 from diagnosis.results.document import IntervalRow, ReportDocument, WheelPlace
+from diagnosis.results.durations import covered_s
 from diagnosis.results.machine_words import HYDRAULIC, MachineWords, words_of
 from diagnosis.results.vocabulary import Kind, Severity
 from replay.faults import Side, State
@@ -68,7 +69,7 @@ def condition(
         name = words.part_name(kind, worst["side"])
         label = label_of(worst).lower()
         same = [f for f in mine if f["side"] == worst["side"] and label_of(f).lower() == label]
-        length = span(sum(f["stop_s"] - f["start_s"] for f in same))
+        length = span(covered_s((f["start_s"], f["stop_s"]) for f in same))
         more: tuple[str, ...] = (f"and {len(mine) - len(same)} more",) if len(mine) > len(same) else ()
         faulty = {side for f in mine for side in Side(f["side"]).sides}
         more += tuple(

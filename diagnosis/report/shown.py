@@ -12,6 +12,7 @@ from diagnosis.results.clearing_rows import DetectabilityRow, DetectabilityTrace
 from diagnosis.results.detectability import Deviation
 from diagnosis.results.document import ReportDocument
 from diagnosis.results.machine_words import MachineWords, words_of
+from diagnosis.results.plain_numbers import plain
 from diagnosis.results.vocabulary import Kind
 from replay.faults import Side
 
@@ -114,8 +115,8 @@ def _cell(row: DetectabilityRow | None) -> str:
     if not size:
         return "not cleared"
     if unit == "rad":
-        return f"{math.degrees(size):.2g}°"
-    return f"{100 * size:.0f} %" if unit == "1" else f"{size:.2g} {unit}"
+        return f"{plain(math.degrees(size), 2)}°"
+    return f"{100 * size:.0f} %" if unit == "1" else f"{plain(size, 2)} {unit}"
 
 
 def _told(kind: Kind, side: str, rows: Mapping[tuple[str, float | None], DetectabilityRow], words: MachineWords) -> str:

@@ -15,6 +15,7 @@ from diagnosis.report.standing import Standing, standings_of
 from diagnosis.results.candidates import label_of, symbol_of
 from diagnosis.results.consequences import Stated, causes_of
 from diagnosis.results.document import IntervalRow, PhaseRow, ReportDocument
+from diagnosis.results.durations import covered_s
 from diagnosis.results.fault_rows import state_label
 from diagnosis.results.machine_words import MachineWords, words_of
 from diagnosis.results.vocabulary import Kind, Severity
@@ -255,7 +256,7 @@ def _faulty_lane(
     if len(own) < len(faults):
         spans = [*spans, *((f["mode"], f["start_s"], f["stop_s"]) for f in faults)]
     painting = [f for f in faults if f["severity"] != Severity.INFO]
-    total = sum(f["stop_s"] - f["start_s"] for f in painting)
+    total = covered_s((f["start_s"], f["stop_s"]) for f in painting)
     share = 100 * total / duration if duration > 0 else 0.0
     words = f"{share:.1f} %" if share >= 0.05 else span(total) if painting else "remark"
     name = machine_words.part_name(faults[0]["kind"], side)

@@ -19,7 +19,9 @@ from diagnosis.response.inputs import FollowerData, cell_of, cells
 from diagnosis.response.vibration import Unit, Vibration, vibration_of
 from diagnosis.response.wheel import SENSOR_SHARE, sensor_finding
 from diagnosis.results.assessment import CODE, Assessment, Finding
+from diagnosis.results.plain_numbers import plain
 from diagnosis.results.result import Epsilon
+from diagnosis.results.sentence import lasting
 from replay.faults import FaultMode, Side, State
 
 Array = NDArray[np.float64]
@@ -223,14 +225,14 @@ def _finding(
     text += (
         f", and is back {(stop - start) * dt:.1f} s later in the same way"
         if len(jumps) > 1
-        else f", while the inertial unit shakes on as that of a body that moves, for {(stop - start) * dt:.1f} s"
+        else f", while the inertial unit shakes on as that of a body that moves, for {lasting((stop - start) * dt, 1)}"
     )
     if by_change and related is not None:
         whole = sum(abs(s[1]) for s in said)
         part = sum(s[2] * np.sign(s[1]) for s in said) / whole
         text += (
-            f"; the body's acceleration (imu.acceleration) has {part:.2f} × of {'these changes' if len(jumps) > 1 else 'this change'}, of others 1 ± {related.spread:.2g} × "
-            f"and {related.noise / abs(related.gain):.2g} {{speed_unit}}"
+            f"; the body's acceleration (imu.acceleration) has {part:.2f} × of {'these changes' if len(jumps) > 1 else 'this change'}, of others 1 ± {plain(related.spread, 2)} × "
+            f"and {plain(related.noise / abs(related.gain), 2)} {{speed_unit}}"
         )
     if by_shaking:
         text += "; all the time the inertial unit shakes as it does in motion, and not as at rest"

@@ -18,7 +18,7 @@ from diagnosis.response.spells import deviations_of
 from diagnosis.response.wheel import SENSOR_SHARE, sensor_finding
 from diagnosis.results.assessment import Finding
 from diagnosis.results.result import Epsilon
-from diagnosis.results.sentence import About, Sentence
+from diagnosis.results.sentence import About, Sentence, lasting
 from replay.faults import FaultMode
 
 Array = NDArray[np.float64]
@@ -87,7 +87,7 @@ def _finding(data: FollowerData, view: View, y: Array, span: tuple[int, int], dt
     mode = FaultMode.NO_SIGNAL if nothing else FaultMode.INEFFICIENT if gain < 1.0 else FaultMode.OUTSIDE_TABLE
     loss = 1.0 if nothing else 1.0 - gain
     text = (
-        f"{data.name} reads {'nothing' if nothing else f'{gain:.2f} × that'} of what {view.name} shows for {(stop - start) * width * dt:.1f} s, "
+        f"{data.name} reads {'nothing' if nothing else f'{gain:.2f} × that'} of what {view.name} shows for {lasting((stop - start) * width * dt, 1)}, "
         f"{'both ends of which come' if ends > 1 else 'one end of which comes'} at once; in most of the mission the two agree."
     )
     size = Epsilon(loss, loss, loss) if gain < 1.0 else None

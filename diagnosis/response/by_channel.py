@@ -11,6 +11,7 @@ from diagnosis.response.channel import Samples
 from diagnosis.response.wheel import SENSOR_SHARE, Wheel, sensor_finding
 from diagnosis.results.assessment import Finding
 from diagnosis.results.result import Epsilon
+from diagnosis.results.sentence import lasting
 from replay.arrays.runs import runs_of
 from replay.faults import FaultMode
 
@@ -130,7 +131,7 @@ def lost_of(wheel: Wheel, lost: Sequence[tuple[int, int]], driving: Flags) -> li
     for first, last in lost:
         if np.count_nonzero(driving[first:last]) * wheel.dt < _LOST_DRIVING_S:
             continue
-        text = f"Nothing came from {wheel.name} for {(last - first) * wheel.dt:.1f} s, while what is recorded with it went on."
+        text = f"Nothing came from {wheel.name} for {lasting((last - first) * wheel.dt, 1)}, while what is recorded with it went on."
         out.append(
             sensor_finding(first, last, FaultMode.NO_SIGNAL, SENSOR_SHARE, Epsilon(1.0, 1.0, 1.0), None, (text,))
         )

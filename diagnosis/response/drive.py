@@ -22,7 +22,9 @@ from diagnosis.response.machine import Judged, unlike_others
 from diagnosis.response.models import Beside, Blocks
 from diagnosis.response.spells import spans_of
 from diagnosis.results.assessment import Finding
+from diagnosis.results.plain_numbers import plain
 from diagnosis.results.result import Epsilon, Hypothesis
+from diagnosis.results.sentence import lasting
 from diagnosis.results.vocabulary import Tier
 from replay.faults import FaultMode, Side, State
 from replay.machine.geometry import Geometry
@@ -270,8 +272,8 @@ def _finding(
     }.get(mode)
     p = _ALONE_P if one.alone else _P[sum(much > least for least in _MUCH_S) - 1]
     texts: tuple[str, ...] = (
-        f"{one.data.name} is {round(size, 6):.2g} {{speed_unit}} (median) for {(stop - start) * block_s:.1f} s, where its command makes it "
-        f"{float(np.median(np.abs(asked))):.2g} {{speed_unit}} otherwise.",
+        f"{one.data.name} is {plain(round(size, 6), 2)} {{speed_unit}} (median) for {lasting((stop - start) * block_s, 1)}, where its command makes it "
+        f"{plain(float(np.median(np.abs(asked))), 2)} {{speed_unit}} otherwise.",
         f"{view.compared} and the measured motion of the body show the same speed as the sensor, so that the sensor is right and the "
         "{valve} does not do what it is told.",
     )

@@ -16,7 +16,7 @@ from diagnosis.response.inputs import FollowerData
 from diagnosis.response.machine import Judged
 from diagnosis.results.assessment import Finding
 from diagnosis.results.result import Epsilon, Hypothesis
-from diagnosis.results.sentence import About, Sentence
+from diagnosis.results.sentence import About, Sentence, lasting
 from diagnosis.results.vocabulary import Tier
 from replay.arrays.runs import runs_of
 from replay.faults import FaultMode, Side, State
@@ -273,7 +273,7 @@ def _finding(one: Judged, start: int, stop: int, dragged: bool, block_s: float) 
     width = int(one.wheel.blocks.start[1])
     wheel = one.data.name.split(".")[1]
     text = (
-        f"wheel.{wheel}.effort is next to nothing for {(stop - start) * block_s:.1f} s while {'the drives beside it pull' if dragged else 'the other drive pulls'} as usual: its "
+        f"wheel.{wheel}.effort is next to nothing for {lasting((stop - start) * block_s, 1)} while {'the drives beside it pull' if dragged else 'the other drive pulls'} as usual: its "
         f"{{valve}} has no power{', and the others drag the {wheel} along' if dragged else ''}."
     )
     other = 0.5 * (1.0 - _P)

@@ -11,8 +11,9 @@ from diagnosis.response.spells import Spell
 from diagnosis.response.wheel import EITHER, SENSOR_SHARE, Wheel, sensor_finding
 from diagnosis.results.assessment import Finding
 from diagnosis.results.limited import limited
+from diagnosis.results.plain_numbers import plain
 from diagnosis.results.result import Epsilon, Sat
-from diagnosis.results.sentence import About, Sentence
+from diagnosis.results.sentence import About, Sentence, lasting
 from replay.faults import FaultMode
 
 Array = NDArray[np.float64]
@@ -71,7 +72,7 @@ def _stuck(spell: Spell, wheel: Wheel, first: int, last: int) -> Finding | None:
     if (end - begin) * wheel.dt < _BEYOND_HABIT * wheel.habit:
         return None
     text = (
-        f"{wheel.name} read {value:.4g} {{speed_unit}} in {stop - start + 1} readings one after another, for {(end - begin) * wheel.dt:.2f} s; "
+        f"{wheel.name} read {plain(value, 4)} {{speed_unit}} in {stop - start + 1} readings one after another, for {lasting((end - begin) * wheel.dt, 2)}; "
         "while it drives it otherwise changes all the time."
     )
     sat = Sat(value, abs(value), value, value, "m/s")
@@ -88,7 +89,7 @@ def _silent(spell: Spell, wheel: Wheel, first: int, last: int, speed: Array | No
     if fell is None and rose is None and _asked_little(wheel, part) and _lives(wheel, begin, end):
         return None
     asked = "its command asked for motion" if np.isfinite(wheel.blocks.low[part]).any() else "other {wheels} turned"
-    texts = [f"{wheel.name} read 0 for {(end - begin) * wheel.dt:.2f} s while {asked}."]
+    texts = [f"{wheel.name} read 0 for {lasting((end - begin) * wheel.dt, 2)} while {asked}."]
     # a wheel that comes free leaps ahead, for its loop has wound up
     sensor = _by_jumps(wheel, 0 if fell is None else 1 + (rose is not None))
     if fell is not None or rose is not None:
@@ -206,7 +207,7 @@ def _noisy(spell: Spell, wheel: Wheel, first: int, last: int) -> Finding | None:
     rms = float(np.sqrt(np.mean(wheel.samples.white[inside] ** 2)))
     usual = float(np.sqrt(np.median(wheel.samples.white[~inside] ** 2))) if (~inside).any() else 0.0
     text = (
-        f"{wheel.name} changes by {rms:.2g} {{speed_unit}} from reading to reading (second differences), otherwise by {usual:.2g} {{speed_unit}}; "
+        f"{wheel.name} changes by {plain(rms, 2)} {{speed_unit}} from reading to reading (second differences), otherwise by {plain(usual, 2)} {{speed_unit}}; "
         "the inertia of a {wheel} forbids that."
     )
     sat = Sat(0.0, rms, -rms, rms, "m/s")

@@ -21,7 +21,9 @@ from diagnosis.response.spells import Spell
 from diagnosis.response.uphill import lower_of
 from diagnosis.results.assessment import Finding
 from diagnosis.results.detectability import Deviation, Power
+from diagnosis.results.plain_numbers import plain
 from diagnosis.results.result import Hypothesis
+from diagnosis.results.sentence import lasting
 from diagnosis.results.vocabulary import Tier
 from replay.arrays.runs import runs_of
 from replay.faults import FaultMode, Side, State
@@ -135,7 +137,9 @@ def _finding(one: Judged, start: int, stop: int, said: tuple[float, float], bloc
     own = one.wheel.own
     side = Side.SENSOR if own else Side.SENSOR_OR_ACTUATOR
     beside = f"what {one.wheel.compared} show of it" if one.speed is not None else "what its command makes of it"
-    texts = [f"{one.data.name} follows {beside} about {delay:.2g} s late for {(stop - start) * block_s:.1f} s."]
+    texts = [
+        f"{one.data.name} follows {beside} about {plain(delay, 2)} s late for {lasting((stop - start) * block_s, 1)}."
+    ]
     if not own:
         texts.append(
             "Readings that are held up and a drive that answers late cannot be distinguished; stamps by the encoder itself, or "
@@ -174,10 +178,10 @@ def smallest_delay(one: Judged, block_s: float) -> tuple[Power, str]:
     seen = sizes[np.isfinite(sizes)]
     told = f"A delay of {one.data.name} that lasts {_LENGTH_S:.0f} s "
     told += (
-        f"would show from {float(np.median(seen)):.2g} s on, at {100 * seen.size / sizes.size:.0f} % of the places where it may begin; elsewhere, "
+        f"would show from {plain(float(np.median(seen)), 2)} s on, at {100 * seen.size / sizes.size:.0f} % of the places where it may begin; elsewhere, "
         "and where it is less, it is not assessed."
         if seen.size
-        else f"is not assessed: up to {DELAYS_S[-1]:.2g} s none would show, as the speed hardly changes or nothing else shows it."
+        else f"is not assessed: up to {plain(DELAYS_S[-1], 2)} s none would show, as the speed hardly changes or nothing else shows it."
     )
     return Power(Deviation.DELAY, _LENGTH_S, size if np.isfinite(size) else None, "s", None, int(sizes.size)), told
 

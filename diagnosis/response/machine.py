@@ -16,6 +16,7 @@ from diagnosis.response.shaken import quiet_meanwhile
 from diagnosis.response.spells import Spell
 from diagnosis.response.wheel import Wheel
 from diagnosis.results.assessment import Finding, Lack, Reason
+from diagnosis.results.plain_numbers import plain
 from diagnosis.results.said import Said, Stated
 from replay.arrays.runs import runs_of
 from replay.faults import FaultMode, Side
@@ -145,7 +146,7 @@ def unexplained(drives: Sequence[FollowerData], limits: Limits, dt: float) -> tu
     if not shares or not (max(shares) <= _UNMADE or min(shares) >= 1.0 / _UNMADE):
         return ()
     return (
-        f"The drives were commanded to {np.median(asked):.2g} {{speed_unit}} and made {np.median(made):.2g} {{speed_unit}} of it (medians), and "
+        f"The drives were commanded to {plain(np.median(asked), 2)} {{speed_unit}} and made {plain(np.median(made), 2)} {{speed_unit}} of it (medians), and "
         "nothing relates the two: another source of commands, a wrong unit, a limit, or a machine that is held; no {wheel} is blamed for it.",
     )
 
@@ -181,7 +182,7 @@ def unlike(judged: Mapping[str, Judged]) -> dict[str, Reason]:
     for w, own in _made(judged).items():
         if w not in out and not _NEAR[0] <= own <= _NEAR[1]:
             out[w] = Reason(
-                f"over the whole mission it reads {own:.2g} × its command: a wrong unit of one of them, another wheel diameter, or a "
+                f"over the whole mission it reads {plain(own, 2)} × its command: a wrong unit of one of them, another wheel diameter, or a "
                 "wrongly mapped channel",
                 Lack.UNIT,
             )

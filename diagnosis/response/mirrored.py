@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from diagnosis.response.beside import same_side
 from diagnosis.response.identification import Response, as_another, beyond
 from diagnosis.response.inputs import FollowerData, cells
+from diagnosis.results.plain_numbers import plain
 from replay.machine.geometry import Geometry
 
 Array = NDArray[np.float64]
@@ -154,6 +155,6 @@ def _right(wheel: str, pair: tuple[str, str], made: Mapping[str, float], off: Ma
 
 def _words(wheel: str, other: str, made: Mapping[str, float]) -> str:
     return (
-        f"beside what it makes of a commanded speed, it makes {made[wheel]:.2g} of a commanded turn where {{wheel}} {other} makes "
-        f"{made[other]:.2g} (1 is what the machine file says): "
+        f"beside what it makes of a commanded speed, it makes {plain(made[wheel], 2)} of a commanded turn where {{wheel}} {other} makes "
+        f"{plain(made[other], 2)} (1 is what the machine file says): "
     )

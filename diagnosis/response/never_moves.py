@@ -75,7 +75,7 @@ def unmoved(
         return []
     spans = [x for x in spans_of(driven, round(_JOIN_S / dt)) if (x[1] - x[0]) * dt >= _SPELL_S]
     text = (
-        f"wheel.{wheel}.v reads 0 from start to end, for {np.count_nonzero(driven) * dt:.1f} s of it while wheel.{wheel}.u asks for as much as moves "
+        f"wheel.{wheel}.v reads 0 from start to end, for {np.count_nonzero(driven) * dt:.1f} s in all while wheel.{wheel}.u asks for as much as moves "
         "the other {wheels}: its sensor gives nothing, or its drive does not turn it, and its effort or another view of this {wheel} would tell which."
     )
     sat = Sat(0.0, 0.0, 0.0, 0.0, "m/s")

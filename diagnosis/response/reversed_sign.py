@@ -13,6 +13,7 @@ from diagnosis.response.spells import spans_of
 from diagnosis.response.wheel import sensor_finding
 from diagnosis.results.assessment import CODE, Assessment, Finding
 from diagnosis.results.result import Epsilon
+from diagnosis.results.sentence import lasting
 from replay.faults import FaultMode, State
 
 Array = NDArray[np.float64]
@@ -98,7 +99,7 @@ def _finding(one: Judged, start: int, stop: int) -> Finding:
     leapt = begin is not None or end is not None
     name = one.data.name
     texts = [
-        f"{name} is −1 × what its command makes it do for {(stop - start) * one.wheel.dt:.1f} s, at whatever speed."
+        f"{name} is −1 × what its command makes it do for {lasting((stop - start) * one.wheel.dt, 1)}, at whatever speed."
     ]
     texts.append(
         "It changed its sign from one reading to the next: no {wheel} does."

@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 from diagnosis.response.machine import Judged
 from diagnosis.response.spells import spans_of
 from diagnosis.results.assessment import Finding
+from diagnosis.results.plain_numbers import plain
 from diagnosis.results.result import Epsilon, Hypothesis
-from diagnosis.results.sentence import About, Sentence
+from diagnosis.results.sentence import About, Sentence, lasting
 from diagnosis.results.vocabulary import Tier
 from replay.faults import FaultMode, Side, State
 
@@ -94,8 +95,8 @@ def _finding(one: Judged, span: tuple[int, int], effort: Array, block_s: float) 
     rest = np.r_[effort[:start], effort[stop:]]
     times = float(np.nanmedian(np.abs(effort[start:stop])) / np.nanquantile(np.abs(rest), _USUAL))
     text = (
-        f"For {(stop - start) * block_s:.1f} s {one.data.name} is at {np.nanmedian(b.mean[start:stop]):.2g} {{speed_unit}} where its command makes it "
-        f"{np.nanmedian(middle):.2g} {{speed_unit}}, and its drive pulls that way, {times:.1f} times as hard as it usually does: it runs away. A loop that "
+        f"For {lasting((stop - start) * block_s, 1)} {one.data.name} is at {plain(np.nanmedian(b.mean[start:stop]), 2)} {{speed_unit}} where its command makes it "
+        f"{plain(np.nanmedian(middle), 2)} {{speed_unit}}, and its drive pulls that way, {times:.1f} times as hard as it usually does: it runs away. A loop that "
         "believes a wrong sensor would pull the other way, and a reading that is only wrong takes the usual effort."
     )
     p = _LONE_P if one.alone else _P

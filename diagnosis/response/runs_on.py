@@ -16,7 +16,9 @@ from diagnosis.response.body_limits import at_body_limit
 from diagnosis.response.machine import Judged
 from diagnosis.response.models import Blocks
 from diagnosis.results.assessment import Finding
+from diagnosis.results.plain_numbers import plain
 from diagnosis.results.result import Epsilon, Hypothesis
+from diagnosis.results.sentence import lasting
 from diagnosis.results.vocabulary import Tier
 from replay.faults import FaultMode, Side, State
 
@@ -164,7 +166,7 @@ def _shifted(one: Judged, span: tuple[int, int, float], block_s: float) -> Findi
     start, stop, speed = span
     width = int(one.wheel.blocks.start[1])
     text = (
-        f"{one.data.name} stays at {speed:.2g} {{speed_unit}} for {(stop - start) * block_s:.1f} s, part of it while all other {{wheels}} stand, and goes at other speeds as well: its "
+        f"{one.data.name} stays at {plain(speed, 2)} {{speed_unit}} for {lasting((stop - start) * block_s, 1)}, part of it while all other {{wheels}} stand, and goes at other speeds as well: its "
         "readings are shifted, or it turns freely."
     )
     side, mode = Side.SENSOR_OR_ACTUATOR, FaultMode.OUTSIDE_TABLE
@@ -212,8 +214,8 @@ def _finding(one: Judged, span: tuple[int, int, float], asked: Array, block_s: f
     told = asked[start:stop][np.isfinite(asked[start:stop])]
     width = int(one.wheel.blocks.start[1])
     text = (
-        f"{one.data.name} stays at {speed:.2g} {{speed_unit}} for {(stop - start) * block_s:.1f} s, shaking as a turning {{wheel}} does, while its command "
-        f"asks for {told.min():.2g} to {told.max():.2g} {{speed_unit}}."
+        f"{one.data.name} stays at {plain(speed, 2)} {{speed_unit}} for {lasting((stop - start) * block_s, 1)}, shaking as a turning {{wheel}} does, while its command "
+        f"asks for {plain(told.min(), 2)} to {plain(told.max(), 2)} {{speed_unit}}."
     )
     return Finding(
         start=start * width,

@@ -19,6 +19,7 @@ from diagnosis.response.stays import stays_though_told
 from diagnosis.response.wheel import Wheel
 from diagnosis.results.assessment import CODE, Assessment, Finding, Lack, Reason
 from diagnosis.results.evidence_columns import Pictured, steps_of
+from diagnosis.results.plain_numbers import plain
 from diagnosis.results.result import Hypothesis
 from diagnosis.results.vocabulary import Tier
 from replay.faults import FaultMode, Side, State
@@ -201,13 +202,13 @@ def _assessment(
     pictured = Pictured.of(steps_of(findings, size, dt), series)
     r = one.response
     unseen = not r.answered and one.speed is None
-    late = "at once" if r.delay < _AT_ONCE_S else f"after {r.delay:.2g} s"
+    late = "at once" if r.delay < _AT_ONCE_S else f"after {plain(r.delay, 2)} s"
     note = (
         f"{one.data.name} has no command{'' if not np.isfinite(one.data.commands).any() else ' that it was found to answer'}"
         if not r.answered
         else (
-            f"{one.data.name} answers its command {late} with a lag of {r.lag:.2g} s, up to {r.limit:.3g} {{speed_unit}} and "
-            f"{r.rate:.2g} m/s²; usual misfit {float(np.median(r.noise)):.2g} {{speed_unit}}"
+            f"{one.data.name} answers its command {late} with a lag of {plain(r.lag, 2)} s, up to {plain(r.limit)} {{speed_unit}} and "
+            f"{plain(r.rate, 2)} m/s²; usual misfit {plain(float(np.median(r.noise)), 2)} {{speed_unit}}"
         )
     )
     note += f"; compared with {one.wheel.compared}." if one.wheel.compared else "."

@@ -11,7 +11,9 @@ from diagnosis.response.machine import Judged
 from diagnosis.response.tracking import estimate_lag
 from diagnosis.response.wheel import sensor_finding
 from diagnosis.results.assessment import Finding
+from diagnosis.results.plain_numbers import plain
 from diagnosis.results.result import Epsilon
+from diagnosis.results.sentence import lasting
 from replay.arrays.runs import runs_of
 from replay.faults import FaultMode
 
@@ -80,7 +82,7 @@ def stays_though_told(one: Judged, driving_speed: float) -> list[Finding]:
         first, stop = int(goes[0]), int(goes[-1]) + 1
         stands = _by_the_body(one, slice(first, stop), usual)
         text = (
-            f"{one.data.name} reads no motion for {(stop - first) * dt:.1f} s while it is told to go at {usual:.2g} {{speed_unit}} (median) and another {{wheel}} "
+            f"{one.data.name} reads no motion for {lasting((stop - first) * dt, 1)} while it is told to go at {plain(usual, 2)} {{speed_unit}} (median) and another {{wheel}} "
             "goes on; at other times it follows its command."
         )
         seen = {

@@ -15,7 +15,9 @@ from numpy.typing import NDArray
 from diagnosis.channels.noise import moving_sum, rounding_step, shifted
 from diagnosis.results.assessment import CODE, Assessment, Finding, Lack, Reason
 from diagnosis.results.evidence_columns import Pictured, steps_of
+from diagnosis.results.plain_numbers import plain
 from diagnosis.results.result import Epsilon, Hypothesis, Sat
+from diagnosis.results.sentence import lasting
 from diagnosis.results.vocabulary import Tier
 from replay.faults import FaultMode, Side, State
 from replay.machine.config import Limits
@@ -124,7 +126,7 @@ def assess_tracking(
     }
     why = (
         Reason(
-            f"it follows its command at {small:.2g} of its size: a wrong unit, a scaled or wrongly mapped channel",
+            f"it follows its command at {plain(small, 2)} of its size: a wrong unit, a scaled or wrongly mapped channel",
             Lack.UNIT,
         )
         if small
@@ -135,7 +137,7 @@ def assess_tracking(
         )
     )
     series = (("residual", np.where(np.isfinite(v), v - reference, np.nan)), ("expected", reference))
-    note = f"{names[0]} against {names[1]}: lag {lag * dt:.3g} s."
+    note = f"{names[0]} against {names[1]}: lag {plain(lag * dt)} s."
     return _sides(states, findings, reasons, why, Pictured.of(steps_of(findings, v.size, dt), series), note)
 
 
@@ -265,7 +267,7 @@ def _standstill(v: Array, tracking: _Tracking, dt: float, names: tuple[str, str]
         epsilon=Epsilon(1.0, 0.0, 1.0),
         sat=Sat(level, abs(level), level, level, "m/s"),
         evidence=(
-            f"{names[0]} stopped and never moved again while {names[1]} went on for {remaining.sum() * dt:.2f} s: "
+            f"{names[0]} stopped and never moved again while {names[1]} went on for {lasting(remaining.sum() * dt, 2)}: "
             f"{100 * share:.0f} % of all commanded travel was still to come.",
             f"The response lags its command by {lag * dt:.2f} s (estimated and taken out).",
             "Without a second measurement, a drive at standstill and a dead sensor cannot be distinguished.",

@@ -12,6 +12,7 @@ from diagnosis.response.by_acceleration import filled
 from diagnosis.response.inputs import FollowerData, cell_of, cells
 from diagnosis.response.vibration import Unit
 from diagnosis.results.assessment import Assessment, Finding
+from diagnosis.results.plain_numbers import plain
 
 Sides = tuple[Assessment, Assessment]
 
@@ -52,6 +53,6 @@ def unit_note(data: FollowerData, unit: Unit, findings: Sequence[Finding], dt: f
     if not np.isfinite(related.least):
         return f"imu.acceleration follows the changes of {data.name} too loosely to judge it."
     return (
-        f"imu.acceleration has {related.gain:.2f} × the changes of {data.name}; one of {related.least:.2g} {{speed_unit}} or more from one reading to "
+        f"imu.acceleration has {related.gain:.2f} × the changes of {data.name}; one of {plain(related.least, 2)} {{speed_unit}} or more from one reading to "
         "the next, there and back, would show where the body does not do it. Smaller ones, what comes slowly, and what is wrong all through do not show in it."
     )

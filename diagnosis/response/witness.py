@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from diagnosis.response.body import BodySpeed
 from diagnosis.response.inputs import FollowerData, cells
 from diagnosis.response.pulses import in_pulses
+from diagnosis.results.plain_numbers import plain
 from diagnosis.results.said import Said, Stated
 from replay.machine.config import Limits
 
@@ -107,8 +108,8 @@ def contradicted(speeds: Sequence[BodySpeed], drives: Sequence[FollowerData], wi
         if went > _ASKED * limits.driving_speed and (max(read) < _OTHERWISE * went or min(read) > went / _OTHERWISE):
             names = " and ".join(d.name for d in drives)
             return (
-                f"By the {body.name} the machine went at {went:.2g} {{speed_unit}} while it was commanded, and {names} read "
-                f"{np.median(read):.2g} {{speed_unit}} (medians): readings that come in pulses, a wrong unit, a channel of something else, or "
+                f"By the {body.name} the machine went at {plain(went, 2)} {{speed_unit}} while it was commanded, and {names} read "
+                f"{plain(np.median(read), 2)} {{speed_unit}} (medians): readings that come in pulses, a wrong unit, a channel of something else, or "
                 "readings that are wrong; how the machine followed its commands they do not tell."
             )
     return ""

@@ -6,13 +6,13 @@ import re
 from math import isfinite
 
 _HYPHEN = re.compile(
-    r"(?<![\w.,:;\[/\]})'\"-])-(?=\d)"
-)  # before a number, and neither within a name or a date nor of a range
+    r"(?<![\w.,:;\[/\]})'\"-])-(?=\d+(?:[.,]\d+)*(?![\w/]|[.,-]\w))"
+)  # before a number, and neither in or before a name or a date nor of a range
 
 
 def plain(value: float, digits: int = 3) -> str:
     """A value in significant digits without an exponent: ``127``, ``0.0031``, ``−2``; below a millionth 0."""
-    text = f"{value:.{digits}g}"
+    text = f"{value + 0.0:.{digits}g}"  # nothing has no sign
     if "e" not in text or not isfinite(value):
         return text.replace("-", "−")
     whole = f"{float(text):.6f}".rstrip("0").rstrip(".")

@@ -67,6 +67,14 @@ class Sentence(str):
         return Sentence(self.about, self.parts[0], part, self.parts[2])
 
 
+def lasting(seconds: float, digits: int) -> str:
+    """How long a channel did something, in a sentence on it: braces tell where the end says how that goes with how long its fault lasts.
+
+    See `diagnosis.decision.lengths`. Written with so many `digits` behind the point.
+    """
+    return f"{{{seconds:.{digits}f} s}}"
+
+
 def is_about(text: str, *about: About) -> bool:
     """Whether a sentence says that it gives one of some things."""
     return isinstance(text, Sentence) and text.about in about

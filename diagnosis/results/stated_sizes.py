@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnosis.results.document import ReportDocument
+from diagnosis.results.document import IntervalRow, ReportDocument
 from replay.faults import DECIDED, Side, State
 from replay.machine.quantities import OPENING
 
@@ -84,16 +84,49 @@ def mode_columns(
         columns = {mode: np.full(t.size, np.nan, np.float32) for mode in DECIDED}
         mine = [f for f in report["intervals"] if f["component"] == component and side in Side(f["side"]).sides]
         for fault in sorted((f for f in mine if f["hypotheses"]), key=lambda f: f["probability"]):
-            chances = dict.fromkeys(DECIDED, 0.0)
-            for h in fault["hypotheses"]:
-                if h["mode"] != State.HEALTHY and side in Side(h["side"]).sides:
-                    chances[State(h["mode"])] += h["p"]
-            chances[State.HEALTHY] = max(0.0, 1.0 - sum(chances.values()))
             rows = _rows(t, step, fault["start_s"], fault["stop_s"])
-            for mode, p in chances.items():
+            for mode, p in _chances(fault, side).items():
                 columns[mode][rows] = p
         base = f"evidence.{component}.{side}.p_"
         out |= {base + mode: x for mode, x in columns.items() if np.any(x > 0.0)}
+    return out
+
+
+def _chances(fault: IntervalRow, side: str) -> dict[State, float]:
+    """Probability that a fault's hypotheses give each row on one side, and health what they leave."""
+    chances = dict.fromkeys(DECIDED, 0.0)
+    for h in fault["hypotheses"]:
+        if h["mode"] != State.HEALTHY and side in Side(h["side"]).sides:
+            chances[State(h["mode"])] += h["p"]
+    chances[State.HEALTHY] = max(0.0, 1.0 - sum(chances.values()))
+    return chances
+
+
+def known_modes(
+    report: ReportDocument, t: NDArray[np.floating], step: float, columns: Mapping[str, NDArray[Any]]
+) -> dict[str, NDArray[Any]]:
+    """The columns ``evidence.<component>.<side>.p_<mode>`` that change where a fault rests on other evidence than theirs, which call it improbable.
+
+    During such a fault they are what its hypotheses say, as those of `mode_columns`.
+
+    Columns and `t` [s] of shape (n,).
+    """
+    out: dict[str, NDArray[Any]] = {}
+    for component, side in {(s["component"], s["side"]): None for s in report["states"]}:
+        base = f"evidence.{component}.{side}.p_"
+        healthy = columns.get(base + State.HEALTHY)
+        mine = [f for f in report["intervals"] if f["component"] == component and side in Side(f["side"]).sides]
+        for fault in sorted((f for f in mine if f["hypotheses"]), key=lambda f: f["probability"]):
+            rows, chances = _rows(t, step, fault["start_s"], fault["stop_s"]), _chances(fault, side)
+            if healthy is None or not healthy[rows].size:
+                continue
+            if _least_half(1.0 - np.nan_to_num(healthy[rows], nan=1.0)) >= min(_EVEN, 1.0 - chances[State.HEALTHY]):
+                continue
+            for mode, p in chances.items():
+                name = base + mode
+                if p > 0.0 or name in columns:
+                    kept = columns.get(name, np.full(t.size, np.nan, healthy.dtype))
+                    out.setdefault(name, kept.copy())[rows] = p
     return out
 
 
@@ -117,17 +150,21 @@ def known_probability(
         for s in report["states"]:
             if (s["component"], s["side"]) == (component, side) and s["state"] in DECIDED:
                 known[_rows(t, step, s["start_s"], s["stop_s"])] = True
-        decided = known.copy()
-        for fault in report["intervals"]:
-            if fault["component"] == component and side in Side(fault["side"]).sides:
-                rows = _rows(t, step, fault["start_s"], fault["stop_s"])
-                told = decided[rows] if decided[rows].any() else np.ones_like(decided[rows])  # by no state of this side
-                known[rows] |= told
-                faulty = 1.0 - sum(h["p"] for h in fault["hypotheses"] if h["mode"] == State.HEALTHY)
-                if fault["side"] == Side.SENSOR_OR_ACTUATOR:
-                    values[rows] = np.fmax(values[rows], 0.5 * faulty)
-                elif _least_half(np.nan_to_num(values[rows][told])) < min(_EVEN, faulty):
-                    values[rows] = np.fmax(values[rows], faulty)
+        decided, drawn = known.copy(), columns[name]
+        mine = [f for f in report["intervals"] if f["component"] == component and side in Side(f["side"]).sides]
+        spans = [_rows(t, step, f["start_s"], f["stop_s"]) for f in mine]
+        claims = np.zeros(t.size, np.uint16)
+        for rows in spans:
+            claims[rows] += 1
+        for fault, rows in zip(mine, spans, strict=True):
+            told = decided[rows] if decided[rows].any() else np.ones_like(decided[rows])  # by no state of this side
+            known[rows] |= told
+            faulty = 1.0 - sum(h["p"] for h in fault["hypotheses"] if h["mode"] == State.HEALTHY)
+            own = told & (claims[rows] == 1)  # what another fault shows meanwhile is no picture of this one
+            if fault["side"] == Side.SENSOR_OR_ACTUATOR:
+                values[rows] = np.fmax(values[rows], 0.5 * faulty)
+            elif min(_least_half(np.nan_to_num(drawn[rows][x])) for x in (told, own) if x.any()) < min(_EVEN, faulty):
+                values[rows] = np.fmax(values[rows], faulty)
         out[name] = np.where(known, values, values.dtype.type(np.nan))
     return out
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from diagnosis.evidence import Part
 from diagnosis.results.assessment import CODE, Assessment, Lack, unassessed
+from diagnosis.results.plain_numbers import plain
 from diagnosis.results.sizes import amount
 from diagnosis.results.vocabulary import Tier
 from diagnosis.steering.acquittal import acquitted, moves_otherwise, scatter_of
@@ -262,7 +263,7 @@ def _note(axle: AxleFilter) -> str:
     instead = _INSTEAD if axle.names[1].startswith(REPLAYED) else ""
     return (
         f"{axle.names[0]} by the steering model with {axle.names[1]}{instead}: {amount(plant.gain, 'rad')}/s at 100{{percent}}, at most "
-        f"{amount(plant.rate, 'rad')}/s, lag {plant.lag:.2g} s, noise {amount(noise.std, 'rad', 2)}, rounding step "
+        f"{amount(plant.rate, 'rad')}/s, lag {plain(plant.lag, 2)} s, noise {amount(noise.std, 'rad', 2)}, rounding step "
         f"{amount(noise.lsb, 'rad', 2)}, error of the rate {amount(axle.model.rate_error, 'rad', 2)}/s."
     )
 

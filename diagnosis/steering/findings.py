@@ -12,7 +12,7 @@ from diagnosis.results.assessment import Finding
 from diagnosis.results.fault_rows import mode_words
 from diagnosis.results.machine_words import part_token
 from diagnosis.results.result import Epsilon, Hypothesis
-from diagnosis.results.sentence import About, Sentence
+from diagnosis.results.sentence import About, Sentence, lasting
 from diagnosis.results.sizes import amount, probable_words
 from diagnosis.results.vocabulary import Kind, Tier
 from diagnosis.steering.dead_readings import LEAST_ASKED_S, at_rest, lapse
@@ -250,7 +250,7 @@ def _sentences(choice: _Choice, gain: float, ranked: Sequence[tuple[Fault, float
     """What decided, one sentence each."""
     channel = run.axle.names[0]
     more = probable_words(gain, f"with “{_words((choice.side, choice.mode))}”", "with a healthy axle")
-    words = f"Over {run.seconds:.2f} s {channel} is {more}."
+    words = f"Over {lasting(run.seconds, 2)} {channel} is {more}."
     lines: list[str] = [Sentence(About.TIMES, words)]
     if choice.dead_sensor:
         level, spread, count = level_of(run.start, run.stop, run.axle)

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from diagnosis.results.assessment import CODE, Assessment, Finding, Lack, Reason
 from diagnosis.results.result import Epsilon, Hypothesis, Sat
+from diagnosis.results.sentence import lasting
 from diagnosis.results.sizes import amount
 from diagnosis.results.vocabulary import Tier
 from replay.faults import FaultMode, Side, State
@@ -191,7 +192,7 @@ def _finding(
     low, high = float(np.nanmin(one.low[first:last])), float(np.nanmax(one.high[first:last]))
     side = Side.ACTUATOR if lives else Side.SENSOR_OR_ACTUATOR
     text = (
-        f"{names[0]} stays at {amount(level, 'rad')} for {(stop - start) * timeline.dt:.1f} s while {names[1]} goes from {amount(low, 'rad')} to "
+        f"{names[0]} stays at {amount(level, 'rad')} for {lasting((stop - start) * timeline.dt, 1)} while {names[1]} goes from {amount(low, 'rad')} to "
         f"{amount(high, 'rad')}; for {seconds:.1f} s of driving it was elsewhere for longer than {_ANSWER_S:g} s.",
         "Its readings go on trembling: the sensor lives, and the {valve}, or the linkage, does not turn the axle; or its command was not in charge."
         if lives

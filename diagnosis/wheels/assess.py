@@ -13,6 +13,7 @@ from diagnosis.results.assessment import Assessment
 from diagnosis.results.evidence_columns import Pictured, steps_of
 from diagnosis.results.loss import Loss
 from diagnosis.results.machine_event import MachineEvent, foreign, swinging
+from diagnosis.results.plain_numbers import plain
 from diagnosis.results.said import Said
 from diagnosis.results.vocabulary import Tier
 from diagnosis.wheels.blocks import WheelBlocks, blocks_of, per_sample
@@ -210,11 +211,11 @@ def _note(path: WheelPath) -> str:
     model, (speed, opening) = path.model, path.names
     air = model.grip_most <= 0
     return (
-        f"{speed} by the {{wheel}} model with {opening}: noise {model.noise:.2g} {{speed_unit}}, load and model error "
-        f"{model.load:.2g} {{speed_unit}}, K {model.K:.3g} {{speed_unit}} at 100{{percent}}, τ {model.tau:.2g} s, "
+        f"{speed} by the {{wheel}} model with {opening}: noise {plain(model.noise, 2)} {{speed_unit}}, load and model error "
+        f"{plain(model.load, 2)} {{speed_unit}}, K {plain(model.K)} {{speed_unit}} at 100{{percent}}, τ {plain(model.tau, 2)} s, "
         + (
             "no coupling by the ground."
             if air
-            else f"tyres that hold up to {model.grip_most:.2g} {{speed_unit}} of load."
+            else f"tyres that hold up to {plain(model.grip_most, 2)} {{speed_unit}} of load."
         )
     )

@@ -9,7 +9,9 @@ import numpy as np
 
 from diagnosis.channels.one_value import TURNS, Frozen, frozen_of, trembling
 from diagnosis.results.assessment import Finding
+from diagnosis.results.plain_numbers import plain
 from diagnosis.results.result import Epsilon, Hypothesis, Sat
+from diagnosis.results.sentence import lasting
 from diagnosis.results.vocabulary import Tier
 from diagnosis.wheels.findings import WheelFindings
 from diagnosis.wheels.inputs import WheelsData
@@ -143,7 +145,7 @@ def _told(data: WheelsData, i: int, r: Frozen) -> Finding:
         epsilon=Epsilon(1.0, 1.0, 1.0),
         sat=Sat(r.value, abs(r.value), r.value, r.value, "m/s"),
         evidence=(
-            f"{name} stays at {r.value:.3g} m/s to the last digit for {length:.2f} s; the longest that it "
+            f"{name} stays at {plain(r.value)} m/s to the last digit for {lasting(length, 2)}; the longest that it "
             f"stays at another value is {r.usual_s:.2f} s.",
         ),
         tier=Tier.MODEL,

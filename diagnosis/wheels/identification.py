@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.estimation.lag import low_passed
+from diagnosis.results.plain_numbers import plain
 from diagnosis.results.wheel_model import WheelModelFit
 from diagnosis.wheels.plant_identification import identify_plants
 from diagnosis.wheels.plant_windows import Drive
@@ -45,12 +46,12 @@ def identified(drive: Drive, machine: Machine, given: dict[int, WheelPlant]) -> 
         return None
     plants = tuple(given.get(i, p) for i, p in enumerate(found.plants))
     reliable = found.misfit <= _MOST_MISFIT
-    shown = ", ".join("–" if p is None else f"{p.K:.3g}" for p in plants)
+    shown = ", ".join("–" if p is None else f"{plain(p.K)}" for p in plants)
     first = next(p for p in found.plants if p is not None)
     note = (
         f"Model of the {{wheels}} identified in {found.windows} windows of 1 s: K = {shown} {{speed_unit}} at 100{{percent}} where the machine "
-        f"works, τ = {first.tau:.2g} s, hysteresis {100 * first.hysteresis:.2g} %, "
-        + ("{wheels} free of the ground" if not first.grip else f"grip {first.grip:.2g}")
+        f"works, τ = {plain(first.tau, 2)} s, hysteresis {plain(100 * first.hysteresis, 2)} %, "
+        + ("{wheels} free of the ground" if not first.grip else f"grip {plain(first.grip, 2)}")
         + f"; the better windows leave {100 * found.misfit:.1f} % of the speed unexplained, the median one "
         f"{100 * found.typical:.1f} %"
         + ("." if reliable else f": too uncertain to judge gains by (limit {100 * _MOST_MISFIT:.0f} %).")
@@ -156,7 +157,7 @@ def _identify(y: Array, u: Array, moving: NDArray[np.bool_], dt: float, given: d
         if K > 0:
             plants[i] = WheelPlant(K=K, tau=tau, K_std=spread * abs(K) / np.sqrt(max(1, g.size)))
     reliable = len(given) == len(wheels) or (pooled.size >= 5 and spread <= _MAX_SPREAD and centre > 0)
-    shown = ", ".join("–" if p is None else f"{p.K:.3g}" for p in plants)
+    shown = ", ".join("–" if p is None else f"{plain(p.K)}" for p in plants)
     note = (
         f"Model of the {{wheels}} identified in {pooled.size} windows of {_WINDOW_S:g} s: K = {shown} {{speed_unit}} at 100{{percent}}, "
         f"τ = {tau:g} s, spread of the windows {100 * spread:.0f} %"

@@ -12,7 +12,7 @@ from diagnosis.results.assessment import Finding
 from diagnosis.results.fault_rows import mode_words
 from diagnosis.results.machine_words import part_token
 from diagnosis.results.result import Hypothesis
-from diagnosis.results.sentence import About, Sentence
+from diagnosis.results.sentence import About, Sentence, lasting
 from diagnosis.results.sizes import kept_to, probable_words
 from diagnosis.results.vocabulary import Kind, Tier
 from diagnosis.wheels.estimates import estimate
@@ -247,7 +247,7 @@ def _sentences(
     share = dict(ranked)[row]
     by_itself = m in TOTAL_SENSOR  # its channel alone shows it, whatever the opening
     fits = f"{names[0]} fits" if by_itself else f"{names[0]} and {names[1]} fit"
-    words = f"Over {seconds:.3f} s {fits} “{_words((side, row[1]))}”: on simulated machines with such signals it was this in "
+    words = f"Over {lasting(seconds, 3)} {fits} “{_words((side, row[1]))}”: on simulated machines with such signals it was this in "
     lines: list[str] = [Sentence(About.CASES, words, f"{100 * share:.0f}", " of 100 cases.")]
     ahead = run.ahead(m)
     if ahead > 0:

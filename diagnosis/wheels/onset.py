@@ -7,6 +7,7 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import NDArray
 
+from diagnosis.results.plain_numbers import plain
 from diagnosis.results.sentence import About, Sentence, is_about
 from diagnosis.wheels.models import S_OU_LARGE, S_STUCK, TOTAL_SENSOR, WheelFilterModel
 from replay.faults import Side
@@ -45,13 +46,13 @@ def _onset_words(start: int, y: Array, model: WheelFilterModel, dt: float, name:
     fastest = float(np.nan_to_num(np.abs(y[low - 1 : high])).max())
     within = dt * _waited(y, low + int(np.argmax(steps)))
     able = (model.K + fastest) * min(1.0, within / model.tau)  # by a wheel whose valve opens wholly the other way
-    jump = f"At its onset {name} jumps by {largest:.2g} {{speed_unit}} within one sample ({largest / model.noise:.0f} times its noise)"
+    jump = f"At its onset {name} jumps by {plain(largest, 2)} {{speed_unit}} within one sample ({largest / model.noise:.0f} times its noise)"
     beyond = largest > max(8 * model.noise, _BEYOND * able)
     if side is Side.ACTUATOR:
         if beyond:
             return f"{jump}: a fault of the {{valve}} alone does not explain this."
         return (
-            f"At its onset {name} changes with the lag of the {{wheel}}, and no step exceeds {largest:.2g} {{speed_unit}}: this is how a {{wheel}} "
+            f"At its onset {name} changes with the lag of the {{wheel}}, and no step exceeds {plain(largest, 2)} {{speed_unit}}: this is how a {{wheel}} "
             "reacts when its {valve} fails."
         )
     if beyond:
@@ -59,7 +60,7 @@ def _onset_words(start: int, y: Array, model: WheelFilterModel, dt: float, name:
     return (
         f"{jump}."
         if largest > 8 * model.noise
-        else f"At its onset no step of {name} exceeds {largest:.2g} {{speed_unit}}."
+        else f"At its onset no step of {name} exceeds {plain(largest, 2)} {{speed_unit}}."
     )
 
 

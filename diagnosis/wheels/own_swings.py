@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.results.assessment import Finding
+from diagnosis.results.plain_numbers import plain
 from diagnosis.results.result import Hypothesis
 from diagnosis.results.sentence import About, is_about
 from diagnosis.wheels.blocks import per_sample
@@ -94,7 +95,7 @@ def _opened(finding: Finding, path: WheelPath, expected: Array) -> Finding:
         return finding
     return opened(
         finding,
-        f"It swings at {hz:.2g} Hz: the {{wheel}} may really do so, as where a loop, a tyre or a valve hunts, or its sensor may read so.",
+        f"It swings at {plain(hz, 2)} Hz: the {{wheel}} may really do so, as where a loop, a tyre or a valve hunts, or its sensor may read so.",
     )
 
 

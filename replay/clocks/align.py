@@ -24,6 +24,7 @@ from replay.clocks.windows import Line
 from replay.log.raw_log import Channel, RawLog
 from replay.log.source_options import SourceOptions
 from replay.machine.config import Machine
+from replay.number_words import told
 from replay.signals.mapping import map_signals
 from replay.signals.signal import Signal
 
@@ -107,7 +108,7 @@ def _too_far(offset: float, origins: tuple[int, int]) -> str:
     if abs(offset) < _ONE_DAY_S or min(origins) < _SET_NS:
         return ""
     return (
-        f"they agree under a shift of {offset:+.3f} s ({offset / 86400:+.1f} days), which may also be another drive of the "
+        f"they agree under a shift of {told(offset, '+.3f')} s ({told(offset / 86400, '+.1f')} days), which may also be another drive of the "
         "same kind"
     )
 
@@ -136,7 +137,7 @@ def _steps(shared: Sequence[Shared], line: Line) -> str:
         if not place.reason and abs(step) > _STEP_S:
             found.append((first, step))
             if place.correlation > _SURE or any(abs(step - other) < _STEP_S for _, other in found[:-1]):
-                return f"its clock jumps: {first - start:.0f} s after its start, the signals need a further shift of {step:+.2f} s"
+                return f"its clock jumps: {first - start:.0f} s after its start, the signals need a further shift of {told(step, '+.2f')} s"
     return ""
 
 

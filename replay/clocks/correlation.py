@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from replay.clocks.shared_series import Series, Shared
+from replay.number_words import told
 
 Array = NDArray[np.float64]
 
@@ -186,6 +187,6 @@ def _correlate(whole: Sequence[Array], part: Sequence[Array], width: float) -> t
         return (
             np.nan,
             0.0,
-            f"they are periodic: a shift by another {(place - peak) * width:+.1f} s fits nearly as well",
+            f"they are periodic: a shift by another {told((place - peak) * width, '+.1f')} s fits nearly as well",
         )
     return (peak - m) * width, float(r[peak]), ""

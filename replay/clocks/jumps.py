@@ -17,6 +17,7 @@ from replay.arrays.blocks import blocks
 from replay.clocks.correlation import match
 from replay.clocks.shared_series import Series, Shared
 from replay.clocks.windows import Line
+from replay.number_words import told
 from replay.signals.signal import Signal
 
 Array = NDArray[np.float64]
@@ -131,7 +132,7 @@ def jumps(shared: Sequence[Shared], line: Line, found: Sequence[Pause]) -> tuple
                 break
         if evidence > _SURE:
             where = f"{pause.at_s - start:.0f} s after its start"
-            return f"its clock jumps by {-pause.step_s:+.3f} s against the other, {where}", 0.0
+            return f"its clock jumps by {told(-pause.step_s, '+.3f')} s against the other, {where}", 0.0
         if evidence > -_SURE:
             unknown.append(pause)
             continue
@@ -221,7 +222,7 @@ def _elsewhere(shared: Sequence[Shared], line: Line) -> str:
         place = match(parts, lag)
         step = place.lag_s - lag
         if not place.reason and abs(step) > _STEP_S and place.correlation > _CORRELATION:
-            return f"its clock jumps: {first - start:.0f} s after its start, the signals need a further shift of {step:+.2f} s"
+            return f"its clock jumps: {first - start:.0f} s after its start, the signals need a further shift of {told(step, '+.2f')} s"
     return ""
 
 

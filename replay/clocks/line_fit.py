@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from replay.clocks.duplicates import NEWEST, PAIRED, copied
 from replay.clocks.shared_series import Shared
 from replay.clocks.windows import TOLERANCES_S, Line, Readings, prepared, read_windows
+from replay.number_words import told
 
 Array = NDArray[np.float64]
 
@@ -112,7 +113,7 @@ def _robust_line(
     if agreeing < _LEAST_AGREEING:
         return _refused(start, f"only {agreeing:.0%} of the moments agree on one offset and drift")
     if abs(line[1]) > _MOST_DRIFT:
-        return _refused(start, f"the drift would be {line[1] * 1e6:.0f} ppm".replace("-", "−"))
+        return _refused(start, f"the drift would be {told(line[1] * 1e6, '.0f')} ppm")
     residual = lag - line[0] - line[1] * u
     uneven, more = _uneven(u, residual, weight0, weight, scale)
     if uneven:
@@ -143,7 +144,7 @@ def _uneven(u: Array, residual: Array, weight0: Array, weight: Array, scale: flo
         if not (weight[mine] > 0.1 * weight0[mine]).any():
             if abs(off) > max(3.0 * error, _STEP_S):
                 return (
-                    f"the clocks do not run evenly against each other: {last - first:.0f} s deviate by {off * 1e3:+.0f} ms"
+                    f"the clocks do not run evenly against each other: {last - first:.0f} s deviate by {told(off * 1e3, '+.0f')} ms"
                 ), 0.0
         elif weight[mine].any():
             offs.append(float(np.average(residual[mine], weights=weight[mine])))

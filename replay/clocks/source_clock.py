@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from pathlib import PurePath
 from typing import Literal
 
+from replay.number_words import told
+
 Method = Literal["reference", "estimated", "common", "as recorded", "given"]
 
 
@@ -52,7 +54,7 @@ class SourceClock:
     def sentence(self) -> str:
         """What was found and done, for the report; empty for the reference."""
         name, base = PurePath(self.source).name, PurePath(self.reference).name
-        change = f"{_seconds(self.offset_s)} at its start and {self.drift_ppm:+.1f} ppm".replace("-", "−")
+        change = f"{_seconds(self.offset_s)} at its start and {told(self.drift_ppm, '+.1f')} ppm"
         if self.method == "estimated":
             return (
                 f"{name}: its stamps were moved onto the clock of {base} by {change} (95 % within ±{_size(self.uncertainty_s)} "
@@ -77,8 +79,8 @@ class SourceClock:
 def _seconds(value: float) -> str:
     size = abs(value)
     if size < 0.9995:
-        return f"{value * 1e3:+.2f} ms"
-    return f"{value:+.4f} s" if size < 1000 else f"{value:+.3f} s ({value / 3600:+.3f} h)"
+        return f"{told(value * 1e3, '+.2f')} ms"
+    return f"{told(value, '+.4f')} s" if size < 1000 else f"{told(value, '+.3f')} s ({told(value / 3600, '+.3f')} h)"
 
 
 def _size(value: float | None) -> str:

@@ -12,6 +12,7 @@ from replay.control.law_fit import MIN_EXPLAINED, LawFit, fit_law
 from replay.control.local_fit import PiFit, fit_pi
 from replay.control.loop_kernel import LoopLaw
 from replay.machine.config import Machine
+from replay.number_words import told
 
 Array = NDArray[np.float64]
 
@@ -110,4 +111,4 @@ def _other_law(pi: PiFit) -> Reading:
 
 
 def _number(value: float) -> str:
-    return f"{value:.4g}".replace("-", "−")
+    return told(value, ".4g")

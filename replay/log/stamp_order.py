@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from replay.arrays.blocks import blocks
 from replay.log.raw_log import Channel, RawLog
+from replay.number_words import told
 
 Stamps = NDArray[np.int64]
 
@@ -231,7 +232,7 @@ def _part(course: _Course, label: str, limit: int, span: tuple[int, int] | None)
 
 
 def _seconds(ns: float) -> str:
-    return f"{ns / 86_400e9:+.1f} days" if abs(ns) > 2 * 86_400e9 else f"{ns / 1e9:+.3f} s"
+    return f"{told(ns / 86_400e9, '+.1f')} days" if abs(ns) > 2 * 86_400e9 else f"{told(ns / 1e9, '+.3f')} s"
 
 
 def spread_ticks(stamps: Stamps, values: Sequence[object] | NDArray[np.generic]) -> tuple[Stamps, int] | None:

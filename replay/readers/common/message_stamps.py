@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from replay.log.raw_log import Channel, Clock
 from replay.log.reading_notes import Report
+from replay.number_words import told
 from replay.readers.common.clock_lead import Lead
 from replay.readers.common.clock_steps import (
     Step,
@@ -135,8 +136,8 @@ class Clocks:
                 self.leads[label] = lead
         if lead is not None and lead.drifts:
             self.report.note(
-                f"{label}: its header clock runs {_minus(f'{lead.rate * 1e6:+.0f}')} ppm against the log's ("
-                f"{_minus(f'{(lead.ahead[1] - lead.ahead[0]) / 1e6:+.0f}')} ms over the log)"
+                f"{label}: its header clock runs {told(lead.rate * 1e6, '+.0f')} ppm against the log's ("
+                f"{told((lead.ahead[1] - lead.ahead[0]) / 1e6, '+.0f')} ms over the log)"
                 + ("; header stamps are kept" if self.clock == "header" else "")
             )
 
@@ -240,12 +241,8 @@ def _times(count: int) -> str:
 def _signed(ns: int) -> str:
     seconds = ns / 1e9
     if abs(seconds) >= 2 * 86400:
-        return _minus(f"{seconds / 86400:+.1f} days")
-    return _minus(f"{seconds:+.3f} s")
-
-
-def _minus(text: str) -> str:
-    return text.replace("-", "−")
+        return f"{told(seconds / 86400, '+.1f')} days"
+    return f"{told(seconds, '+.3f')} s"
 
 
 def _list_of(jumps: list[int]) -> str:

@@ -32,7 +32,7 @@ def test_a_sensor_that_ends_has_no_signal() -> None:
     a = told(3000, SIZE)
     (found,) = a.findings
     assert (found.start, found.stop, found.mode, found.side) == (3000, 5000, FaultMode.NO_SIGNAL, Side.SENSOR)
-    assert "delivered nothing for 20.0 s" in found.evidence[0]
+    assert "delivered nothing for {20.0 s}" in found.evidence[0]
     assert (a.states[3000:] == CODE[State.NO_SIGNAL]).all()
 
 

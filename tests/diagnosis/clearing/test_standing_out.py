@@ -9,12 +9,12 @@ from typing import cast
 import numpy as np
 import pytest
 
+from diagnosis.clearing.added_findings import with_findings
 from diagnosis.clearing.cells import Cells
 from diagnosis.clearing.checks import checks_of
 from diagnosis.clearing.standing_out import (
     _less_sure_together,
     what_stands_out,
-    with_findings,
     without_explained,
     without_followers,
 )
@@ -27,7 +27,7 @@ from diagnosis.results.vocabulary import Kind, Tier
 from replay.faults import FaultMode, FaultSpec, Side, State
 from tests.diagnosis.clearing.missions import LENGTH, in_cells, simulated
 
-WHOLE = (0.0, LENGTH)
+WHOLE, DT = (0.0, LENGTH), 0.01
 
 
 def _found(*faults: FaultSpec, seed: int = 5) -> dict[str, Finding]:
@@ -103,7 +103,7 @@ def test_an_axle_that_stands_still_is_named_and_explains_its_wheels() -> None:
     rest = np.full(
         fault.stop + 100, CODE[State.NOT_EXCITED], dtype=np.int8
     )  # which a command that moves nothing is not
-    after = with_findings({("front", "actuator"): Assessment(rest)}, found)["front", "actuator"]
+    after = with_findings({("front", "actuator"): Assessment(rest)}, found, DT)["front", "actuator"]
     assert set(after.states[fault.start : fault.stop]) == {CODE[State.NO_SIGNAL]}
     assert after.states[fault.stop] == CODE[State.NOT_EXCITED]
 
@@ -138,13 +138,30 @@ def test_states_of_both_sides_say_the_fault_but_where_nothing_was_known() -> Non
     states[: fault.start + 5] = CODE[State.NO_DATA]
     states[fault.start + 50 : fault.start + 90] = CODE[State.SLIP]  # or its sensor is faulty: it is
     before = {(c, s): Assessment(states) for c in ("RR", "FR") for s in ("sensor", "actuator")}
-    after = with_findings(before, {"RR": fault})
+    after = with_findings(before, {"RR": fault}, DT)
     assert after["FR", "sensor"] is before["FR", "sensor"]
     for side in ("sensor", "actuator"):
         a = after["RR", side]
         assert a.findings == (fault,)
         assert (a.states[: fault.start + 5] == CODE[State.NO_DATA]).all()
         assert (a.states[fault.start + 5 : fault.stop] == CODE[State.NO_SIGNAL]).all()
+
+
+@pytest.mark.parametrize(
+    ("mode", "p", "expected"), [(FaultMode.NOISY, 0.5, 1), (FaultMode.NOISY, 0.97, 2), (FaultMode.INEFFICIENT, 0.5, 2)]
+)
+def test_a_less_probable_finding_of_the_same_row_is_not_stated_beside_it(
+    mode: FaultMode, p: float, expected: int
+) -> None:
+    states = np.full(3000, CODE[State.HEALTHY])
+    states[1900:2700] = CODE[State(mode.value)]
+    model = Finding(1900, 2700, Side.SENSOR, mode, p, (), None, None, (), Tier.MODEL)
+    spikes = Finding(1700, 2650, Side.SENSOR, FaultMode.NOISY, 0.95, (), None, None, (), Tier.MODEL)
+    after = with_findings({("RL", "sensor"): Assessment(states, findings=(model,))}, {"RL": spikes}, DT)["RL", "sensor"]
+    assert len(after.findings) == expected
+    if expected == 1:
+        assert (after.states[1700:2650] == CODE[State.NOISY]).all()
+        assert (after.states[2650:2700] == CODE[State.NOT_ASSESSED]).all()
 
 
 def test_an_angle_that_is_off_its_second_measurement_all_the_time_is_its_sensors_fault() -> None:
@@ -166,7 +183,7 @@ def test_an_angle_that_is_off_its_second_measurement_all_the_time_is_its_sensors
         tier=Tier.MODEL,
     )
     before = {("rear", "sensor"): Assessment(states), ("rear", "actuator"): Assessment(states, findings=(loss,))}
-    after = with_findings(before, found)
+    after = with_findings(before, found, DT)
     assert [f.mode for f in after["rear", "sensor"].findings] == [FaultMode.OUTSIDE_TABLE]
     (valve,) = after["rear", "actuator"].findings
     assert valve.probability == pytest.approx(0.65)

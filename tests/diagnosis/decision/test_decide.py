@@ -375,6 +375,15 @@ def test_the_sentence_names_parts_in_the_order_of_the_actions_with_what_they_los
     assert "inefficient (40 % lost, 95 % bounds 39 to 41 %) for 3.0 s" in str(got.actions[0]["text"])
 
 
+def test_a_part_that_is_two_things_at_once_is_not_faulty_for_longer_than_the_mission() -> None:
+    dead = finding(Side.SENSOR, FaultMode.NO_SIGNAL, 3000, 9000)
+    off = finding(Side.SENSOR, FaultMode.OUTSIDE_TABLE, 0, 28_000, epsilon=None)
+    assert (
+        "without signal for 6.0 s and outside the tables for 28.0 s, 6.0 s of it at the same time"
+        in verdict(machine(FR_sensor=assessed(dead, off))).text
+    )
+
+
 def test_what_comes_again_and_again_is_one_fault_with_its_course() -> None:
     gaps = [finding(Side.SENSOR, FaultMode.NO_SIGNAL, 1000 * k, 1000 * k + 100) for k in range(1, 8)]
     alone = verdict(machine(FR_sensor=assessed(*gaps)))

@@ -67,7 +67,9 @@ def test_shared_finding_counts_once() -> None:
 
 
 def test_what_was_measured_for_longer_than_a_fault_lasts_says_so() -> None:
-    cut = replace(finding(Side.SENSOR, FaultMode.INEFFICIENT, 5000, 9000), evidence=("v was -0.7 × u, over 14.62 s.",))
+    cut = replace(
+        finding(Side.SENSOR, FaultMode.INEFFICIENT, 5000, 9000), evidence=("v was -0.7 × u, over {14.62 s}.",)
+    )
     (got,) = intervals_of(machine(FR_sensor=assessed(cut)), MACHINE, HYDRAULIC, 0, STEP)
     assert got.evidence == ("v was −0.7 × u, over 14.62 s in and around it.",)
 

@@ -92,6 +92,11 @@ def test_an_open_check_of_a_speed_is_said_with_what_was_seen() -> None:
     title, text = said(checks=[rough])
     assert title == "No speed sensor fault seen, but a check is open; drives not judged"
     assert text.startswith("No fault was seen in the speed sensors over at least 20 s of driving, but ")
+    assert "other checks" not in text
+    title, text = said(checks=[rough, replace(rough, component=WHEELS[1])])
+    assert title == "No speed sensor fault seen, but checks are open; drives not judged"
+    assert title in TITLES
+    assert "other checks" in text
 
 
 def test_a_steering_rate_that_is_open_doubts_no_sensor() -> None:

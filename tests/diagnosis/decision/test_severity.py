@@ -11,6 +11,7 @@ import pytest
 from diagnosis.decision.caveats import doubts_of
 from diagnosis.decision.intervals import intervals_of
 from diagnosis.decision.severity import AGAIN, advised, halved_words, severity_of, unbounded_words
+from diagnosis.decision.wording import actions_of
 from diagnosis.results.machine_words import HYDRAULIC
 from diagnosis.results.result import Epsilon, FaultInterval, Hypothesis
 from diagnosis.results.vocabulary import Severity, Verdict
@@ -201,6 +202,34 @@ def test_a_sensor_that_is_dead_briefly_again_and_again_is_looked_at_before_the_m
     assert doubts == (["the FR speed sensor gave nothing usable 6 times, 3.6 s in all"] if often else [])
     told = advised(faults, Verdict.WATCH, cleared=not often)
     assert all((f.advice == AGAIN) is often for f in told)
+
+
+@pytest.mark.parametrize(
+    ("status", "cleared", "told"),
+    [
+        (Verdict.WATCH, True, "at the next service"),
+        (Verdict.WATCH, False, "before the machine goes out again"),
+        (Verdict.STOP, False, "with the repair"),
+    ],
+)
+def test_what_is_probable_waits_for_a_service_only_where_the_machine_is_cleared(
+    status: Verdict, cleared: bool, told: str
+) -> None:
+    stuck = {("FR", "sensor"): assessed(finding(Side.SENSOR, FaultMode.STUCK, p=0.7))}
+    faults = advised(intervals_of(stuck, MACHINE, HYDRAULIC, 0, STEP), status, cleared=cleared)
+    assert [f.severity for f in faults] == [Severity.LOW]
+    assert told in faults[0].advice
+    (action,) = actions_of(faults, HYDRAULIC)
+    assert action["text"].startswith("Check at the next service") == (told == "at the next service")
+
+
+def test_an_action_waits_for_no_service_where_the_advice_does_not() -> None:
+    rows = split(("sensor", "stuck", 0.5), ("sensor", "noisy", 0.49))
+    either = replace(finding(Side.SENSOR, FaultMode.STUCK, p=0.5), hypotheses=rows)
+    (fault,) = intervals_of({("FR", "sensor"): assessed(either)}, MACHINE, HYDRAULIC, 0, STEP)
+    assert fault.advice.endswith("check it before the next mission.")
+    (action,) = actions_of((fault,), HYDRAULIC)
+    assert action["text"].startswith("Before the machine goes out, check the FR speed sensor")
 
 
 @pytest.mark.parametrize(

@@ -282,7 +282,7 @@ def test_channel_silent_while_its_siblings_live_is_no_signal() -> None:
     assessment = assess_pair(pair(Side.SENSOR, y, x), LIMITS)
     found = single(assessment)
     assert (found.mode, found.start, found.stop) == (FaultMode.NO_SIGNAL, 4000, 6000)
-    assert "delivered nothing for 2.000 s while other channels" in found.evidence[0]
+    assert "delivered nothing for {2.000 s} while other channels" in found.evidence[0]
     assert not np.isnan(found.probability)
 
 
@@ -382,6 +382,13 @@ def test_fault_that_grows_is_one_fault(seed: int) -> None:
     assert abs(found.stop - 9000) <= 3
     assert found.epsilon is not None
     assert found.epsilon.value == pytest.approx(0.6, abs=0.02)
+
+
+@pytest.mark.parametrize(("level", "mode"), [(0.015, FaultMode.STUCK), (0.001, FaultMode.NO_SIGNAL)])
+def test_a_value_beyond_the_zero_of_a_sensor_is_one_that_it_is_stuck_at(level: float, mode: FaultMode) -> None:
+    """However fast the machine is, so that the smallest saturation term that counts is larger."""
+    assessment = judged(Side.SENSOR, l4(1.0, level), 1)
+    assert single(assessment).mode is mode
 
 
 def test_silent_channel_is_one_fault_through_a_standstill() -> None:

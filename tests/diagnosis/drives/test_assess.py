@@ -113,6 +113,12 @@ def test_a_constant_sensor_is_found_in_the_loop_too(model: DriveModel, mode: Fau
     assert "nan" not in " ".join(sensor.findings[0].evidence)
 
 
+def test_a_value_beyond_the_zero_of_a_sensor_is_one_that_it_is_stuck_at(model: DriveModel) -> None:
+    held = mission(30, inside=lambda y, rng: 0.3, model=model)
+    sensor, _ = assess_drive(held, replace(LIMITS, min_sat=0.5))
+    assert sensor.findings[0].mode is FaultMode.STUCK
+
+
 def test_a_sensor_that_loses_gain_in_the_loop_jumps(model: DriveModel) -> None:
     sensor, actuator = assess_drive(mission(40, inside=lambda y, rng: 0.6 * y, model=model), LIMITS)
     assert [(f.side, f.mode) for f in sensor.findings] == [(Side.SENSOR, FaultMode.INEFFICIENT)]

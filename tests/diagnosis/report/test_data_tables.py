@@ -6,8 +6,9 @@ from typing import Any
 
 import pytest
 
-from diagnosis.report.data_tables import check_rows, coverage_rows
+from diagnosis.report.data_tables import check_rows, coverage_rows, loop_tables
 from diagnosis.report.page import build_page
+from diagnosis.results.machine_words import HYDRAULIC
 from tests import report_samples as samples
 
 CHECK: dict[str, Any] = {
@@ -41,3 +42,18 @@ def test_faulty_time_of_remarks_is_told_apart_as_the_timeline_counts_none(severi
     report["intervals"] = [fault | {"severity": severity}]
     (row,) = [r for r in coverage_rows(report) if r["faulty"] > 0.0][:1]
     assert any("of its faulty time are remarks" in why for why in row["why"]) is told
+
+
+def test_figures_of_a_column_have_as_many_digits() -> None:
+    def row(error: float, effort: float) -> dict[str, object]:
+        return {key: {"mission": x, "driving": x} for key, x in (("tracking_error", error), ("control_effort", effort))}
+
+    paper = [{"controller": "Yang", "tracking_error": 0.032, "control_effort": 0.13, "parameters": 16}]
+    metrics = {
+        "wheels": {"FR": row(0.0274, 0.0982), "FL": row(0.024, 0.1)},
+        "average": row(-0.5, 1.234),
+        "paper": paper,
+    }
+    shown = loop_tables(metrics, HYDRAULIC)  # type: ignore[arg-type]
+    assert [cells[::2] for _, cells in shown["rows"]] == [["0.0274", "9.82"], ["0.0240", "10.0"], ["−0.500", "123"]]
+    assert shown["paper"] == [("Yang", ["0.032", "13.0", "16"])]

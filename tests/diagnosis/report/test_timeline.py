@@ -95,6 +95,13 @@ def test_bars_that_would_cover_each_other_share_the_height() -> None:
     assert len(many) == 9
 
 
+def test_faults_at_the_same_time_make_it_faulty_once() -> None:
+    report, _ = samples.one_wheel()
+    first = report["intervals"][0] | {"start_s": 0.0, "stop_s": 90.0}
+    report["intervals"] = [first, first | {"id": "F2", "start_s": 30.0, "stop_s": 96.0}]
+    assert timeline(report, 120.0).lanes[0].faulty == "80.0 %"
+
+
 def test_brief_noise_of_little_severity_is_drawn_and_paints_no_part() -> None:
     report, _ = samples.one_wheel()
     report["intervals"][0] |= {"mode": "noisy", "severity": "info", "start_s": 30.0, "stop_s": 30.013}

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 import pytest
@@ -10,6 +12,8 @@ from numpy.typing import NDArray
 
 from diagnosis.response.assess import assess_response
 from diagnosis.response.inputs import FollowerData
+from diagnosis.response.machine import Judged
+from diagnosis.response.runaway import _finding
 from diagnosis.results.assessment import Finding
 from replay.faults import FaultMode, Side
 from replay.machine.config import Limits
@@ -80,3 +84,13 @@ def test_a_wheel_that_is_braked_at_many_times_its_usual_speed_does_not_turn_the_
     effort = effort.copy()
     y[after], effort[after] = np.linspace(40.0, 1.0, after.stop - after.start), -50.0
     assert not runaways({**data, "RR": replace(data["RR"], y=y, effort=effort)})
+
+
+def test_a_command_of_nearly_nothing_is_told_as_nothing() -> None:
+    still = np.full(20, -6.1e-8)
+    blocks = SimpleNamespace(start=np.arange(20) * 10, mean=np.full(20, 0.69), low=still, high=still)
+    one = SimpleNamespace(
+        data=SimpleNamespace(name="v", y=np.zeros(200)), wheel=SimpleNamespace(blocks=blocks), alone=False
+    )
+    found = _finding(cast(Judged, one), (5, 15), np.r_[np.ones(5), np.full(10, 9.0), np.ones(5)], 0.1)
+    assert "is at 0.69 {speed_unit} where its command makes it 0 {speed_unit}" in found.evidence[0]

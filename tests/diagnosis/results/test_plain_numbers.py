@@ -14,6 +14,8 @@ from diagnosis.results.plain_numbers import plain, with_minus_signs
         (-1.2e-5, 2, "−0.000012"),
         (1e-9, 2, "0"),
         (0.0, 2, "0"),
+        (-0.0, 2, "0"),
+        (-6.1e-8, 2, "0"),
     ],
 )
 def test_numbers_have_no_exponent(value: float, digits: int, text: str) -> None:
@@ -30,6 +32,7 @@ def test_below_nothing_is_a_minus_sign() -> None:
     [
         ("read -0.6 m/s, then (-3.7 ms) and × -1", "read −0.6 m/s, then (−3.7 ms) and × −1"),
         ("on 2025-10-09, wheel-2, 3-4, [-1] of /joint-1", "on 2025-10-09, wheel-2, 3-4, [-1] of /joint-1"),
+        ("drive -1.mcap, log -2/a.db3 and -3rd: -1.5.", "drive -1.mcap, log -2/a.db3 and -3rd: −1.5."),
         ("'/a'-1 and \"b\"-1 --5", "'/a'-1 and \"b\"-1 --5"),
     ],
 )

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from diagnosis.results.stated_sizes import known_probability, mode_columns, size_columns
+from diagnosis.results.stated_sizes import known_modes, known_probability, mode_columns, size_columns
 from replay.machine.quantities import OPENING
 from tests import report_samples as samples
 
@@ -94,6 +94,31 @@ def test_so_has_one_that_the_columns_show_at_its_beginning_alone() -> None:
     seen = np.where(T < 23.0, 0.9, 0.02).astype(np.float32)
     found = known_probability(report, T, 0.1, {name: seen})  # type: ignore[arg-type]
     np.testing.assert_allclose(found[name][200:300], 0.95)
+
+
+def test_so_has_one_that_they_show_only_while_another_fault_lasts() -> None:
+    hypotheses = [{"side": "sensor", "mode": "noisy", "p": 0.95}, {"side": "none", "mode": "healthy", "p": 0.05}]
+    fault = samples.fault(mode="noisy", start_s=20.0, stop_s=30.0, probability=0.95, hypotheses=hypotheses)
+    other = samples.fault(mode="inefficient", start_s=22.0, stop_s=29.0)
+    report = samples.report_with() | {"intervals": [fault, other], "states": [state("noisy", 20.0, 30.0)]}
+    name = "evidence.FR.sensor.probability"
+    seen = np.where((T >= 22.0) & (T < 29.0), 0.9, 0.3).astype(np.float32)
+    found = known_probability(report, T, 0.1, {name: seen})  # type: ignore[arg-type]
+    np.testing.assert_allclose(found[name][200:300], 0.95)
+
+
+def test_rows_of_a_fault_that_rests_on_other_evidence_are_those_of_its_hypotheses() -> None:
+    hypotheses = [{"side": "sensor", "mode": "noisy", "p": 0.95}, {"side": "none", "mode": "healthy", "p": 0.05}]
+    fault = samples.fault(mode="noisy", start_s=20.0, stop_s=30.0, probability=0.95, hypotheses=hypotheses)
+    report = samples.report_with() | {"intervals": [fault], "states": [state("noisy", 20.0, 30.0)]}
+    base = "evidence.FR.sensor.p_"
+    for p, told in ((1.0, {"healthy": 0.05, "noisy": 0.95, "stuck": 0.0}), (0.2, {})):  # which shows the fault itself
+        seen = {base + m: np.full(1000, x, np.float32) for m, x in (("healthy", p), ("stuck", 1.0 - p))}
+        found = known_modes(report, T, 0.1, seen)  # type: ignore[arg-type]
+        assert set(found) == {base + m for m in told}
+        for mode, x in told.items():
+            np.testing.assert_allclose(found[base + mode][200:300], x, atol=1e-6)
+            np.testing.assert_array_equal(found[base + mode][:200], seen.get(base + mode, np.full(1000, np.nan))[:200])
 
 
 def test_rows_that_were_weighed_over_a_whole_fault_have_its_probabilities_during_it_alone() -> None:

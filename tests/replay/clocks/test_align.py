@@ -140,7 +140,7 @@ def test_other_drives_do_not_match() -> None:
 def test_days_between_clocks_that_were_set_are_told_and_not_bridged() -> None:
     clock, line, _ = estimate(*two_clocks(drive(), 3 * 86_400.0, 0.0))
     assert line is None
-    assert "-3.0 days" in clock.reason
+    assert "−3.0 days" in clock.reason
 
 
 @pytest.mark.parametrize("step", [0.02, 0.3, 2.0, 3600.0])

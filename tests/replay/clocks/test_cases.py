@@ -203,8 +203,8 @@ def test_simulated_time_that_starts_again(tmp_path: Path) -> None:
 # Stamps of a table, which has no second clock; words; what is left out; largest error [ms].
 TABLES: dict[str, tuple[Stamps, list[str], int, float]] = {
     "in order": (GOOD, [], 0, 0.0),
-    "an hour back from 5 s on": (GOOD + after(5, -HOUR), ["set back once", "-3600"], 0, 0.0),
-    "5 s back from 8 s on": (GOOD + after(8, -5 * S), ["set back once", "-5.000 s"], 0, 0.0),
+    "an hour back from 5 s on": (GOOD + after(5, -HOUR), ["set back once", "−3600"], 0, 0.0),
+    "5 s back from 8 s on": (GOOD + after(8, -5 * S), ["set back once", "−5.000 s"], 0, 0.0),
     "an hour ahead from 5 s on": (GOOD + after(5, HOUR), ["jump ahead", "3600.020 s", "kept"], 0, 3.6e6),
     "zero now and then": (at([10, 300], [0, 0])(GOOD), ["2 of 600 stamps are far", "left out"], 2, 0.0),
     "2^62 and before 1970": (

@@ -116,7 +116,7 @@ def _coverage(machines: Sequence[MachineRow]) -> str:
         else []
     )
     who = join_words(dark) if len(dark) <= _MACHINES else count(len(dark), "machine")
-    words += [f"not known of {who}, whose newest mission did not clear it"] if dark else []
+    words += [f"which parts the last mission of {who} judged is not known"] if dark else []
     return "; ".join(words) or "every part judged long enough in the last mission"
 
 

@@ -194,13 +194,13 @@ def test_a_fault_that_comes_back_is_as_severe_as_it_is_now(
         ([NO_SIGNAL], "nothing judged"),
         (
             [Sample("a", day=None, verdict="not_assessed", blind=samples.PARTS)],
-            "not known of HX-1, whose newest mission did not clear it",
+            "which parts the last mission of HX-1 judged is not known",
         ),
         (
             [Sample("a"), Sample("b", "HX-2", state="crashed")],
-            "not known of HX-2, whose newest mission did not clear it",
+            "which parts the last mission of HX-2 judged is not known",
         ),
-        ([Sample("a"), Sample("b", state="crashed")], "not known of HX-1, whose newest mission did not clear it"),
+        ([Sample("a"), Sample("b", state="crashed")], "which parts the last mission of HX-1 judged is not known"),
     ],
 )
 def test_every_part_is_assessed_only_where_that_is_known(tmp_path: Path, missions: list[Sample], told: str) -> None:
