@@ -19,7 +19,7 @@ MODEL = RowModel(noise=0.1, core=0.02, exact=0.6, constant_noise=0.002, span=10.
 
 
 def one(m: int, y: float, x: float, last: float, status: int = PAIR, quiet: bool = False) -> float:
-    return float(emission(m, y, x, 0.0, last, status, quiet, MODEL.disturbance, MODEL.grid_noise()))
+    return float(emission(m, y, x, 0.0, last, np.int8(status), quiet, MODEL.disturbance, MODEL.grid_noise()))
 
 
 def beside(y: Array, x: Array, status: NDArray[np.int8], quiet: NDArray[np.bool_]) -> SpeedSamples:

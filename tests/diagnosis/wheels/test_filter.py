@@ -169,7 +169,7 @@ def test_evidence_is_what_a_loop_sums_up(ended: bool) -> None:
         total = np.zeros(MODELS)
         for n in range(first, last):
             x, chatter = done.inputs[n, 0], cut.unsteady[n, 0] * WHEEL.K * RAW / WHEEL.tau
-            seen = (cut.y[n, 0], cut.count[n, 0], cut.jitter[n, 0], 1.0, 0.0, 0)
+            seen = (cut.y[n, 0], cut.count[n, 0], cut.jitter[n, 0], 1.0, 0.0, np.int8(0))
             q = WheelInput(*seen, x[0], x[1], x[2], x[3], x[4], chatter, 0.0, x[5], x[6], unseen[n])
             predict(HEALTHY, q, k, free, free_P)
             expected[n], spread[n] = free[0, 0], free_P[0, 0, 0]

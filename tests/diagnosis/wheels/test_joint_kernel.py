@@ -276,7 +276,7 @@ def advanced(q: WheelInput, status: int, quiet: bool = False, speed: float = 0.2
     k = wheel().constants(DT, RAW)
     start = initial_state(np.full(4, speed), machine(), DT, RAW)
     z, P, gain = start.mean[0].copy(), start.cov[0].copy(), np.zeros(MODELS)
-    advance(MODELS, q, status, quiet, k, z, P, gain)
+    advance(MODELS, q, np.int8(status), quiet, k, z, P, gain)  # as in the scan, which has compiled it
     plain = np.zeros(MODELS)
     other, cov = start.mean[0].copy(), start.cov[0].copy()
     for m in range(MODELS):
@@ -289,7 +289,7 @@ def advanced(q: WheelInput, status: int, quiet: bool = False, speed: float = 0.2
 
 
 def shown(y: float, jitter: float = 3e-5) -> WheelInput:
-    return WheelInput(y, 10.0, jitter, 1.0, 0.0, 0, 0.08, 0.08, 0.08, 1.0, 1.0, 0.0, 0.0, np.nan, 0.0, 0.0)
+    return WheelInput(y, 10.0, jitter, 1.0, 0.0, np.int8(0), 0.08, 0.08, 0.08, 1.0, 1.0, 0.0, 0.0, np.nan, 0.0, 0.0)
 
 
 def test_a_block_speaks_within_limits() -> None:
