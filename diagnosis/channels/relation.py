@@ -17,6 +17,7 @@ from diagnosis.channels.noise import shifted
 from diagnosis.channels.scale import scale_of
 from replay.arrays.compiling import njit
 from replay.arrays.numeric import bridged, without_nan
+from replay.arrays.quantiles import median_of, quantile_known, quantile_of
 
 Array = NDArray[np.float64]
 
@@ -76,9 +77,9 @@ def relations_of_kind(found: Sequence[Relation], dt: float) -> list[Relation]:
     late, gain = np.array([r.delay + r.lag / dt for r in found]), np.array([r.gain for r in found])
     if late.size < _SIBLINGS:
         return list(found)
-    apart = np.abs(late - np.median(late))
+    apart = np.abs(late - median_of(late))
     agree = np.count_nonzero(apart <= _ALIKE) >= max(2, (late.size + 1) // 2)
-    typical, usual = found[int(np.argmin(apart))], float(np.median(gain))
+    typical, usual = found[int(np.argmin(apart))], float(median_of(gain))
     timed = [typical._replace(gain=r.gain) if agree and d > _ALIKE else r for r, d in zip(found, apart, strict=True)]
     return [r if abs(r.gain - usual) <= _SCALES else r._replace(gain=usual) for r in timed]
 
@@ -92,10 +93,10 @@ def valves_of_kind(found: Sequence[Relation], dt: float) -> list[Relation]:
         return list(found)
     if all(r.lag == r.play == 0.0 for r in found):
         return relations_of_kind(found, dt)
-    scale = float(np.median([r.gain for r in found]))
+    scale = float(median_of([r.gain for r in found]))
     found = [r if abs(r.gain - scale) <= _SCALES else r._replace(gain=scale) for r in found]
     size = np.array([(r.play, r.lag) for r in found])
-    usual = np.quantile(size, 0.5, axis=0, method="lower")
+    usual = quantile_of(size, 0.5, axis=0, method="lower")
     typical = found[int(np.argmin(np.abs(size - usual) @ np.array([1.0, 0.5])))]
     odd = (size > _UNLIKE * usual + np.array([_PLAYS[0], _LAGS_S[3]])).any(axis=1)
     return [typical._replace(gain=r.gain) if strange else r for r, strange in zip(found, odd, strict=True)]
@@ -215,14 +216,14 @@ def _places(y: Array, x: Array, use: NDArray[np.bool_], dt: float, margin: int) 
     filled = without_nan(x)
     moved = np.abs(np.diff(filled))[warm : warm + count * length - 1]
     moved = np.r_[moved, 0.0].reshape(count, length).sum(axis=1)
-    kept = first[moved >= np.quantile(moved, _STILL)]
+    kept = first[moved >= quantile_of(moved, _STILL)]
     kept = kept[np.linspace(0, kept.size - 1, min(kept.size, _CHUNKS)).round().astype(np.intp)]
     steps = (kept[:, None] + np.arange(-warm, length + margin)).ravel()
     inside = np.tile(np.r_[np.zeros(warm, np.bool_), np.ones(length, np.bool_), np.zeros(margin, np.bool_)], kept.size)
     good = inside & use[steps] & np.isfinite(x[steps]) & np.isfinite(y[steps])
     reach = max(1, round(_MOTION_S / dt))
     motion = np.abs(np.roll(filled[steps], -reach) - np.roll(filled[steps], reach))
-    at = np.flatnonzero(good & (motion > np.median(motion[good]))) if good.any() else np.zeros(0, np.intp)
+    at = np.flatnonzero(good & (motion > median_of(motion[good]))) if good.any() else np.zeros(0, np.intp)
     at = at[:: max(1, at.size // _PLACES)]
     return _Places(x[steps], at, y[steps][at])
 
@@ -239,7 +240,7 @@ def _at(places: _Places, relation: Relation, dt: float) -> Array:
 def _scale(places: _Places, relation: Relation, dt: float) -> float:
     """Usual size of the misfit: a low quantile, which faults in half of the places leave alone."""
     misfit = np.abs(places.y - relation.gain * _at(places, relation, dt))
-    return max(float(np.nanquantile(misfit, _USUAL)), 1e-12)
+    return max(float(quantile_known(misfit, _USUAL)), 1e-12)
 
 
 def _misfit(places: _Places, relation: Relation, dt: float, scale: float) -> float:

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.results.restored import differences_of
+from replay.arrays.quantiles import quantile_of
 
 _BLOCK = 1 << 15
 _PROBE = 20_000
@@ -46,7 +47,7 @@ def grid_of(name: str, values: NDArray[np.floating], lsb: float | None = None) -
     probe = probe[np.abs(probe) < _HUGE]
     if not len(probe):
         return 0.0
-    low, high = np.quantile(probe, [0.001, 0.999])
+    low, high = quantile_of(probe, [0.001, 0.999])
     if lsb is not None and _LEAST < lsb < _HUGE:
         step = max(lsb / 4, float(high - low) / 2**_WITH_LSB)
     else:

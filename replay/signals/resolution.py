@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from replay.arrays.blocks import blocks
+from replay.arrays.quantiles import median_of, quantile_of
 
 Array = NDArray[np.float64]
 
@@ -34,7 +35,7 @@ def rounding_step(values: Array) -> float:
     if steps.size < 20:
         return 0.0
     smallest = _low_quantile(steps, 0.01)
-    step = float(np.median(steps[steps < 1.5 * smallest]))
+    step = float(median_of(steps[steps < 1.5 * smallest]))
     multiple = steps / step
     whole = np.rint(multiple)
     multiple *= whole
@@ -111,4 +112,4 @@ def white_noise(values: Array, dt: float, quantile: float = 0.4) -> float:
         return float("nan")
     rms = np.concatenate(found)
     rms = rms[np.isfinite(rms)]
-    return float(np.quantile(rms, quantile)) if rms.size >= 3 else float("nan")
+    return float(quantile_of(rms, quantile)) if rms.size >= 3 else float("nan")
