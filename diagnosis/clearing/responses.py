@@ -211,7 +211,7 @@ def largest_change(log: Array, ways: Sequence[NDArray[np.bool_]]) -> float:
         x = log[way & np.isfinite(log)]
         least = max(_LEAST_WINDOWS, round(_PART * x.size))
         for k in range(least, x.size - least + 1, max(1, x.size // 40)):
-            largest = max(largest, abs(_median(x[:k]) - _median(x[k:])))
+            largest = max(largest, abs(median_of(x[:k]) - median_of(x[k:])))
     return float(largest)
 
 
@@ -227,7 +227,7 @@ def growth(log: Array, ways: Sequence[NDArray[np.bool_]]) -> float:
         if n < _GROWS:
             continue
         apart = [(at[:-k], at[k:]) for k in range(n // 3, 2 * n // 3 + 1, max(1, n // 24))]
-        pace = _median(np.concatenate([(log[b] - log[a]) / (b - a) for a, b in apart]))
+        pace = median_of(np.concatenate([(log[b] - log[a]) / (b - a) for a, b in apart]))
         largest = max(largest, 0.5 * abs(pace) * float(at[-1] - at[0]))
     return largest
 
@@ -239,15 +239,6 @@ def clear_change(log: Array) -> float:
     about = log[at] - np.polyval(np.polyfit(at, log[at], 1), at)
     scatter = _NORMAL * float(median_of(np.abs(about - median_of(about))))
     return change if change >= _CLEARLY * scatter else 0.0
-
-
-def _median(x: Array) -> float:
-    """Median of finite values; `np.median` looks for NaN and axes first, which takes most of its time here."""
-    half = x.size // 2
-    if x.size % 2:
-        return float(np.partition(x, half)[half])
-    low, high = np.partition(x, [half - 1, half])[half - 1 : half + 1]
-    return float((low + high) / 2.0)
 
 
 def largest(windows: Array) -> Array:

@@ -11,10 +11,8 @@ from replay.arrays.quantiles import median_of, quantile_of
 Array = NDArray[np.float64]
 
 _WINDOW_S = 0.25
-_SOME, _WIDER = (
-    4_000,
-    2.0,
-)  # values that tell where a low quantile lies, and times its share, up to which values are ranked
+# values that tell where a low quantile lies, and times its share, up to which values are ranked
+_SOME, _WIDER = 4_000, 2.0
 
 
 def rounding_step(values: Array) -> float:
@@ -57,8 +55,8 @@ def _low_quantile(values: Array, share: float) -> float:
     some = values[:: max(1, values.size // _SOME)]
     near = min(int(_WIDER * share * some.size) + 1, some.size - 1)
     few = values[values <= np.partition(some, near)[near]]
-    ranked = np.partition(few if few.size > k + 1 else values, (k, k + 1))
-    a, b, t = float(ranked[k]), float(ranked[k + 1]), place - k
+    ranked = np.partition(few if few.size > k + 1 else values, k)
+    a, b, t = float(ranked[k]), float(ranked[k + 1 :].min()), place - k
     return a + (b - a) * t if t < 0.5 else b - (b - a) * (1.0 - t)
 
 
