@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from diagnosis.results.assessment import CODE, Assessment, Lack, Reason
 from diagnosis.results.vocabulary import Tier
+from replay.arrays.quantiles import median_of
 from replay.faults import State
 from replay.machine.config import Limits
 
@@ -70,7 +71,7 @@ def repeats_its_command(y: Array, fresh: NDArray[np.bool_], asked: Array, limits
     early, late = (np.clip(at + round(s / dt), 0, known.size - 1) for s in (-_BEFORE_S, _AFTER_S))
     value = np.cumsum(changes) - 1  # which of them holds at a step
     start, stop = value[early], value[late]
-    if np.median(stop - start) > _MANY and not _fine(y[at]):  # steps of both are the same, and any of them is met
+    if median_of(stop - start) > _MANY and not _fine(y[at]):  # steps of both are the same, and any of them is met
         return False
     met = at.size
     for part in (slice(i, i + _LOOKED_AT) for i in range(0, at.size, _LOOKED_AT)):

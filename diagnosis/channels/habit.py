@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.channels.noise import rounding_step, usual_distance
+from replay.arrays.quantiles import median_of
 
 Array = NDArray[np.float64]
 
@@ -107,7 +108,7 @@ def identify_habit(y: Array, fresh: NDArray[np.bool_], dt: float) -> Habit:
     if parts.runs.size < _LEAST_WINDOWS:
         return every
     shortest = _short(parts)
-    window = float(np.median(shortest)) * dt
+    window = float(median_of(shortest)) * dt
     if window < 1.5 * period:
         travel = _slow_travel(parts, shortest, runs, moving, (period, dt))
         return (
@@ -121,7 +122,7 @@ def identify_habit(y: Array, fresh: NDArray[np.bool_], dt: float) -> Habit:
     slope = _slope(np.log(speed), np.log(shortest))
     if slope is not None and slope > _FALLING:
         return Habit(window, 0.0, window, stepwise=True, tick=_tick(runs))
-    travel = float(np.median(distance))
+    travel = float(median_of(distance))
     return Habit(period, travel, _timeout(runs, travel, dt), stepwise=True, tick=_tick(runs))
 
 
@@ -143,7 +144,7 @@ def _slow_travel(
         hold, at = runs.length[long] * dt, np.abs(runs.following[long]).astype(np.float64)
     if hold.size < _LEAST_WINDOWS:
         return None
-    travel = float(np.median(hold * at))
+    travel = float(median_of(hold * at))
     alike = np.abs(np.log(hold * at / travel)) < np.log(_ALIKE)
     passes = travel / speed[~slow] < _PASSED * period
     fits = np.mean(alike) >= _MOSTLY and (not passes.size or np.mean(passes) >= _MOSTLY)
@@ -207,7 +208,7 @@ def _slope(x: Array, y: Array) -> float | None:
     if np.count_nonzero(apart) < _LEAST_PAIRS:
         return None
     i, j = i[apart], j[apart]
-    return float(np.median((y[i] - y[j]) / (x[i] - x[j])))
+    return float(median_of((y[i] - y[j]) / (x[i] - x[j])))
 
 
 def _tick(runs: _Runs) -> float:
@@ -217,14 +218,14 @@ def _tick(runs: _Runs) -> float:
     are counts of poles in a window, and no times.
     """
     held = np.abs(runs.value[(runs.length > 1) & (runs.value != 0.0)])
-    held = held[held >= np.median(held)] if held.size else held
+    held = held[held >= median_of(held)] if held.size else held
     apart = np.diff(np.unique(held))
-    if not apart.size or rounding_step(held) > _COUNTS * float(np.median(apart)):
+    if not apart.size or rounding_step(held) > _COUNTS * float(median_of(apart)):
         return 0.0
     parts = np.array_split(held, max(1, held.size // _TICK_RUNS))
     some = np.linspace(0, len(parts) - 1, min(len(parts), _TICK_PARTS)).round().astype(np.intp)
     steps = np.array([rounding_step(1.0 / parts[k]) for k in some])
-    return float(np.median(steps[steps > 0.0])) if np.mean(steps > 0.0) > 0.5 else 0.0
+    return float(median_of(steps[steps > 0.0])) if np.mean(steps > 0.0) > 0.5 else 0.0
 
 
 def _timeout(runs: _Runs, travel: float, dt: float) -> float:
@@ -233,7 +234,7 @@ def _timeout(runs: _Runs, travel: float, dt: float) -> float:
     if not fell.any():
         return _TIMEOUT_S
     held = np.maximum(runs.length[fell] * dt, travel / np.abs(runs.value[fell]))
-    return float(np.clip(np.median(held), 2 * dt, _LONGEST_S))
+    return float(np.clip(median_of(held), 2 * dt, _LONGEST_S))
 
 
 def of_kind(habits: Sequence[Habit]) -> list[Habit]:
@@ -241,7 +242,7 @@ def of_kind(habits: Sequence[Habit]) -> list[Habit]:
     shown = [h for h in habits if h.stepwise]
     if 2 * len(shown) < len(habits) or len(shown) < 2:
         return list(habits)
-    window, travel, timeout, _, tick = (float(x) for x in np.median(np.array(shown, dtype=np.float64), axis=0))
+    window, travel, timeout, _, tick = (float(x) for x in median_of(np.array(shown, dtype=np.float64), axis=0))
     usual = Habit(window, travel, timeout, stepwise=True, tick=tick)
     between = usual.travel > 0.0
     return [h if h.stepwise and (h.travel > 0.0) is between else usual for h in habits]

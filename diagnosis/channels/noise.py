@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from replay.arrays.blocks import blocks
+from replay.arrays.quantiles import median_of, quantile_of
 from replay.arrays.sliding import mean_within, windowed
 from replay.signals.resolution import rounding_step as rounding_step
 from replay.signals.resolution import white_noise as white_noise
@@ -70,7 +71,7 @@ def usual_rounding(values: Array) -> float:
         return whole
     found = np.array([rounding_step(part) for part in np.array_split(values, _GRID_PARTS)])
     shown = found > 0.0
-    return float(np.median(found[shown])) if np.mean(shown) > _GRID_SHARE else 0.0
+    return float(median_of(found[shown])) if np.mean(shown) > _GRID_SHARE else 0.0
 
 
 def usual_distance(new: NDArray[np.bool_]) -> float:
@@ -79,7 +80,7 @@ def usual_distance(new: NDArray[np.bool_]) -> float:
         places = np.flatnonzero(new[:size])
         if places.size >= 20_000 or size == new.size:
             break
-    return float(np.median(np.diff(places[:20_000])))
+    return float(median_of(np.diff(places[:20_000])))
 
 
 def quick_noise(residual: Array, dt: float) -> float:
@@ -123,7 +124,7 @@ def slow_mismatch(residual: Array, use: NDArray[np.bool_], dt: float, quantile: 
         counted.append(_windows(kept.astype(np.float64), length).sum(axis=1))
     squares, counts = np.concatenate(summed), np.concatenate(counted)
     good = counts >= length / 4
-    return float(np.quantile(np.sqrt(squares[good] / counts[good]), quantile)) if good.any() else float("nan")
+    return float(quantile_of(np.sqrt(squares[good] / counts[good]), quantile)) if good.any() else float("nan")
 
 
 def quiet_rms(x: Array, dt: float) -> float:
@@ -138,7 +139,7 @@ def quiet_rms(x: Array, dt: float) -> float:
     number = np.isfinite(windows).sum(axis=1)
     power = np.nansum(windows**2, axis=1) / np.maximum(number, 1)
     used = power[number >= length / 2]
-    return float(np.sqrt(np.quantile(used, _QUIET_SHARE))) if used.size else float("nan")
+    return float(np.sqrt(quantile_of(used, _QUIET_SHARE))) if used.size else float("nan")
 
 
 def shifted(x: Array, lag: float) -> Array:
@@ -177,7 +178,7 @@ def relative_lag(y: Array, x: Array, use: NDArray[np.bool_], least_lag: int, max
     moving = use & np.isfinite(y) & np.isfinite(x)
     if np.count_nonzero(moving) < 100:
         return 0.0
-    moving &= smooth >= np.quantile(smooth[moving], 0.7)
+    moving &= smooth >= quantile_of(smooth[moving], 0.7)
     places = np.flatnonzero(moving)
     places = places[(places > max_lag) & (places < y.size - max_lag - 1)]
     places = places[:: max(1, places.size // _PLACES)]
@@ -263,7 +264,7 @@ def unresolved(
     share = _COARSE_SHARE if dt >= COARSE_STEP_S else 0.0
     if np.count_nonzero(lively) >= 10 * width:
         seen = mean_within(np.where(kept, residual, 0.0) ** 2, width)
-        found = float(np.quantile(seen[lively] / power[lively], _SOUND_SHARE))
+        found = float(quantile_of(seen[lively] / power[lively], _SOUND_SHARE))
         share = max(share, found if found < _MOST_SHARE else 0.0)
     share = share if known is None else known
     if share <= 0.05:

@@ -7,6 +7,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from replay.arrays.quantiles import median_of, quantile_of
+
 Array = NDArray[np.float64]
 
 _WINDOW_S, _LEAST = 0.25, 4
@@ -63,14 +65,14 @@ def noise_growth(power: Array, size: Array, dt: float) -> NoiseGrowth | None:
         return None
     mean, at = mean[use], at[use]
     classes = np.array_split(np.argsort(at), min(_CLASSES, mean.size // _LEAST_WINDOWS))
-    x = np.array([np.median(at[c]) for c in classes])
-    y = np.array([np.quantile(mean[c], _SOUND) for c in classes])
+    x = np.array([median_of(at[c]) for c in classes])
+    y = np.array([quantile_of(mean[c], _SOUND) for c in classes])
     i, j = np.triu_indices(x.size, 1)
     apart = np.abs(x[i] - x[j]) > 0.1 * x.max(initial=0.0)
-    slope = float(np.median((y[i] - y[j])[apart] / (x[i] - x[j])[apart])) if apart.any() else 0.0
+    slope = float(median_of((y[i] - y[j])[apart] / (x[i] - x[j])[apart])) if apart.any() else 0.0
     slope = max(slope, 0.0)
-    floor = float(np.median(y - slope * x))
+    floor = float(median_of(y - slope * x))
     least = float(y.min())
     if slope * x.max() < (_NOTICED**2 - 1.0) * max(floor, least):
-        return NoiseGrowth(float(np.sqrt(np.quantile(mean, _SOUND))), 0.0)
+        return NoiseGrowth(float(np.sqrt(quantile_of(mean, _SOUND))), 0.0)
     return NoiseGrowth(float(np.sqrt(max(floor, 0.25 * least))), float(np.sqrt(slope)))

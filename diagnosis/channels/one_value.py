@@ -7,6 +7,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from replay.arrays.quantiles import median_of
+
 Array = NDArray[np.float64]
 
 TURNS = 0.02  #: Of the largest speed: a wheel that turns.
@@ -75,7 +77,7 @@ def trembling(y: Array, least: float) -> tuple[float, float] | None:
     turning = np.abs(y[:-1]) > least
     if y.size < _FEW or not turning.any():
         return None
-    return float(np.mean(np.diff(y)[turning] != 0.0)), float(np.sqrt(np.median(np.diff(y, 2) ** 2) / _SECOND))
+    return float(np.mean(np.diff(y)[turning] != 0.0)), float(np.sqrt(median_of(np.diff(y, 2) ** 2) / _SECOND))
 
 
 def _in_steps(value: Array, length: Array) -> bool:

@@ -8,6 +8,7 @@ misfit by Cauchy's loss of scale s, mean ln(1 + (misfit/s)²), where the referen
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from itertools import groupby
 from typing import NamedTuple
 
 import numpy as np
@@ -17,6 +18,7 @@ from diagnosis.channels.noise import shifted
 from diagnosis.channels.scale import scale_of
 from replay.arrays.compiling import njit
 from replay.arrays.numeric import bridged, without_nan
+from replay.arrays.quantiles import median_of, quantile_known, quantile_of
 
 Array = NDArray[np.float64]
 
@@ -28,6 +30,7 @@ _LAGS_S = (0.004, 0.008, 0.012, 0.018, 0.026, 0.036, 0.05, 0.07)
 _LONG_LAGS_S = (0.1, 0.14, 0.2, 0.28)  # of large pilot stages: tried where the longest of the others is best
 _PLAYS = (0.006, 0.012, 0.02, 0.03, 0.045, 0.065)  # of the span
 _BETTER = 0.03  # of the loss, by which a lag or play is believed
+_AT_ONCE = 8  # lags and plays
 _ROUNDS, _FINE = 5, (0.8, 0.9, 0.95, 1.05, 1.1, 1.25)
 _USUAL = 0.35
 _SIBLINGS, _ALIKE, _SCALES = 3, 0.6, 0.01  # channels of one kind; steps, and share, by which they may differ
@@ -76,9 +79,9 @@ def relations_of_kind(found: Sequence[Relation], dt: float) -> list[Relation]:
     late, gain = np.array([r.delay + r.lag / dt for r in found]), np.array([r.gain for r in found])
     if late.size < _SIBLINGS:
         return list(found)
-    apart = np.abs(late - np.median(late))
+    apart = np.abs(late - median_of(late))
     agree = np.count_nonzero(apart <= _ALIKE) >= max(2, (late.size + 1) // 2)
-    typical, usual = found[int(np.argmin(apart))], float(np.median(gain))
+    typical, usual = found[int(np.argmin(apart))], float(median_of(gain))
     timed = [typical._replace(gain=r.gain) if agree and d > _ALIKE else r for r, d in zip(found, apart, strict=True)]
     return [r if abs(r.gain - usual) <= _SCALES else r._replace(gain=usual) for r in timed]
 
@@ -92,10 +95,10 @@ def valves_of_kind(found: Sequence[Relation], dt: float) -> list[Relation]:
         return list(found)
     if all(r.lag == r.play == 0.0 for r in found):
         return relations_of_kind(found, dt)
-    scale = float(np.median([r.gain for r in found]))
+    scale = float(median_of([r.gain for r in found]))
     found = [r if abs(r.gain - scale) <= _SCALES else r._replace(gain=scale) for r in found]
     size = np.array([(r.play, r.lag) for r in found])
-    usual = np.quantile(size, 0.5, axis=0, method="lower")
+    usual = quantile_of(size, 0.5, axis=0, method="lower")
     typical = found[int(np.argmin(np.abs(size - usual) @ np.array([1.0, 0.5])))]
     odd = (size > _UNLIKE * usual + np.array([_PLAYS[0], _LAGS_S[3]])).any(axis=1)
     return [typical._replace(gain=r.gain) if strange else r for r, strange in zip(found, odd, strict=True)]
@@ -111,26 +114,29 @@ class _Filled(NamedTuple):
     def of(cls, x: Array) -> _Filled:
         return cls(bridged(x), ~np.isfinite(x))
 
-    def followed(self, play: float, lag: float, dt: float) -> Array:
-        out = np.empty(self.x.size)
-        _follow(self.x, 0.5 * play, float(np.exp(-dt / lag)) if lag > 0.0 else 0.0, out)
-        out[self.unknown] = np.nan
+    def followed(self, ways: Sequence[tuple[float, float]], dt: float) -> Array:
+        """With each of some lags [s] and plays, shape (ways, n): several at once, for each waits for its own last sample."""
+        out = np.empty((len(ways), self.x.size))
+        keep = np.array([float(np.exp(-dt / lag)) if lag > 0.0 else 0.0 for lag, _ in ways])
+        _follow(self.x, np.array([0.5 * play for _, play in ways]), keep, out)
+        out[:, self.unknown] = np.nan
         return out
 
 
 def _followed(x: Array, play: float, lag: float, dt: float) -> Array:
-    return _Filled.of(x).followed(play, lag, dt)
+    return np.asarray(_Filled.of(x).followed([(lag, play)], dt)[0])
 
 
 @njit(cache=True, nogil=True)
 def _follow(x, half, keep, out):  # type: ignore[no-untyped-def]
-    """Play of ± half, then a lag that keeps a share of the last value."""
-    held = x[0] if x.size else 0.0
-    y = held
+    """Plays of ± half, then lags that keep a share of the last value: one for each row of out."""
+    held = np.full(half.size, x[0] if x.size else 0.0)
+    y = held.copy()
     for k in range(x.size):
-        held = min(max(held, x[k] - half), x[k] + half)
-        y = keep * y + (1.0 - keep) * held
-        out[k] = y
+        for i in range(half.size):
+            held[i] = min(max(held[i], x[k] - half[i]), x[k] + half[i])
+            y[i] = keep[i] * y[i] + (1.0 - keep[i]) * held[i]
+            out[i, k] = y[i]
 
 
 class _Places(NamedTuple):
@@ -215,14 +221,14 @@ def _places(y: Array, x: Array, use: NDArray[np.bool_], dt: float, margin: int) 
     filled = without_nan(x)
     moved = np.abs(np.diff(filled))[warm : warm + count * length - 1]
     moved = np.r_[moved, 0.0].reshape(count, length).sum(axis=1)
-    kept = first[moved >= np.quantile(moved, _STILL)]
+    kept = first[moved >= quantile_of(moved, _STILL)]
     kept = kept[np.linspace(0, kept.size - 1, min(kept.size, _CHUNKS)).round().astype(np.intp)]
     steps = (kept[:, None] + np.arange(-warm, length + margin)).ravel()
     inside = np.tile(np.r_[np.zeros(warm, np.bool_), np.ones(length, np.bool_), np.zeros(margin, np.bool_)], kept.size)
     good = inside & use[steps] & np.isfinite(x[steps]) & np.isfinite(y[steps])
     reach = max(1, round(_MOTION_S / dt))
     motion = np.abs(np.roll(filled[steps], -reach) - np.roll(filled[steps], reach))
-    at = np.flatnonzero(good & (motion > np.median(motion[good]))) if good.any() else np.zeros(0, np.intp)
+    at = np.flatnonzero(good & (motion > median_of(motion[good]))) if good.any() else np.zeros(0, np.intp)
     at = at[:: max(1, at.size // _PLACES)]
     return _Places(x[steps], at, y[steps][at])
 
@@ -239,7 +245,7 @@ def _at(places: _Places, relation: Relation, dt: float) -> Array:
 def _scale(places: _Places, relation: Relation, dt: float) -> float:
     """Usual size of the misfit: a low quantile, which faults in half of the places leave alone."""
     misfit = np.abs(places.y - relation.gain * _at(places, relation, dt))
-    return max(float(np.nanquantile(misfit, _USUAL)), 1e-12)
+    return max(float(quantile_known(misfit, _USUAL)), 1e-12)
 
 
 def _misfit(places: _Places, relation: Relation, dt: float, scale: float) -> float:
@@ -280,13 +286,14 @@ def _loss(x, at, y, whole, part, gain, scale, most):  # type: ignore[no-untyped-
 
 def _least(places: _Places, trials: Iterable[Relation], dt: float, scale: float) -> tuple[Relation, float]:
     """The trial that leaves least, and what it leaves."""
-    best, least, followed, key = Relation(), np.inf, places.x, (0.0, 0.0)
+    best, least = Relation(), np.inf
     filled = _Filled.of(places.x)
-    for trial in trials:
-        if (trial.lag, trial.play) != key:
-            key = (trial.lag, trial.play)
-            followed = filled.followed(trial.play, trial.lag, dt)
-        misfit = _misfit_of(followed, places, trial, scale, least)
-        if misfit < least:
-            best, least = trial, misfit
+    alike = [(way, list(of)) for way, of in groupby(trials, key=lambda trial: (trial.lag, trial.play))]
+    for first in range(0, len(alike), _AT_ONCE):
+        some = alike[first : first + _AT_ONCE]
+        for (way, of), followed in zip(some, filled.followed([way for way, _ in some], dt), strict=True):
+            for trial in of:
+                misfit = _misfit_of(followed if any(way) else places.x, places, trial, scale, least)
+                if misfit < least:
+                    best, least = trial, misfit
     return best, least

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from replay.arrays.quantiles import median_of, quantile_of
 from replay.machine.config import Machine
 from replay.signals.timeline import Timeline
 
@@ -62,11 +63,11 @@ def zero_of(position: Array, command: Array, fresh: NDArray[np.bool_], dt: float
     for start, first, last in zip(begin, settled, stop, strict=True):
         seen = position[first:last][use[first:last]]
         if seen.size and (last - first) * dt >= _LEAST_S:
-            values.append(float(np.median(seen)))
+            values.append(float(median_of(seen)))
             sides.append(np.sign(np.nan_to_num(command[start - 1])) if start else 0.0)
     if len(values) < _RESTS:
         return 0.0
-    low, zero, high = (float(q) for q in np.quantile(values, (0.25, 0.5, 0.75)))
+    low, zero, high = (float(q) for q in quantile_of(values, (0.25, 0.5, 0.75)))
     agree = high - low <= _ALIKE * abs(zero)
     held = -np.sign(zero) not in sides  # friction leaves a spool on the side that it comes from
     if held or not agree or not _LEAST * span <= abs(zero) <= _MOST * span:
@@ -87,5 +88,5 @@ def _offset(y: Array, x: Array) -> float:
         weighted = design * weight[:, np.newaxis]
         gain, offset = (float(c) for c in np.linalg.solve(weighted.T @ design, weighted.T @ y))
         misfit = np.abs(y - gain * x - offset)
-        weight = 1.0 / np.maximum(misfit, max(float(np.median(misfit)), 1e-9))
+        weight = 1.0 / np.maximum(misfit, max(float(median_of(misfit)), 1e-9))
     return offset

@@ -8,6 +8,8 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from replay.arrays.quantiles import median_known, quantile_known
+
 Array = NDArray[np.float64]
 
 _USUAL, _LARGE = 0.35, 3.0
@@ -27,11 +29,11 @@ def scale_of(x: Array, y: Array) -> float:
     x, y : Array, shape (k,)
         What is expected of a channel with the scale 1, and the channel, at some places in order of time [unit].
     """
-    large = np.abs(x) >= np.nanmedian(np.abs(x))
+    large = np.abs(x) >= median_known(np.abs(x))
     white = _white(y - x)
     gain, near = _explained(x[large], y[large], lambda misfit: _usual_of_few(misfit, white))
     if np.mean(np.abs(y - gain * x) <= near) >= _MOSTLY:
-        gain, _ = _explained(x, y, lambda misfit: float(np.nanquantile(misfit, _USUAL)))
+        gain, _ = _explained(x, y, lambda misfit: float(quantile_known(misfit, _USUAL)))
     return gain if abs(gain - 1.0) < 0.99 * _LARGEST_SCALE else 1.0
 
 
@@ -55,13 +57,13 @@ def _usual_of_few(misfit: Array, white: float) -> float:
     Of these, what differs from place to place by itself is enough, `white` [unit of the misfit].
     """
     few = misfit[misfit > 0.0]
-    usual = float(np.nanquantile(misfit, _USUAL))
+    usual = float(quantile_known(misfit, _USUAL))
     if not few.size:
         return usual
-    least = float(np.nanquantile(few, _FEW))
+    least = float(quantile_known(few, _FEW))
     return min(usual, _OF_FEW * least, max(least, white))
 
 
 def _white(misfit: Array) -> float:
     """Usual size, as a median, of what a misfit (n,) has from place to place: a fault that lasts moves two neighbours alike."""
-    return float(np.nanmedian(np.abs(np.diff(misfit)))) / math.sqrt(2.0) if misfit.size > 1 else 0.0
+    return float(median_known(np.abs(np.diff(misfit)))) / math.sqrt(2.0) if misfit.size > 1 else 0.0

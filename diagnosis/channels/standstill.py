@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from diagnosis.evidence import MissionView
 from replay.arrays.numeric import without_nan
+from replay.arrays.quantiles import median_of, quantile_known
 from replay.arrays.runs import runs_of
 
 Array = NDArray[np.float64]
@@ -63,8 +64,8 @@ def without_noise(y: Array, fresh: Flags, asked: Array, driving_speed: float) ->
     value = y[fresh & np.isfinite(y)]
     if value.size < _LEAST_SAMPLES or not np.isfinite(asked).any():
         return y
-    noise = float(np.median(np.abs(np.diff(value, 2)))) / (np.sqrt(6.0) * _NORMAL)
-    most = min(_NOISE * noise, _OF_ASKED * float(np.nanquantile(np.abs(asked), 0.9)))
+    noise = float(median_of(np.abs(np.diff(value, 2)))) / (np.sqrt(6.0) * _NORMAL)
+    most = min(_NOISE * noise, _OF_ASKED * float(quantile_known(np.abs(asked), 0.9)))
     return y * min(1.0, STILL * driving_speed / most) if most > 0.0 else y
 
 

@@ -13,6 +13,7 @@ from diagnosis.clearing.cells import Array, Cells, Frame
 from diagnosis.clearing.responses import clear_change, growth, largest_change
 from diagnosis.clearing.still import ALIKE, OVERLAP, beyond, dead_bands, stands
 from diagnosis.clearing.valve_lag import in_time
+from replay.arrays.quantiles import median_known, median_of
 
 Flags = NDArray[np.bool_]
 
@@ -140,11 +141,11 @@ def _parted(tried: Sequence[Array]) -> list[float | None]:
     """
     out: list[float | None] = [None] * tried[0].shape[1]
     if len(out) == 1 and min(np.count_nonzero(np.isfinite(off)) for off in tried) >= _LEAST_WINDOWS:
-        out[0] = float(np.median([clear_change(off[:, 0]) for off in tried]))
+        out[0] = float(median_of([clear_change(off[:, 0]) for off in tried]))
     for a, b in pairwise(range(len(out))):
         between = [off[:, a] - off[:, b] for off in tried]
         if min(np.count_nonzero(np.isfinite(x)) for x in between) >= _LEAST_WINDOWS:
-            least = float(np.median([clear_change(x) for x in between]))  # one dead band in three may blur it
+            least = float(median_of([clear_change(x) for x in between]))  # one dead band in three may blur it
             out[a], out[b] = max(out[a] or 0.0, least), max(out[b] or 0.0, least)
     return out
 
@@ -189,7 +190,7 @@ def _off(
     time = frame.sums(steered.astype(np.float64)) * dt
     with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
         log = np.where(time >= _LEAST_S, np.log(np.maximum(frame.sums(ahead) / frame.sums(opened), 1e-3)), np.nan)
-    return np.asarray(log - np.array([float(np.nanmedian(x)) if np.isfinite(x).any() else np.nan for x in log.T]))
+    return np.asarray(log - np.array([float(median_known(x)) if np.isfinite(x).any() else np.nan for x in log.T]))
 
 
 def _evened(ahead: Array, opened: Array, opening: Array, dt: float) -> Array:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.clearing.cells import Array, Cells
+from replay.arrays.quantiles import median_known, median_of, quantile_known, quantile_of
 
 _STEP = 0.02  # of full opening
 #: The dead part is at most this share of the openings that the machine drives with, so that a speed goes by no more than the third power of them.
@@ -50,7 +51,7 @@ def _searched(moved: Array, opened: Array, count: Array, ahead: NDArray[np.bool_
     if np.count_nonzero(rows) < _LEAST_WINDOWS:
         return 0.0
     v, u, n = (x[rows] for x in (np.where(known, moved, np.nan), np.where(known, opened, np.nan), count))
-    most = _MOST * float(np.nanquantile(u / n, _LOW))
+    most = _MOST * float(quantile_known(u / n, _LOW))
     tried = np.arange(0.0, most, _STEP)
     if not tried.size:
         return 0.0
@@ -62,9 +63,9 @@ def _searched(moved: Array, opened: Array, count: Array, ahead: NDArray[np.bool_
 def _apart(moved: Array, opened: Array, ahead: NDArray[np.bool_]) -> float:
     """By how much wheels usually differ per opening at one time, beside how each usually differs that way [ln]."""
     log = np.log(moved / opened)
-    log = log - np.nanmedian(log, axis=1, keepdims=True)
+    log = log - median_known(log, axis=1, keepdims=True)
     for way in (ahead, ~ahead):
         some = np.isfinite(log) & way
-        usual = [float(np.median(x[k])) if k.any() else 0.0 for x, k in zip(log.T, some.T, strict=True)]
+        usual = [float(median_of(x[k])) if k.any() else 0.0 for x, k in zip(log.T, some.T, strict=True)]
         log = np.where(some, log - np.array(usual), log)
-    return float(np.quantile(np.nanmedian(np.abs(log), axis=1), _OFTEN))
+    return float(quantile_of(median_known(np.abs(log), axis=1), _OFTEN))

@@ -16,6 +16,7 @@ from diagnosis.clearing.gauges import Gauges, gauges_of
 from diagnosis.clearing.placements import Placements, placements
 from diagnosis.results.detectability import Detectability, Detectable, Deviation, Powers, Trace
 from diagnosis.results.vocabulary import Kind
+from replay.arrays.quantiles import quantile_of
 from replay.faults import Side
 
 LENGTHS_S = (2.0, 10.0, None)
@@ -121,7 +122,7 @@ def _row(
 ) -> Detectable:
     if unit:
         sizes = (_NOISE_MARGIN if deviation is Deviation.NOISY else _MARGIN[g.kind])[length] * sizes
-    size = float(np.quantile(sizes, _SURE, method="higher")) if sizes.size else np.inf
+    size = float(quantile_of(sizes, _SURE, method="higher")) if sizes.size else np.inf
     if unit == "1" and deviation is Deviation.INEFFICIENT and size > 1.0:
         size = np.inf
     share = None if natural is None or not sizes.size else float(np.mean(sizes <= natural))

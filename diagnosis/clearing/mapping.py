@@ -13,6 +13,7 @@ import numpy as np
 from diagnosis.clearing.cells import Array, Cells
 from diagnosis.clearing.measure import lowest_passed
 from diagnosis.clearing.still import rate_of
+from replay.arrays.quantiles import median_known, median_of
 
 _LAG_S = 0.3  # of what follows a command
 _MOVED = 0.3  # of the largest value: less of it says nothing
@@ -163,7 +164,7 @@ def _hints(
     rest = [i for i in range(len(names)) if i not in told]
     pairs = {i: pair for i in rest if len((pair := _moving(signals[:, i], follows[:, i]))[0]) * cells.dt >= _LEAST_S}
     ratios = {i: _ratio(*pair) for i, pair in pairs.items()}
-    usual = float(np.median([r for r in ratios.values() if np.isfinite(r)] or [0.0]))
+    usual = float(median_of([r for r in ratios.values() if np.isfinite(r)] or [0.0]))
     known = [r for r in ratios.values() if np.isfinite(r)]
     all_alike = len(known) >= _ALL and len(known) == len(names) and float(np.ptp(known)) < _ONE_FACTOR
     for i, (y, x) in pairs.items():
@@ -198,16 +199,16 @@ def _believed(works: Array, follows: Array, i: int, ratio: float) -> bool:
     others = np.delete(asked, i)
     if np.count_nonzero(np.isfinite(others)) < _OTHERS or not np.isfinite(asked[i]):
         return False
-    more = asked[i] - float(np.nanmedian(others))
+    more = asked[i] - float(median_known(others))
     return bool(more * np.sign(-ratio) > _ASKS_MORE)
 
 
 def _asked(u: Array, x: Array) -> float:
     """ln of an opening by the commanded speed; NaN where it is not known."""
     opening, speed = _moving(np.abs(u), np.abs(x))
-    if not opening.size or not np.median(opening) > 0.0:
+    if not opening.size or not median_of(opening) > 0.0:
         return np.nan
-    return float(np.log(np.median(opening / speed)))
+    return float(np.log(median_of(opening / speed)))
 
 
 def _part(name: str) -> str:
@@ -237,8 +238,8 @@ def _ratio(y: Array, x: Array) -> float:
     ratio = ratio[np.isfinite(ratio)]
     if ratio.size < 0.9 * x.size:
         return np.nan
-    middle = float(np.median(ratio))
-    return middle if 1.4826 * float(np.median(np.abs(ratio - middle))) < _EVEN else np.nan
+    middle = float(median_of(ratio))
+    return middle if 1.4826 * float(median_of(np.abs(ratio - middle))) < _EVEN else np.nan
 
 
 def _throughout(y: Array, x: Array, ratio: float, dt: float) -> bool:
@@ -252,7 +253,7 @@ def _throughout(y: Array, x: Array, ratio: float, dt: float) -> bool:
         return True
     with np.errstate(divide="ignore", invalid="ignore"):
         size = np.log(np.abs(y[: count * width]) / np.abs(x[: count * width])).reshape(count, width)
-    right = np.abs(np.median(size, axis=1)) < _NEARER * abs(ratio)
+    right = np.abs(median_of(size, axis=1)) < _NEARER * abs(ratio)
     return bool(np.count_nonzero(right) * width * dt < _ELSE_S)
 
 

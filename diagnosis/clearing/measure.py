@@ -12,6 +12,7 @@ from diagnosis.clearing.cells import Array, Cells, Frame
 from diagnosis.estimation.lag import low_passed
 from diagnosis.results.clearing import Check, Checked
 from diagnosis.results.vocabulary import Kind
+from replay.arrays.quantiles import median_of, quantile_known
 from replay.faults import Side
 
 _EVEN_S = 0.2  # over which a channel and its reference are evened: two healthy instruments differ in lag
@@ -147,8 +148,8 @@ def _best_lag(cells: Cells, openings: Array, commands: Array, floor: float) -> i
 
     def left(k: int) -> float:
         usual = [compared(cells, y, behind(x, cells.dt, _LAGS_S[k]), floor).off for y, x in pairs]
-        known = [float(np.nanquantile(off, _FOLLOWED)) for off in usual if np.isfinite(off).any()]
-        return float(np.median(known)) if known else float("inf")
+        known = [float(quantile_known(off, _FOLLOWED)) for off in usual if np.isfinite(off).any()]
+        return float(median_of(known)) if known else float("inf")
 
     return min(range(len(_LAGS_S)), key=left)
 
@@ -250,7 +251,7 @@ def worst(
     k = int(np.nanargmax(values))
     start = float(cells.frame.starts[k] * cells.dt)
     stop = min(start + cells.frame.length * cells.dt, cells.timeline.size * cells.timeline.dt)
-    usual = float(np.nanquantile(np.abs(values), _SURE))
+    usual = float(quantile_known(np.abs(values), _SURE))
     return Checked(*part, float(values[k]), limit, start, stop, _shown(part[3], limit + usual))
 
 

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from diagnosis.clearing.cells import Array, Cells
 from diagnosis.clearing.responses import Responses
+from replay.arrays.quantiles import median_of
 
 #: Of the loss that counts [ln]: of 26 healthy missions of 14 machines that are cleared (tuning) one had a half of it, one 0.43.
 FALLS = 0.6
@@ -42,7 +43,7 @@ def _fall(responses: Responses, cells: Cells, own: Array) -> Array:
         x = own[way & np.isfinite(own).all(axis=1)]
         least = max(_LEAST_WINDOWS, round(_PART * len(x)))
         for k in range(least, len(x) - least + 1, max(1, len(x) // _SPLITS)):
-            change = np.median(x[k:], axis=0) - np.median(x[:k], axis=0)
+            change = median_of(x[k:], axis=0) - median_of(x[:k], axis=0)
             for a, b in combinations(range(count), 2):
                 others = np.abs(np.delete(change, (a, b))).max()
                 more = max(0.0, -max(change[a], change[b]) - others)

@@ -12,6 +12,7 @@ from diagnosis.clearing.cells import Array, Cells
 from diagnosis.clearing.dead_openings import beyond, dead_opening
 from diagnosis.clearing.measure import lowest_passed
 from diagnosis.clearing.turn_slope import turn_slope
+from replay.arrays.quantiles import median_known, median_of
 
 LAG_S = 0.15  #: Of a valve and its drive [s].
 SETTLED_S, SETTLED = 0.6, 0.03  #: a command that has changed by less than this [m/s] over this time
@@ -181,13 +182,13 @@ def _beside(cells: Cells, sums: _Sums, opened: Array, *, over_time: bool, slope:
         for way in ways_apart:
             here = way & np.isfinite(own)
             lasts = np.count_nonzero(here) * frame.hop * cells.dt >= _USUAL_S
-            ways.append(float(np.median(own[here])) if lasts else None)
+            ways.append(float(median_of(own[here])) if lasts else None)
         for k, middle in enumerate(ways):
             here = ways_apart[k] & np.isfinite(own)
             usual += [] if middle is None else [middle]
             if here.any():  # what is too short to be usual is held to the other way's usual one: it may be all fault
                 either = [x for x in (middle, ways[1 - k]) if x is not None]
-                expected = either[0] if either else float(np.median(own[here]))
+                expected = either[0] if either else float(median_of(own[here]))
                 off[ways_apart[k], i] = log[ways_apart[k], i] - expected
         asked = over_time and bool(usual)
         changes.append(largest_change(own, ways_apart) if asked else None)
@@ -210,7 +211,7 @@ def largest_change(log: Array, ways: Sequence[NDArray[np.bool_]]) -> float:
         x = log[way & np.isfinite(log)]
         least = max(_LEAST_WINDOWS, round(_PART * x.size))
         for k in range(least, x.size - least + 1, max(1, x.size // 40)):
-            largest = max(largest, abs(_median(x[:k]) - _median(x[k:])))
+            largest = max(largest, abs(median_of(x[:k]) - median_of(x[k:])))
     return float(largest)
 
 
@@ -226,7 +227,7 @@ def growth(log: Array, ways: Sequence[NDArray[np.bool_]]) -> float:
         if n < _GROWS:
             continue
         apart = [(at[:-k], at[k:]) for k in range(n // 3, 2 * n // 3 + 1, max(1, n // 24))]
-        pace = _median(np.concatenate([(log[b] - log[a]) / (b - a) for a, b in apart]))
+        pace = median_of(np.concatenate([(log[b] - log[a]) / (b - a) for a, b in apart]))
         largest = max(largest, 0.5 * abs(pace) * float(at[-1] - at[0]))
     return largest
 
@@ -236,17 +237,8 @@ def clear_change(log: Array) -> float:
     every, at = [np.ones(log.size, np.bool_)], np.flatnonzero(np.isfinite(log))
     change = max(largest_change(log, every), growth(log, every))
     about = log[at] - np.polyval(np.polyfit(at, log[at], 1), at)
-    scatter = _NORMAL * float(np.median(np.abs(about - np.median(about))))
+    scatter = _NORMAL * float(median_of(np.abs(about - median_of(about))))
     return change if change >= _CLEARLY * scatter else 0.0
-
-
-def _median(x: Array) -> float:
-    """Median of finite values; `np.median` looks for NaN and axes first, which takes most of its time here."""
-    half = x.size // 2
-    if x.size % 2:
-        return float(np.partition(x, half)[half])
-    low, high = np.partition(x, [half - 1, half])[half - 1 : half + 1]
-    return float((low + high) / 2.0)
 
 
 def largest(windows: Array) -> Array:
@@ -262,5 +254,5 @@ def others_at(x: Array, among: Sequence[int] | None = None) -> Array:
     for i in columns:
         rest = x[:, [j for j in (columns if among is None else among) if j != i]]
         enough = np.isfinite(rest).sum(axis=1) >= min(OTHERS, rest.shape[1])
-        out[enough, i] = np.nanmedian(rest[enough], axis=1)
+        out[enough, i] = median_known(rest[enough], axis=1)
     return out

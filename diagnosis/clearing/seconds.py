@@ -8,6 +8,7 @@ import numpy as np
 
 from diagnosis.clearing.cells import Array, Cells
 from diagnosis.clearing.measure import alone, behind, compared
+from replay.arrays.quantiles import median_of, quantile_known
 
 _LAGS_S = (0.0, 0.05, 0.1, 0.15, 0.2, 0.3)  # of one instrument behind the other
 _FOLLOWED = 0.8  # quantile of the windows: lag shows where speeds change
@@ -47,8 +48,8 @@ def off_second(cells: Cells, speed: Array, second: Array, floor: float) -> Array
     for of_second, of_speed in tried:
         y, x = behind(speed, cells.dt, of_speed), behind(second, cells.dt, of_second)
         off = np.column_stack([compared(cells, y[:, i], x[:, i], floor).off for i in range(count)])
-        known = [float(np.nanquantile(z, _FOLLOWED)) for z in off[:, both].T if np.isfinite(z).any()]
-        left = float(np.median(known)) if known else np.inf
+        known = [float(quantile_known(z, _FOLLOWED)) for z in off[:, both].T if np.isfinite(z).any()]
+        left = float(median_of(known)) if known else np.inf
         if left < least or not (of_second or of_speed):
             best, least = off, left
     return less_at_starts(best)

@@ -10,6 +10,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from replay.arrays.quantiles import median_known, median_of, quantile_of
+
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
@@ -38,7 +40,7 @@ def turn_slope(log: Array, asked: Array, ahead: Flags) -> float:
     known = slopes[np.isfinite(slopes)]
     if known.size < _WHEELS:
         return 0.0
-    middle = float(np.median(known))
+    middle = float(median_of(known))
     agree = np.count_nonzero(np.abs(known - middle) <= max(_AGREE, _AGREE_SHARE * abs(middle)))
     if not _LEAST <= middle <= _MOST or agree < max(known.size - 1, 2):
         return 0.0
@@ -62,7 +64,7 @@ def _slope(log: Array, asked: Array, ahead: Flags) -> float:
 
 def _centred(log: Array, asked: Array, slope: float) -> tuple[Array, Array]:
     """Both of a way, from where most windows of it lie by such a slope on: `asked` from straight on, `log` less its intercept."""
-    return asked, log - float(np.median(log - slope * asked))
+    return asked, log - float(median_of(log - slope * asked))
 
 
 def _weighted_median(x: Array, weight: Array) -> float:
@@ -76,6 +78,6 @@ def _usually_off(log: Array, asked: Array, ahead: Flags) -> float:
     off = []
     for y, x, way in zip(log.T, asked.T, ahead.T, strict=True):
         known = np.isfinite(y) & np.isfinite(x)
-        parts = [np.abs(y[k] - np.median(y[k])) for k in (known & way, known & ~way) if np.count_nonzero(k)]
-        off.append(float(np.quantile(np.concatenate(parts), _OFTEN)) if parts else np.nan)
-    return float(np.nanmedian(off))
+        parts = [np.abs(y[k] - median_of(y[k])) for k in (known & way, known & ~way) if np.count_nonzero(k)]
+        off.append(float(quantile_of(np.concatenate(parts), _OFTEN)) if parts else np.nan)
+    return float(median_known(off))

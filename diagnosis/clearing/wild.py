@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from diagnosis.clearing.cells import Array, Cells
 from diagnosis.clearing.leaps import heights
 from replay.arrays.blocks import release
+from replay.arrays.quantiles import median_of
 
 _NOISES, _OF_TOP = 8.0, 0.1  # times the usual noise, and share of the top speed, from which on a reading is wild
 _TURNING = 20  # readings that tell its noise while it turns
@@ -68,4 +69,4 @@ def _usual(v: Array, driving_speed: float) -> float:
     second = np.abs(v[2:] + v[:-2] - 2.0 * v[1:-1])
     turns = np.minimum(np.abs(v[2:]), np.abs(v[:-2])) > driving_speed
     some = [second, second[turns]] if np.count_nonzero(turns) >= _TURNING else [second]
-    return max(float(np.median(s)) for s in some) / 0.6745 / float(np.sqrt(6.0))
+    return max(float(median_of(s)) for s in some) / 0.6745 / float(np.sqrt(6.0))

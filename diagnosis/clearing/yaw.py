@@ -16,6 +16,7 @@ from diagnosis.clearing.cells import Array, Cells
 from diagnosis.clearing.measure import lasts, worst
 from diagnosis.results.clearing import Check, Checked
 from diagnosis.results.vocabulary import Kind
+from replay.arrays.quantiles import median_known, median_of
 from replay.faults import Side
 from replay.machine.config import Machine
 
@@ -48,9 +49,9 @@ def yaw_checks(cells: Cells) -> Iterator[Checked]:
     looked_at = off.in_turns(cells) if straight is None else straight
     if looked_at is None:
         return
-    windows, lasting = np.abs(cells.frame.mean(looked_at)), abs(float(np.nanmedian(looked_at)))
+    windows, lasting = np.abs(cells.frame.mean(looked_at)), abs(float(median_known(looked_at)))
     turns = None if off.by_wheels else off.in_turns(cells)
-    lasting = lasting if turns is None else max(lasting, abs(float(np.nanmedian(turns))))
+    lasting = lasting if turns is None else max(lasting, abs(float(median_known(turns))))
     told = bool(np.isfinite(windows).any()) and not (off.by_wheels and straight is None)  # in turns wheels slip
     sides = _by_sound_wheels(cells.machine) if off.by_wheels else 0.0
     for end in turning_ends(cells.machine).values():
@@ -238,9 +239,9 @@ def _path(cells: Cells, leaf: str = "phi") -> _Path | None:
         return None
     angle = np.column_stack([np.mean([by_name[name] for name in end], axis=0) for end in (one, other)])
     known = np.asarray(np.isfinite(speeds).any(axis=1))
-    speed = np.nanmedian(np.where(known[:, np.newaxis], speeds, 0.0), axis=1)
+    speed = median_known(np.where(known[:, np.newaxis], speeds, 0.0), axis=1)
     rest = known & (np.abs(speed) < _STILL) & np.isfinite(yaw)
-    bias = float(np.median(yaw[rest])) if np.count_nonzero(rest) * cells.dt >= _STILL_S else 0.0
+    bias = float(median_of(yaw[rest])) if np.count_nonzero(rest) * cells.dt >= _STILL_S else 0.0
     moving = np.abs(speed) > _MOVING * cells.machine.max_speed
     turn = np.tan(angle[:, 0]) - np.tan(angle[:, 1])
     return _Path(yaw - bias, speed, moving, turn, length, by_wheels)

@@ -28,6 +28,7 @@ from diagnosis.results.machine_event import (
 )
 from diagnosis.results.plain_numbers import plain
 from diagnosis.results.said import Said, Stated
+from replay.arrays.quantiles import median_known, median_of, quantile_of
 from replay.arrays.runs import runs_of
 
 Flags = NDArray[np.bool_]
@@ -96,7 +97,7 @@ def _median(x: Array) -> Array:
     """Size of the median of the wheels, NaN where hardly half of them are known; from shape (cells, wheels) to (cells,)."""
     known = np.isfinite(x).sum(axis=1) > x.shape[1] / 2
     out = np.full(len(x), np.nan)
-    out[known] = np.abs(np.nanmedian(x[known], axis=1))
+    out[known] = np.abs(median_known(x[known], axis=1))
     return out
 
 
@@ -109,7 +110,7 @@ def _largest(x: Array) -> Array:
 def _usual(size: Array) -> float:
     """What a size of shape (cells,) usually is while it is anything; infinite where it never is."""
     some = size[np.nan_to_num(size) > 0.0]
-    return float(np.quantile(some, _USUAL)) if some.size else np.inf
+    return float(quantile_of(some, _USUAL)) if some.size else np.inf
 
 
 def _course(cells: Cells, of: Array, by: Array, use: Flags) -> Course:
@@ -169,11 +170,11 @@ def _falls_behind(course: Course, counts: float) -> Said | None:
     hop = course.cells.frame.hop * course.cells.dt
     if spell is not None:
         first, last = int(at[spell[0]]), int(at[spell[1] - 1]) + 1
-        inside, when = float(np.median(course.share[at[slice(*spell)]])), Stated.of(*course.span(first, last), digits=0)
+        inside, when = float(median_of(course.share[at[slice(*spell)]])), Stated.of(*course.span(first, last), digits=0)
         return Said(f"{inside:.2f} times what they are told at {when}, and {course.usual:.2f} times else", (when.span,))
     if np.count_nonzero(behind) * hop < _AGAIN_S:
         return None
-    inside = float(np.median(course.share[at[behind]]))
+    inside = float(median_of(course.share[at[behind]]))
     text = f"{inside:.2f} times what they are told again and again, for {np.count_nonzero(behind) * hop:.0f} s in all, and {course.usual:.2f} times else"
     return Said(text, tuple(course.span(int(at[a]), int(at[b - 1]) + 1) for a, b in runs_of(behind)))
 
@@ -208,7 +209,7 @@ def _at_rest(cells: Cells) -> Iterator[MachineEvent]:
         a, b = max(spells, key=lambda s: s[1] - s[0])
         when = Stated.of(a * cells.dt, b * cells.dt)
         text = (
-            f"All {{wheels}} read about {plain(float(np.nanmedian(v[a:b])), 2)} {{speed_unit}} at {when}, while they are told to "
+            f"All {{wheels}} read about {plain(float(median_known(v[a:b])), 2)} {{speed_unit}} at {when}, while they are told to "
             "stand and no {valve} is open"
         )
         yield Said(text, (when.span,)).event(not_at_rest)
@@ -240,7 +241,7 @@ def _contradicts(course: Course, counts: float) -> Said | None:
     spell = course.longest(np.abs(np.nan_to_num(course.log - np.log(max(course.usual, FLOOR)))) >= counts, _SPELL_S)
     if spell is None:
         return None
-    inside, when = float(np.nanmedian(course.share[slice(*spell)])), Stated.of(*course.span(*spell), digits=0)
+    inside, when = float(median_known(course.share[slice(*spell)])), Stated.of(*course.span(*spell), digits=0)
     return Said(
         f"{inside:.2f} times as fast as by its {{wheels}} at {when}, and {course.usual:.2f} times else", (when.span,)
     )
@@ -290,7 +291,7 @@ def _turns_otherwise(course: Course, counts: float) -> Said | None:
     spell = deaf or wild
     if spell is not None:
         when = Stated.of(*course.span(*spell), digits=0)
-        return Said(f"{_turning(float(np.median(share[slice(*spell)])))} {what} at {when}", (when.span,))
+        return Said(f"{_turning(float(median_of(share[slice(*spell)])))} {what} at {when}", (when.span,))
     found = course.changes(what, counts, _MANY) or course.changes(what, _FEW_CHANGE * counts, FEW)
     return None if found is None else found._replace(text=f"turns {found.text}")
 

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from diagnosis.clearing.cells import Array, Cells
 from diagnosis.clearing.responses import responses_of
+from replay.arrays.quantiles import median_known, median_of, quantile_known, quantile_of
 
 _LEVEL = 0.12  # ln of the speed: as wide are speeds that are alike
 _LEAST, _EACH = 20, 3  # windows before and after, in all, and at a level
@@ -98,7 +99,7 @@ def _of_all(cells: Cells) -> _Common:
     own = found.own[:, cells.driven]
     known = np.isfinite(own).sum(axis=1) >= _KNOWN * own.shape[1]
     common = np.full(len(own), np.nan)
-    common[known] = np.nanmedian(own[known], axis=1)
+    common[known] = median_known(own[known], axis=1)
     common[np.column_stack([cells.explained(wheel) for wheel in cells.machine.wheels]).any(axis=1)] = np.nan
     levels = cells.frame.mean(_median(speed)), cells.frame.mean(_median(used[:, cells.driven]))
     ways = np.asarray(found.ahead.all(axis=1)), np.asarray(~found.ahead.any(axis=1))
@@ -119,7 +120,7 @@ def _unusual(level: Array, response: Array) -> Array:
     for place in np.unique(places):
         inside = places == place
         if np.count_nonzero(inside) >= _ALIKE:
-            out[inside] = response[inside] - np.median(response[inside])
+            out[inside] = response[inside] - median_of(response[inside])
     return out
 
 
@@ -145,16 +146,16 @@ def _spell(at: NDArray[np.intp], off: Array, width: int) -> _Spell | None:
     starts = np.flatnonzero(np.isfinite(windows).sum(axis=1) >= _FULL * width)
     if not starts.size:
         return None
-    low, high = np.nanquantile(windows[starts], (_LOW, _HIGH), axis=1)
+    low, high = quantile_known(windows[starts], (_LOW, _HIGH), axis=1)
     least = np.where(low * high <= 0.0, 0.0, np.where(low > 0.0, low, high))
     k = int(np.argmax(np.abs(least)))
-    return _Spell(float(least[k]), int(starts[k]), float(np.median(np.abs(off[np.isfinite(off)]))))
+    return _Spell(float(least[k]), int(starts[k]), float(median_of(np.abs(off[np.isfinite(off)]))))
 
 
 def _median(speed: Array) -> Array:
     known = np.isfinite(speed).any(axis=1)
     out = np.full(len(speed), np.nan)
-    out[known] = np.abs(np.nanmedian(speed[known], axis=1))
+    out[known] = np.abs(median_known(speed[known], axis=1))
     return out
 
 
@@ -169,13 +170,13 @@ def _largest(level: Array, common: Array) -> tuple[float, int] | None:
         changes, weights, before, left = [], [], 0, 0.0
         for inside in bins:
             parts = [common[inside[inside < k]], common[inside[inside >= k]]]
-            left += sum(float(np.abs(x - np.median(x)).sum()) for x in parts if x.size)
+            left += sum(float(np.abs(x - median_of(x)).sum()) for x in parts if x.size)
             early, late = parts
             if min(early.size, late.size) >= _EACH:
-                changes.append(float(np.median(late) - np.median(early)))
+                changes.append(float(median_of(late) - median_of(early)))
                 weights.append(late.size)
                 before += early.size
         if min(before, sum(weights)) >= _LEAST and (best is None or left < best[0]):
-            low, high = np.quantile(np.repeat(changes, weights), (_LOW, _HIGH))
+            low, high = quantile_of(np.repeat(changes, weights), (_LOW, _HIGH))
             best = left, 0.0 if low * high <= 0.0 else float(low if low > 0.0 else high), k
     return None if best is None else best[1:]

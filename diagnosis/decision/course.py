@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from diagnosis.clearing.cells import Array, Cells
 from diagnosis.results.said import Said, Stated
+from replay.arrays.quantiles import median_of, quantile_of
 from replay.arrays.runs import runs_of
 
 Flags = NDArray[np.bool_]
@@ -42,14 +43,14 @@ class Course(NamedTuple):
     def usual(self) -> float:
         """Median of the share [1]; NaN where few windows are known."""
         known = self.share[np.isfinite(self.share)]
-        return float(np.median(known)) if known.size >= FEW else np.nan
+        return float(median_of(known)) if known.size >= FEW else np.nan
 
     def mostly(self, middle: float, counts: float) -> bool:
         """Whether the share is not 1, by `middle` in its median and by `counts` nearly always the same way [ln]."""
         known = self.share[np.isfinite(self.share)]
         if known.size < FEW:
             return False
-        low, median, high = np.log(np.maximum(np.quantile(known, (*_NEARLY_ALL, 0.5)), FLOOR))[[0, 2, 1]]
+        low, median, high = np.log(np.maximum(quantile_of(known, (*_NEARLY_ALL, 0.5)), FLOOR))[[0, 2, 1]]
         return bool(abs(median) >= middle and (high <= -counts or low >= counts))
 
     def changes(self, what: str, counts: float, least: int) -> Said | None:
@@ -64,12 +65,12 @@ class Course(NamedTuple):
 
         def left(k: int) -> float:
             """What medians before and after a window leave."""
-            return float(sum(np.abs(part - np.median(part)).sum() for part in (x[:k], x[k:])))
+            return float(sum(np.abs(part - median_of(part)).sum() for part in (x[:k], x[k:])))
 
         step = max(1, n // _CUTS)
         k = min(range(least, n - least + 1, step), key=left)
         k = min(range(max(least, k - step + 1), min(n - least, k + step - 1) + 1), key=left)
-        one, other = float(np.median(x[:k])), float(np.median(x[k:]))
+        one, other = float(median_of(x[:k])), float(median_of(x[k:]))
         if abs(one - other) < counts:
             return None
         last, first = self.span(int(at[k - 1]), int(at[k - 1]) + 1)[1], self.span(int(at[k]), n)[0]

@@ -21,6 +21,7 @@ from diagnosis.results.plain_numbers import plain, with_minus_signs
 from diagnosis.results.wheel_model import WheelModelFit
 from replay.arrays.blocks import blocks, release
 from replay.arrays.processors import each
+from replay.arrays.quantiles import quantile_of
 from replay.clocks.source_clock import SourceClock
 from replay.machine.config import Machine
 from replay.signals.signal import Signal, Signals
@@ -239,7 +240,7 @@ def _jitter_ms(signals: Signals, timeline: Timeline) -> float:
         period, place = timeline.periods_ns[name], signal.stamps.__array_interface__["data"][0]
         if name.startswith("wheel.") and 0 < period < 2 * timeline.step_ns and signal.stamps.size > 2:
             if place not in seen:
-                out = max(out, float(np.quantile(np.abs(np.diff(signal.stamps) - period), 0.99)) * 1e-6)
+                out = max(out, float(quantile_of(np.abs(np.diff(signal.stamps) - period), 0.99)) * 1e-6)
                 release(signal.stamps)
             seen.add(place)
     return out

@@ -17,6 +17,7 @@ from diagnosis.decision.turn_scale import ANGLE, GYRO, SECOND_ANGLES, Meant, fac
 from diagnosis.response.body import BodySpeed, body_speeds
 from diagnosis.results.machine_event import MachineEvent, other_angle, other_turn, other_yaw_rate
 from diagnosis.results.plain_numbers import plain
+from replay.arrays.quantiles import median_known, median_of, quantile_of
 from replay.machine.geometry import Geometry
 from replay.machine.units import known_unit
 
@@ -251,10 +252,10 @@ def _turning(cells: Cells, speeds: Array, by: float, agreeing: tuple[str, ...]) 
     known = np.abs(expected[np.isfinite(expected)])
     if not known.size:
         return
-    on_the_spot = np.abs(np.nan_to_num(expected)) > _STILL * float(np.quantile(known, _USUAL))
+    on_the_spot = np.abs(np.nan_to_num(expected)) > _STILL * float(quantile_of(known, _USUAL))
     rest = (np.abs(v) < _STILL * usual) & ~on_the_spot & np.isfinite(yaw)
-    yaw = yaw - (float(np.median(yaw[rest])) if np.count_nonzero(rest) * cells.dt >= _STILL_S else 0.0)
-    turning = (np.abs(expected) > _MOVES * float(np.quantile(known, _USUAL))) & (expected * yaw > 0.0)
+    yaw = yaw - (float(median_of(yaw[rest])) if np.count_nonzero(rest) * cells.dt >= _STILL_S else 0.0)
+    turning = (np.abs(expected) > _MOVES * float(quantile_of(known, _USUAL))) & (expected * yaw > 0.0)
     factor = factor_of(np.abs(yaw), np.abs(expected), turning, cells.dt)
     if factor is not None:
         others = meant(cells, v, expected, turning, factor, agreeing) if by == 1.0 else Meant()
@@ -292,6 +293,6 @@ def _median(speeds: Array) -> tuple[Array, float]:
     """Median of the wheels, shape (cells,), NaN where none is known; and how fast it usually is."""
     known = np.isfinite(speeds).any(axis=1)
     v = np.full(len(speeds), np.nan)
-    v[known] = np.nanmedian(speeds[known], axis=1)
+    v[known] = median_known(speeds[known], axis=1)
     moving = np.abs(v[known])
-    return v, float(np.quantile(moving[moving > 0.0], _USUAL)) if (moving > 0.0).any() else np.inf
+    return v, float(quantile_of(moving[moving > 0.0], _USUAL)) if (moving > 0.0).any() else np.inf

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from diagnosis.estimation.second_onset import SAMPLES, Readings, Second, channel_model, second_onsets
 from diagnosis.results.assessment import Assessment, Finding
 from diagnosis.results.vocabulary import Tier
+from replay.arrays.quantiles import median_known
 from replay.faults import FaultMode, Side, State
 
 Array = NDArray[np.float64]
@@ -77,7 +78,7 @@ def _around(finding: Finding, a: Assessment, dt: float) -> _Around | None:
     residual, threshold, expected = (c[::stride] for c in columns)
     y = residual + expected
     known = np.isfinite(y)
-    noise = float(np.nanmedian(threshold)) / 3.0 if np.isfinite(threshold).any() else 0.0
+    noise = float(median_known(threshold)) / 3.0 if np.isfinite(threshold).any() else 0.0
     later = first + np.arange(y.size) * stride >= finding.start
     silent = bool(known[~later].any()) and 4.0 * known[later].mean() < known[~later].mean()  # nothing to step over
     if not known.any() or noise <= 0.0 or silent:

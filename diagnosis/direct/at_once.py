@@ -17,6 +17,7 @@ from diagnosis.direct.identification import IdentifiedPair
 from diagnosis.direct.low_speed import evened_off, in_lasting, left_open
 from diagnosis.results.assessment import CODE, Assessment, Finding
 from replay.arrays.numeric import without_nan
+from replay.arrays.quantiles import quantile_of
 from replay.arrays.sliding import largest_within
 from replay.faults import State
 
@@ -47,7 +48,7 @@ def without_shared_moments(
     if len(found) < _SENSORS or not any(a.findings for a in assessments.values()):
         return dict(assessments)
     off = {w: evened_off(one) for w, one in found.items()}
-    top = max(float(np.quantile(np.abs(without_nan(one.samples.x)), _TOP)) for one in found.values())
+    top = max(float(quantile_of(np.abs(without_nan(one.samples.x)), _TOP)) for one in found.values())
     steady = {w: _steady(one, top) for w, one in found.items()}
     own, lasting = {}, {}
     for w, one in found.items():

@@ -34,6 +34,7 @@ from diagnosis.results.assessment import Finding
 from diagnosis.results.fault_rows import ROWS, codes_of
 from diagnosis.results.result import Epsilon, Hypothesis
 from diagnosis.results.vocabulary import Tier
+from replay.arrays.quantiles import median_of, quantile_known
 from replay.faults import FaultMode, Side
 from replay.machine.config import Limits
 
@@ -237,7 +238,7 @@ def _hysteresis(isolated: Isolated, found: IdentifiedPair) -> bool:
         return False
     brief = int(np.count_nonzero(seen.use)) * found.model.dt < _RESTS_S  # a channel may be slower than the timeline
     both = np.maximum(np.abs(seen.y[seen.use]), np.abs(seen.x[seen.use]))
-    rests = float(np.nanquantile(both, _MOSTLY)) < _MIDDLE * pair.span
+    rests = float(quantile_known(both, _MOSTLY)) < _MIDDLE * pair.span
     return rests or (brief and seen.deviation < min(_HYSTERESIS * pair.span, _OF_USUAL * found.usually_off))
 
 
@@ -259,7 +260,7 @@ def _beyond_its_range(isolated: Isolated, found: IdentifiedPair) -> bool:
     if found.pair.side is not Side.SENSOR or not seen.use.any():
         return False
     y, x = seen.y[seen.use], seen.x[seen.use]
-    most, sign = float(np.nanmax(np.abs(found.pair.y))), float(np.sign(np.median(y)))
+    most, sign = float(np.nanmax(np.abs(found.pair.y))), float(np.sign(median_of(y)))
     every = found.pair.y[np.isfinite(found.pair.y)]
     if float(np.mean(np.abs(every) < _LESS * most)) < _SHOWN:
         return False

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from diagnosis.channels.sample_status import PAIR
 from diagnosis.estimation.samples import Samples
 from replay.arrays.numeric import without_nan
+from replay.arrays.quantiles import median_of, quantile_of
 
 Array = NDArray[np.float64]
 
@@ -65,8 +66,8 @@ class GainWindows(NamedTuple):
         driven[start // self.width : -(-stop // self.width)] = False
         if np.count_nonzero(driven) < _GAIN_WINDOWS:
             return None
-        usual = float(np.median(np.abs(self.moved[driven] / self.power[driven] - 1.0)) / _NORMAL_MEDIAN)
-        size = float(np.sqrt(np.median(self.power[driven]) / self.width))
+        usual = float(median_of(np.abs(self.moved[driven] / self.power[driven] - 1.0)) / _NORMAL_MEDIAN)
+        size = float(np.sqrt(median_of(self.power[driven]) / self.width))
         return GainSpread(min(max(usual, LEAST_SPREAD), _MOST_SPREAD), size)
 
 
@@ -75,7 +76,7 @@ def usual_spread(own: Sequence[GainSpread | None]) -> GainSpread:
     known = [s for s in own if s is not None]
     if not known:
         return GainSpread(LEAST_SPREAD, 0.0)
-    share, size = (float(x) for x in np.quantile(np.array(known), 0.5, axis=0, method="lower"))
+    share, size = (float(x) for x in quantile_of(np.array(known), 0.5, axis=0, method="lower"))
     return GainSpread(min(_OF_FEW * share, _MOST_SPREAD), size)
 
 

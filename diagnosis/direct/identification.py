@@ -27,6 +27,7 @@ from diagnosis.direct.uncertainty import HealthyNoise, uncertainty_of
 from diagnosis.estimation.fault_models import ModeModel
 from diagnosis.estimation.samples import Samples
 from replay.arrays.numeric import without_nan
+from replay.arrays.quantiles import quantile_of
 from replay.arrays.sliding import largest_within
 from replay.faults import Side
 from replay.machine.config import Limits
@@ -143,7 +144,7 @@ class IdentifiedPair:
         """By how much y is off its reference at most, nearly all of the mission [unit]; infinite where both are never known."""
         y, x, status, *_ = self.samples
         use = np.isin(status, (PAIR, BLIND)) & np.isfinite(y) & np.isfinite(x)
-        return float(np.quantile(np.abs(y - x)[use], _NEARLY_ALL)) if use.any() else np.inf
+        return float(quantile_of(np.abs(y - x)[use], _NEARLY_ALL)) if use.any() else np.inf
 
     @cached_property
     def _gains(self) -> GainWindows:

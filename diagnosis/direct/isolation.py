@@ -28,6 +28,7 @@ from diagnosis.estimation.row_probability import row_probabilities
 from diagnosis.estimation.segments import Run
 from diagnosis.results.fault_rows import codes_of
 from diagnosis.results.result import Epsilon, Sat
+from replay.arrays.quantiles import median_of
 from replay.faults import Side
 
 Array = NDArray[np.float64]
@@ -119,7 +120,7 @@ def run_samples(run: Run, found: IdentifiedPair, min_sat: float = 0.0) -> RunSam
     slack = 3 * model.constant_noise / np.sqrt(min(use.sum(), 100)) + 0.6 * play if use.any() else 0.0
     size = float(np.sqrt(np.mean(y[use] ** 2))) if use.any() else 0.0
     loud = size > _NOTHING * found.pair.span
-    middle = abs(float(np.median(y[use]))) if use.any() else 0.0
+    middle = abs(float(median_of(y[use]))) if use.any() else 0.0
     rests = zero_level(found.pair.span, min_sat) if found.pair.side is Side.SENSOR else min_sat
     zero = (middle <= slack and not loud) or (middle <= max(slack, rests) and size <= min_sat)
     still = bool(use.any()) and _hardly_moves(y[use], x[use], 2 * noise, 2 * play)

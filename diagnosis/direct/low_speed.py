@@ -18,6 +18,7 @@ from diagnosis.channels.sample_status import PAIR
 from diagnosis.direct.identification import IdentifiedPair
 from diagnosis.results.assessment import CODE, Assessment, Finding
 from replay.arrays.numeric import without_nan
+from replay.arrays.quantiles import median_of, quantile_of
 from replay.arrays.runs import runs_of
 from replay.faults import State
 
@@ -47,13 +48,13 @@ def without_low_speed_habit(
     if len(found) < _SENSORS or not any(a.findings for a in assessments.values()):
         return dict(assessments)
     speeds = {w: np.abs(without_nan(one.samples.x)) for w, one in found.items()}
-    low = _LOW * max(float(np.quantile(x, _TOP)) for x in speeds.values())
+    low = _LOW * max(float(quantile_of(x, _TOP)) for x in speeds.values())
     off = {w: evened_off(one) for w, one in found.items()}
     sound = {w: ~in_lasting(assessments[w].findings, off[w].size, found[w].pair.dt) for w in found}
     passages = np.concatenate([_passages(off[w], speeds[w], sound[w], low) for w in found])
     if len(passages) < _PASSAGES:
         return dict(assessments)
-    most, middle = _BEYOND * np.quantile(passages, _USUAL, axis=0)
+    most, middle = _BEYOND * quantile_of(passages, _USUAL, axis=0)
     out = {}
     for w, a in assessments.items():
         slow, brief = speeds[w] < low, round(_LASTS_S / found[w].pair.dt)
@@ -88,7 +89,7 @@ def _passages(off: Array, speed: Array, sound: NDArray[np.bool_], low: float) ->
     near = [(a, b) for a, b in spans if speed[a:b].min() < _SLOWEST * low and sound[a:b].all()]
     moves = speed > _SLOWEST * low
     return np.array(
-        [(off[a:b].max(), np.median(off[a:b][moves[a:b]]) if moves[a:b].any() else 0.0) for a, b in near]
+        [(off[a:b].max(), median_of(off[a:b][moves[a:b]]) if moves[a:b].any() else 0.0) for a, b in near]
     ).reshape(-1, 2)
 
 
@@ -98,7 +99,7 @@ def _is_habit(finding: Finding, off: Array, low: NDArray[np.bool_], limits: tupl
     most, middle = limits
     if low[part].mean() < _MOSTLY or off[part].max(initial=0.0) > most:
         return False
-    return finding.stop - finding.start <= brief or bool(np.median(off[part]) <= middle)
+    return finding.stop - finding.start <= brief or bool(median_of(off[part]) <= middle)
 
 
 def left_open(a: Assessment, findings: Sequence[Finding], state: State = State.NOT_ASSESSED) -> Assessment:

@@ -21,6 +21,7 @@ from diagnosis.direct.low_speed import left_open
 from diagnosis.estimation.lag import low_passed
 from diagnosis.results.assessment import Assessment, Finding
 from replay.arrays.numeric import without_nan
+from replay.arrays.quantiles import median_known, median_of
 from replay.arrays.runs import runs_of
 
 Array = NDArray[np.float64]
@@ -128,7 +129,7 @@ def _middle(columns: Sequence[Array]) -> Array:
     stacked = np.column_stack(columns)
     some = np.isfinite(stacked).any(axis=1)
     out = np.zeros(len(stacked))
-    out[some] = np.nanmedian(stacked[some], axis=1)
+    out[some] = median_known(stacked[some], axis=1)
     return out
 
 
@@ -157,7 +158,7 @@ def _is_seconds(finding: Finding, usual: Sequence[_Left], cells: _Cells, dt: flo
     inside = _together([_left(w, cells) for w in _windows(finding.start, finding.stop, cells.width, dt)])
     if inside is None:
         return False
-    most = max(float(np.median([u.sensor for u in usual])), float(np.median([u.second for u in usual])))
+    most = max(float(median_of([u.sensor for u in usual])), float(median_of([u.second for u in usual])))
     return (
         inside.second > _UNEXPLAINED * most
         and inside.sensor < _EXPLAINED * most

@@ -11,6 +11,7 @@ from diagnosis.channels.noise import white_part
 from diagnosis.direct.identification import IdentifiedPair
 from diagnosis.direct.isolation import run_samples
 from diagnosis.estimation.segments import Run
+from replay.arrays.quantiles import median_known, median_of, quantile_of
 from replay.arrays.sliding import largest_within, smallest_within
 from replay.faults import FaultMode, Side
 
@@ -181,10 +182,10 @@ def _held_by_habit(found: IdentifiedPair, run: Run) -> bool:
     inside = y[part][np.isfinite(y[part])]
     if not inside.size:
         return False
-    value = float(np.median(np.abs(inside)))
+    value = float(median_of(np.abs(inside)))
     if value == 0.0:
         shown = np.abs(y[np.isfinite(y) & (y != 0.0)])
-        least = float(np.quantile(shown, _LEAST_SHOWN)) if shown.size else 0.0
+        least = float(quantile_of(shown, _LEAST_SHOWN)) if shown.size else 0.0
         return bool(np.nanmax(np.abs(found.samples.x[part]), initial=0.0) <= _ALIKE * least)
     start, length = found.holds
     apart = (start + length <= run.start) | (start >= run.stop)
@@ -192,7 +193,7 @@ def _held_by_habit(found: IdentifiedPair, run: Run) -> bool:
     near = length[apart & (size > value / _ALIKE) & (size < value * _ALIKE)]
     if near.size < _HOLDS or _further(found, run, value, apart):
         return False
-    return bool((run.stop - run.start) < _BEYOND_HOLDS * float(np.quantile(near, _LONG_HOLDS)))
+    return bool((run.stop - run.start) < _BEYOND_HOLDS * float(quantile_of(near, _LONG_HOLDS)))
 
 
 def _further(found: IdentifiedPair, run: Run, value: float, apart: NDArray[np.bool_]) -> bool:
@@ -204,9 +205,9 @@ def _further(found: IdentifiedPair, run: Run, value: float, apart: NDArray[np.bo
     way = found.way
     others = (way[start + length] - way[start])[apart]
     moved = others[others > 0.0]
-    off = float(np.nanmedian(np.abs(found.pair.y - found.samples.x)[run.start : run.stop]))
+    off = float(median_known(np.abs(found.pair.y - found.samples.x)[run.start : run.stop]))
     away = off > max(_STEPS * found.texture.lsb, _OF_VALUE * value)
-    return away and bool(moved.size) and way[run.stop] - way[run.start] > _FURTHER * float(np.median(moved))
+    return away and bool(moved.size) and way[run.stop] - way[run.start] > _FURTHER * float(median_of(moved))
 
 
 def _near_rest(found: IdentifiedPair, run: Run) -> bool:

@@ -19,6 +19,7 @@ from diagnosis.direct.inputs import Pair
 from diagnosis.estimation.fault_models import MISMATCH_S, ModeModel
 from diagnosis.results.fault_rows import codes_of
 from replay.arrays.numeric import without_nan
+from replay.arrays.quantiles import quantile_of
 from replay.faults import Side
 
 Array = NDArray[np.float64]
@@ -179,7 +180,7 @@ def usual_of_kind(found: Sequence[HealthyNoise]) -> HealthyNoise | None:
     """Noise of a healthy one of several channels of one kind: faults leave the medians alone; None where they are few."""
     if len(found) < _SIBLINGS:
         return None
-    return HealthyNoise(*(float(x) for x in np.quantile(np.array(found), 0.5, axis=0, method="lower")))
+    return HealthyNoise(*(float(x) for x in quantile_of(np.array(found), 0.5, axis=0, method="lower")))
 
 
 def most_noise_of_kind(noise: Sequence[float]) -> float | None:
@@ -187,7 +188,7 @@ def most_noise_of_kind(noise: Sequence[float]) -> float | None:
 
     None where they are few.
     """
-    return _LOUDER * float(np.quantile(noise, 0.5, method="lower")) if len(noise) >= _SIBLINGS else None
+    return _LOUDER * float(quantile_of(noise, 0.5, method="lower")) if len(noise) >= _SIBLINGS else None
 
 
 def _growth(residual: Array, size: Array, counted: Array, period: float) -> NoiseGrowth:
@@ -269,7 +270,7 @@ def repeated_share(news: Array, lsb: float, period: float, habit: Habit) -> floa
         windows = news[: count * _REPEATS].reshape(count, _REPEATS)
         same = (np.diff(windows, axis=1) == 0.0).mean(axis=1)
         moving = same < 1.0
-        share = float(np.quantile(same[moving], _SOUND)) if np.count_nonzero(moving) >= 3 else 0.0
+        share = float(quantile_of(same[moving], _SOUND)) if np.count_nonzero(moving) >= 3 else 0.0
     if lsb <= 0.0:
         return share
     white = float(np.nan_to_num(white_noise(news, period)))

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from replay.arrays.blocks import blocks
+from replay.arrays.quantiles import median_of, quantile_of
 
 Array = NDArray[np.float64]
 
@@ -62,7 +63,7 @@ def readings(y: Array, fresh: NDArray[np.bool_], dt: float) -> Iterator[tuple[Ar
     for part in blocks(y.size):
         first, stop = max(0, part.start - beyond), part.stop
         at = first + np.flatnonzero(fresh[first:stop] & np.isfinite(y[first:stop]))
-        if at.size >= _FEW and float(np.median(np.diff(at))) * dt <= _COARSE_S:
+        if at.size >= _FEW and float(median_of(np.diff(at))) * dt <= _COARSE_S:
             yield np.asarray(at * dt, dtype=np.float64), np.asarray(y[at], dtype=np.float64)
 
 
@@ -87,7 +88,7 @@ def jumps_of(read: Iterable[tuple[Array, Array]], quickest: float) -> Jumps:
 
 def _quickest(t: Array, y: Array) -> float:
     """Over two spans on end, in one of which a jump would be alone."""
-    n = max(1, round(_LASTING_S / float(np.median(np.diff(t)))))
+    n = max(1, round(_LASTING_S / float(median_of(np.diff(t)))))
     rate = (y[n:] - y[:-n]) / (t[n:] - t[:-n])
     before, after = rate[:-n], rate[n:]
     both = np.where(before * after > 0.0, np.minimum(np.abs(before), np.abs(after)), 0.0)
@@ -98,14 +99,14 @@ def _held(t: Array, y: Array) -> float:
     """Time between readings that differ, while an axle turns [s]: a channel may repeat each of its readings."""
     changes = np.flatnonzero(np.diff(y) != 0.0) + 1
     if changes.size < 2:
-        return float(np.median(np.diff(t)))
+        return float(median_of(np.diff(t)))
     apart, moved = np.diff(t[changes]), np.abs(np.diff(y[changes]))
     turning = (apart < _LASTING_S) & (moved > _MOVING * apart / _LASTING_S)
-    return float(np.quantile(apart[turning], 0.95)) if turning.any() else float(np.median(np.diff(t)))
+    return float(quantile_of(apart[turning], 0.95)) if turning.any() else float(median_of(np.diff(t)))
 
 
 def _jumps(t: Array, y: Array, quickest: float) -> Jumps:
-    usual, held = float(np.median(np.diff(t))), _held(t, y)
+    usual, held = float(median_of(np.diff(t))), _held(t, y)
     apart = READINGS if usual <= _FINE_S else _COARSE_READINGS
     if y.size < apart + 4 or held > max(_COARSE_S, _BEYOND * usual):
         return Jumps(np.zeros(0), np.zeros(0), np.zeros(0))
@@ -115,7 +116,7 @@ def _jumps(t: Array, y: Array, quickest: float) -> Jumps:
     span = t[apart + 2 :] - t[: -apart - 2]
     moved = np.abs(after - before)
     moved = np.where(np.abs(moved - 2.0 * np.pi) < _WRAP, 0.0, moved)
-    noise = float(np.median(np.abs(np.diff(y, 2)))) / 0.6745 / np.sqrt(6.0)
+    noise = float(median_of(np.abs(np.diff(y, 2)))) / 0.6745 / np.sqrt(6.0)
     steps = np.abs(np.diff(y))
     step = float(np.min(steps[steps > 0.0], initial=np.inf))
     step = step if np.isfinite(step) else 0.0

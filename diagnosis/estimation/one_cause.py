@@ -17,6 +17,7 @@ from diagnosis.estimation.simple_causes import Cause, Measured, below_limit, cau
 from diagnosis.results.assessment import Finding
 from diagnosis.results.result import Hypothesis
 from diagnosis.results.sentence import About, is_about
+from replay.arrays.quantiles import median_of
 from replay.faults import FaultMode, State
 
 Array = NDArray[np.float64]
@@ -139,7 +140,7 @@ def cause_of(near: Sequence[Finding], measured: Measured) -> Cause | None:
     if at.size < _LEAST:
         return None
     least = max(
-        _LEAST, _LEAST_S / (measured.dt * float(np.median(np.diff(at))))
+        _LEAST, _LEAST_S / (measured.dt * float(median_of(np.diff(at))))
     )  # readings may be further apart than steps
     if at.size < least:
         return None
@@ -185,7 +186,7 @@ def _about(y: Array, piece: NDArray[np.intp]) -> Array:
 def _nothing_asked(cause: Cause, x: Array, measured: Measured) -> bool:
     """Whether a loss would not have shown beside a reference, for want of motion."""
     assert cause.epsilon is not None
-    return x.size > 0 and float(np.median(np.abs(cause.epsilon.value * x))) <= _OWN * measured.noise
+    return x.size > 0 and float(median_of(np.abs(cause.epsilon.value * x))) <= _OWN * measured.noise
 
 
 def _lasting(big: NDArray[np.intp], at: NDArray[np.intp], measured: Measured) -> int:
@@ -272,7 +273,7 @@ def _steadily(y: Array, x: Array) -> Array:
 
 def _restless(rest: Array, measured: Measured) -> bool:
     """Whether a reading is most of the time off what explains it by more than noise; `rest` [unit], shape (k,), is what that leaves."""
-    usual = 1.4826 * float(np.median(np.abs(rest)))
+    usual = 1.4826 * float(median_of(np.abs(rest)))
     even = float(np.std(rest)) < _EVEN * usual
     return usual > (_STEADILY if even else _RESTLESS) * measured.noise
 

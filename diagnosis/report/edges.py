@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from diagnosis.pages.labels import number
 from diagnosis.report.compared_channels import Pair
 from diagnosis.results.document import IntervalRow
+from replay.arrays.quantiles import median_of
 from replay.faults import Side
 
 Array = NDArray[np.float64]
@@ -117,7 +118,7 @@ def edge_of(
     times, values = _healthy(place, fault, others, pair, columns, axis, onset)
     if values.size >= _LEAST_HEALTHY:
         course, noise = _course(times, values, t[inside], onset, pair.independent)
-        level = float(np.median(values)) if pair.independent else 0.0
+        level = float(median_of(values)) if pair.independent else 0.0
         expected = course + (reference[inside] if pair.independent else 0.0)
         deviation = y[inside] - expected
         finite = np.flatnonzero(np.isfinite(deviation))
@@ -177,13 +178,13 @@ def _course(t: Array, y: Array, at: Array, onset: bool, independent: bool) -> tu
     nearest ones.
     """
     if independent:
-        level = float(np.median(y))
+        level = float(median_of(y))
         course, rest = np.full(at.size, level), y - level
     else:
         near = slice(-_COURSE, None) if onset else slice(None, _COURSE)
         slope, level = np.polyfit(t[near], y[near], 1)
         course, rest = slope * at + level, y[near] - (slope * t[near] + level)
-    noise = 1.4826 * float(np.median(np.abs(rest))) or float(np.std(rest))
+    noise = 1.4826 * float(median_of(np.abs(rest))) or float(np.std(rest))
     return course, noise if noise > 1e-12 else None
 
 

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.report.encode_kernel import quantise, split_planes
+from replay.arrays.quantiles import quantile_of
 
 _LEVELS = 2**24
 _HUGE, _TINY = 1e30, 1e-30
@@ -118,7 +119,7 @@ def step_of(values: NDArray[np.floating], lsb: float | None, resolution: int = _
         turns = probe / lsb
         step = lsb if np.mean(np.abs(turns - np.rint(turns))) < _ON_GRID else lsb / 2
     else:
-        low, high = np.quantile(probe, [0.001, 0.999])
+        low, high = quantile_of(probe, [0.001, 0.999])
         extent = max(float(high - low) or float(np.abs(probe).max()) or 1.0, _TINY)
         exponent = math.floor(math.log10(extent / resolution))
         mantissa = extent / resolution / 10.0**exponent

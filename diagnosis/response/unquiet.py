@@ -16,6 +16,7 @@ from diagnosis.response.disputed import unproved
 from diagnosis.results.assessment import CODE, Assessment
 from diagnosis.results.vocabulary import Tier
 from replay.arrays.blocks import release
+from replay.arrays.quantiles import quantile_known, quantile_of
 from replay.arrays.sliding import median_within
 from replay.faults import State
 
@@ -95,16 +96,16 @@ def louder(own: Roughness, others: Sequence[Roughness]) -> Flags:
     if not np.isfinite(table).any():
         return np.zeros(own.noise.size, np.bool_)
     known = np.isfinite(table).any(axis=0)
-    most = np.full(own.noise.size, float(np.nanquantile(table, 0.9)))  # where all others stand, what they do else
+    most = np.full(own.noise.size, float(quantile_known(table, 0.9)))  # where all others stand, what they do else
     most[known] = np.nanmax(table[:, known], axis=0)
-    usual = float(np.nanquantile(own.speed, 0.9)) if np.isfinite(own.speed).any() else np.inf
+    usual = float(quantile_known(own.speed, 0.9)) if np.isfinite(own.speed).any() else np.inf
     least = _SHARE * np.maximum(own.speed, _SLOW * usual)
     loud = np.asarray(np.nan_to_num(own.noise) > np.maximum(_LOUDER * most, np.nan_to_num(least, nan=np.inf)))
     return loud if np.count_nonzero(loud) >= _LEAST else np.zeros_like(loud)
 
 
 def _moves(r: Roughness) -> Flags:
-    usual = float(np.nanquantile(r.speed, 0.9)) if np.isfinite(r.speed).any() else np.inf
+    usual = float(quantile_known(r.speed, 0.9)) if np.isfinite(r.speed).any() else np.inf
     return np.asarray((np.nan_to_num(r.speed) > _SLOW * usual) & (np.nan_to_num(r.noise) > 0.0))
 
 
@@ -113,4 +114,4 @@ def _coarse(y: Array, fresh: Flags) -> bool:
     value = y[fresh & np.isfinite(y)]
     change = np.abs(np.diff(value))
     change = change[change > 0.0]
-    return bool(change.size) and bool(np.quantile(change, 0.05) > _COARSE * np.sqrt(np.mean(np.diff(value) ** 2) / 2.0))
+    return bool(change.size) and bool(quantile_of(change, 0.05) > _COARSE * np.sqrt(np.mean(np.diff(value) ** 2) / 2.0))

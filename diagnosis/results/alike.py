@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from diagnosis.results.assessment import Finding
 from diagnosis.results.result import Hypothesis
+from replay.arrays.quantiles import median_of, quantile_of
 from replay.faults import FaultMode, State
 
 Array = NDArray[np.float64]
@@ -36,8 +37,8 @@ def hardly_moves(y: Array, x: Array, most: float = np.inf) -> bool:
     """
     if x.size < _FEW:
         return False
-    low, high = np.quantile(x, (0.05, 0.95))
-    off = abs(float(np.median(y - x)))
+    low, high = quantile_of(x, (0.05, 0.95))
+    off = abs(float(median_of(y - x)))
     return float(high - low) < _MOVES * off <= _MOVES * most
 
 
@@ -57,7 +58,7 @@ def is_held(y: Array, x: Array, span: tuple[int, int]) -> bool:
     size = np.abs(x[known])
     if size.size < _FEW:
         return False
-    moving = known & (np.abs(np.nan_to_num(x)) > _MOVING * np.quantile(size, 0.95))
+    moving = known & (np.abs(np.nan_to_num(x)) > _MOVING * quantile_of(size, 0.95))
     inside = np.zeros(y.size, np.bool_)
     inside[slice(*span)] = True
     if np.mean(moving[inside]) < _HELD:

@@ -14,6 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.results.restored import differences_of
+from replay.arrays.compiling import njit
+from replay.arrays.quantiles import quantile_of
 
 _BLOCK = 1 << 15
 _PROBE = 20_000
@@ -46,7 +48,7 @@ def grid_of(name: str, values: NDArray[np.floating], lsb: float | None = None) -
     probe = probe[np.abs(probe) < _HUGE]
     if not len(probe):
         return 0.0
-    low, high = np.quantile(probe, [0.001, 0.999])
+    low, high = quantile_of(probe, [0.001, 0.999])
     if lsb is not None and _LEAST < lsb < _HUGE:
         step = max(lsb / 4, float(high - low) / 2**_WITH_LSB)
     else:
@@ -84,17 +86,13 @@ def grids_of(columns: Mapping[str, NDArray[np.floating]], lsb: Mapping[str, floa
     return grids
 
 
-def _put_on_grid(part: NDArray[np.float32], grid: np.float32) -> None:
+@njit(cache=True, nogil=True, error_model="numpy")
+def _put_on_grid(part, grid):  # type: ignore[no-untyped-def]
     """Round in place; a value of 2²³ steps or more is on the grid as it is."""
-    beyond = np.abs(part) >= grid * 2**23
-    if not beyond.any():
-        part /= grid
-        np.rint(part, out=part)
-        part *= grid
-        part += np.float32(0.0)
-    else:
-        within = ~beyond
-        part[within] = np.rint(part[within] / grid) * grid + np.float32(0.0)
+    beyond = grid * np.float32(2**23)
+    for i in range(part.size):
+        x = part[i]
+        part[i] = x if abs(x) >= beyond else np.rint(x / grid) * grid + np.float32(0.0)
 
 
 def stored(name: str, values: NDArray[np.floating], grid: float) -> NDArray[np.float32]:

@@ -23,6 +23,7 @@ from diagnosis.steering.driven import driven_by
 from diagnosis.steering.inputs import AxleInputs
 from diagnosis.steering.plant import SteeringPlant
 from diagnosis.steering.side_findings import SideFindings, span_of
+from replay.arrays.quantiles import quantile_of
 from replay.faults import FaultMode, Side
 
 Array = NDArray[np.float64]
@@ -94,7 +95,7 @@ def scatter_of(blocks: SteeringBlocks, plant: SteeringPlant) -> float | None:
     half = share.size // 2
     narrowest = int(np.argmin(share[half:] - share[: share.size - half]))
     usual = float(share[narrowest : narrowest + half + 1].mean())
-    return float(np.quantile(np.abs(share - usual), _BEST))
+    return float(quantile_of(np.abs(share - usual), _BEST))
 
 
 def moves_otherwise(scatters: Sequence[float | None]) -> bool:
@@ -209,7 +210,7 @@ def _frozen(finding: Finding, found: SideFindings, inputs: AxleInputs) -> bool:
     if at.size < _FEW_READINGS or elsewhere.size < 2 * _FEW_READINGS or at.size > elsewhere.size:
         return False
     windows = elsewhere[: elsewhere.size // _FEW_READINGS * _FEW_READINGS].reshape(-1, _FEW_READINGS)
-    restless = float(np.quantile(np.mean(windows > 0.0, axis=1), _CALM))
+    restless = float(quantile_of(np.mean(windows > 0.0, axis=1), _CALM))
     return restless >= _RESTLESS and float(np.mean(np.diff(inputs.angle[at]) != 0.0)) <= _FROZEN
 
 

@@ -16,6 +16,7 @@ from replay.arrays.blocks import blocks as cut
 from replay.arrays.blocks import release
 from replay.arrays.column_store import ColumnStore
 from replay.arrays.numeric import carried
+from replay.arrays.quantiles import median_of, quantile_of
 from replay.machine.config import Noise
 
 Array = NDArray[np.float64]
@@ -88,7 +89,7 @@ def block_length(fresh: Sequence[NDArray[np.bool_]], dt: float) -> int:
     for new in fresh:
         at = np.flatnonzero(new[:_LOOKED])
         if at.size > _FEW:
-            length = max(length, round(float(np.quantile(np.diff(at), _USUAL))))
+            length = max(length, round(float(quantile_of(np.diff(at), _USUAL))))
     return length
 
 
@@ -278,8 +279,8 @@ def sensor_noise(blocks: SteeringBlocks, values: Array, known: Noise, stop: floa
     powers = powers[(powers > 0) & (counts > 0)]
     white, spread = 0.0, 1.0
     if powers.size >= 4:
-        low, middle, high = np.quantile(np.log(powers), (0.3, 0.5, 0.7))
-        samples = float(np.median(blocks.count[blocks.count > 0])) * length
+        low, middle, high = quantile_of(np.log(powers), (0.3, 0.5, 0.7))
+        samples = float(median_of(blocks.count[blocks.count > 0])) * length
         white = float(np.exp(middle))
         spread = (min(middle - low, high - middle) / 0.524) ** 2 - 2.0 / max(WHITE_DOF * samples, 1.0)
     if known.std is not None:

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from diagnosis.channels.noise import moving_sum
 from diagnosis.steering.path import AxleFilter
+from replay.arrays.quantiles import median_of
 
 
 def exercised(axle: AxleFilter) -> NDArray[np.bool_]:
@@ -14,7 +15,7 @@ def exercised(axle: AxleFilter) -> NDArray[np.bool_]:
     width = max(1, round(0.5 / axle.blocks.dt))
     travel = np.abs(moving_sum(np.nan_to_num(axle.driven.command), width)) * axle.blocks.dt
     model, noise = axle.model, axle.model.noise
-    least = 10 * np.sqrt(noise.white / max(1.0, width * float(np.median(axle.blocks.count)))) + noise.lsb
+    least = 10 * np.sqrt(noise.white / max(1.0, width * float(median_of(axle.blocks.count)))) + noise.lsb
     return np.asarray(travel > max(least, 0.5 * model.rate_error, 1e-3 * model.stop))
 
 

@@ -22,6 +22,7 @@ from diagnosis.steering.late_valves import as_late
 from diagnosis.steering.openings import latest, off_command, opens_as_told
 from diagnosis.steering.redundancy import MOST_APART, most_lag
 from diagnosis.steering.side_findings import SideFindings, span_of
+from replay.arrays.quantiles import median_of, quantile_of
 from replay.faults import FaultMode, Side, State
 from replay.machine.quantities import OPENING
 
@@ -141,7 +142,7 @@ def _measured(
 ) -> Measured:
     y, x, use = pair
     sound = _sound(found, use)
-    usual = float(np.quantile(np.abs(y - x)[sound], _LOWER)) if sound.any() else 0.0
+    usual = float(quantile_of(np.abs(y - x)[sound], _LOWER)) if sound.any() else 0.0
     names = (inputs.channel(leaves[0]), inputs.channel(leaves[1]))
     noise = min(_NORMAL * usual, MOST_APART)
     return Measured(y, x, use, inputs.timeline.dt, names, unit, noise, min_sat, _LOSES)
@@ -242,7 +243,7 @@ def _rms(z: Array) -> float:
 
 def _by_its_place(finding: Finding, opening: Array) -> Finding:
     """A valve that stands still, by where it does: about its middle it has no signal, elsewhere it is stuck. `opening` of shape (n,) [fraction]."""
-    middle = float(np.median(opening))
+    middle = float(median_of(opening))
     mode = (
         FaultMode.NO_SIGNAL if abs(middle) < _IN_MIDDLE else FaultMode.STUCK if abs(middle) > _BESIDE else finding.mode
     )

@@ -18,6 +18,7 @@ from diagnosis.steering import path_kernel
 from diagnosis.steering.filter_state import SteeringPath
 from diagnosis.steering.model_bank import HEALTHY_MODEL, STATES
 from diagnosis.steering.path import AxleFilter
+from replay.arrays.quantiles import median_of
 
 _MOTION_S, _BEFORE_S = 1.0, 0.5  # of a motion, and from where the filter starts before it
 _MOVED = 0.02  # rad
@@ -50,7 +51,7 @@ def model_error(axles: Sequence[Callable[[ModelError], AxleFilter]]) -> ModelErr
 
     def gain(error: ModelError, before: Sequence[NDArray[np.float64]]) -> tuple[float, list[NDArray[np.float64]]]:
         now = [_evidence(axle(error), motions) for axle, motions in known]
-        return min(float(np.median(n - b)) for n, b in zip(now, before, strict=True)), now
+        return min(float(median_of(n - b)) for n, b in zip(now, before, strict=True)), now
 
     best = ModelError()
     _, found = gain(best, [np.zeros(len(motions)) for _, motions in known])

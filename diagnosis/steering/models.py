@@ -11,6 +11,7 @@ from diagnosis.steering.filter_constants import AxleConstants, FilterConstants, 
 from diagnosis.steering.plant import SteeringPlant
 from diagnosis.steering.valve_map import rates_at
 from diagnosis.steering.windows import windows_of
+from replay.arrays.quantiles import median_of, quantile_of
 
 _MEAN_HEALTHY_S = 60.0
 _RATE_ERROR_S = 1.0
@@ -183,13 +184,13 @@ def model_of(
     residual = np.abs(windows.rate - predicted)[windows.good & (np.abs(predicted) < 0.05 * plant.rate)]
     error = 0.0
     if residual.size >= 8:
-        error = float(np.sqrt(max((np.quantile(residual, 0.4) / 0.524) ** 2 - windows.noise**2, 0.0)))
+        error = float(np.sqrt(max((quantile_of(residual, 0.4) / 0.524) ** 2 - windows.noise**2, 0.0)))
     known = blocks.count[blocks.count > 0]
-    count = float(np.median(known)) if known.size else 1.0
+    count = float(median_of(known)) if known.size else 1.0
     redundant = bool(blocks.redundancy.known.any())
     measured = bool(np.isfinite(blocks.redundancy.opening).any())
     error = max(error, 5e-4 * plant.rate)
-    jitter = float(np.median(np.abs(np.diff(rates_at(blocks.u, plant.valve))))) if blocks.u.size > 1 else 0.0
+    jitter = float(median_of(np.abs(np.diff(rates_at(blocks.u, plant.valve))))) if blocks.u.size > 1 else 0.0
     idle = max(_IDLE_ERRORS * error, _IDLE_JITTER * jitter)
     return SteeringModel(
         plant, noise, stop, error, count, blocks.dt, redundant, idle, _stops(blocks, noise, stop), measured, lag_spread
@@ -204,6 +205,6 @@ def _stops(blocks: SteeringBlocks, noise: SensorNoise, stop: float) -> tuple[flo
         near = side * usual
         near = near[np.abs(near / stop - 1) < _STOP_SHARE]
         resting = near[near > near.max(initial=0.0) - max(4 * noise.std, noise.lsb)]
-        found = float(np.median(resting)) if resting.size * blocks.dt > _REST_S else stop
+        found = float(median_of(resting)) if resting.size * blocks.dt > _REST_S else stop
         out.append(side * found)
     return out[0], out[1]

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from diagnosis.channels.noise import relative_lag, shifted, slow_mismatch
 from diagnosis.channels.relation import Relation, relation_of
 from diagnosis.steering.blocks import SteeringBlocks, second_differences
+from replay.arrays.quantiles import median_of
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -68,7 +69,7 @@ def _slow(deviation: Array, use: Flags, dt: float) -> float:
 
 def _zero_error(apart: Array, use: Flags) -> float:
     """How far apart two angles were set to zero [rad], as the mission's median says it, as far as healthy ones are."""
-    return float(np.clip(np.median(apart[use]), -_ZERO_ERROR, _ZERO_ERROR)) if use.any() else 0.0
+    return float(np.clip(median_of(apart[use]), -_ZERO_ERROR, _ZERO_ERROR)) if use.any() else 0.0
 
 
 def with_valve_opening(
@@ -197,7 +198,7 @@ def _followed_share(
     if lively.any():
         windows = np.add.reduceat(np.stack([together, changes]) * lively, np.arange(0, starts.size, 100), axis=1)
         by_window = windows[0] / np.maximum(windows[1], 1e-30)
-        if _SHARE_RANGE[0] < float(np.median(by_window[windows[1] > 0])) < _SHARE_RANGE[1]:
+        if _SHARE_RANGE[0] < float(median_of(by_window[windows[1] > 0])) < _SHARE_RANGE[1]:
             share[lively] = together[lively] / changes[lively]
             variance[lively] = power / changes[lively]
     return share, variance
@@ -208,9 +209,9 @@ def _jitter_lag(position: Array, u: Array, use: Flags, most: int) -> float | Non
     if u.size <= 2 * most:
         return None
     du, dp = (np.diff(np.where(use, x, 0.0), 2, prepend=[0.0, 0.0]) for x in (u, position))
-    limit = 10 * float(np.median(np.abs(du))) + 1e-12  # the small jitter of a healthy sensor, not jumps
+    limit = 10 * float(median_of(np.abs(du))) + 1e-12  # the small jitter of a healthy sensor, not jumps
     du[np.abs(du) > limit] = 0.0
-    inner = dp[most:] * (np.abs(dp[most:]) < 10 * float(np.median(np.abs(dp))) + 1e-12)
+    inner = dp[most:] * (np.abs(dp[most:]) < 10 * float(median_of(np.abs(dp))) + 1e-12)
     together = np.array([float(inner @ du[most - k : du.size - k]) for k in range(most + 1)])
     scale = float(np.sqrt((inner @ inner) * (du @ du) / max(inner.size, 1)))
     best = int(np.argmax(together))
@@ -229,7 +230,7 @@ def _without_jitter(command: Array, known: Flags, dt: float) -> tuple[Array, Arr
     width = max(3, round(_JITTER_S / dt))
     squares = second_differences(filled)
     rows = np.pad(squares, (0, -size % width), mode="edge").reshape(-1, width)
-    power = np.median(rows, axis=1) / _MEDIAN_SQUARE  # a jump is no jitter
+    power = median_of(rows, axis=1) / _MEDIAN_SQUARE  # a jump is no jitter
     near = np.pad(power, 1, mode="edge")
     jitter = np.repeat(np.maximum(np.maximum(near[:-2], near[2:]), power), width)[:size]
     total = np.concatenate([[0.0], np.cumsum(filled)])
@@ -253,4 +254,4 @@ def _white(values: Array) -> float:
     count = squares.size // 200
     if count < 3:
         return float(squares.mean()) if squares.size else 0.0
-    return float(np.median(squares[: count * 200].reshape(count, 200).mean(axis=1)))
+    return float(median_of(squares[: count * 200].reshape(count, 200).mean(axis=1)))

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from diagnosis.steering.blocks import WHITE_DOF, SensorNoise, SteeringBlocks, window_means
 from diagnosis.steering.valve_map import ValveMap, rate_at
 from replay.arrays.compiling import njit
+from replay.arrays.quantiles import median_of
 
 Array = NDArray[np.float64]
 
@@ -179,7 +180,7 @@ def windows_of(blocks: SteeringBlocks, noise: SensorNoise, stop: float, window_s
     power = window_means(blocks.power * blocks.count, length) / np.maximum(samples, 1e-9)
     middle = window_means(mean, length)
     # less or more noise than usual: not the healthy sensor; at its end stop an axle does not answer
-    counts = float(np.median(blocks.count[known])) * length if known.any() else 1.0
+    counts = float(median_of(blocks.count[known])) * length if known.any() else 1.0
     usual = 1 + max(0.3, 4 * float(np.sqrt(2 / (WHITE_DOF * counts))))
     alive = (window_means(_sampled(known).astype(np.float64), length) > 0.9) & (np.abs(middle) < 0.97 * stop)
     alive &= window_means(blocks.blind.astype(np.float64), length) == 0.0
@@ -201,7 +202,7 @@ def _sampled(known: NDArray[np.bool_]) -> NDArray[np.bool_]:
     if at.size < 2:
         return known
     gaps, sampled = np.diff(at), known.copy()
-    sampled[at[0] : at[-1]] = np.repeat(gaps, gaps) <= _MISSED * np.median(gaps)
+    sampled[at[0] : at[-1]] = np.repeat(gaps, gaps) <= _MISSED * median_of(gaps)
     return sampled
 
 

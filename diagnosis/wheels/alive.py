@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.channels.noise import white_part
+from replay.arrays.quantiles import median_of, quantile_of
 
 Array = NDArray[np.float64]
 
@@ -32,8 +33,8 @@ def lives(y: Array, reference: Array, noise: float, span: float) -> bool:
     values = y[known]
     if values.size < _FEW or asked.size < known.size / 2:
         return False
-    level = float(np.median(values))
-    low, high = np.quantile(asked, _ENDS)
+    level = float(median_of(values))
+    low, high = quantile_of(asked, _ENDS)
     near = max(_LEAST * span, _SHARE * float(np.max(np.abs([low, high]))))
     if max(high - low, abs(high - level), abs(low - level)) > near:
         return False

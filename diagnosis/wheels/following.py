@@ -17,6 +17,7 @@ from diagnosis.wheels.run_kernel import RunEvidence, evidence_of_runs
 from diagnosis.wheels.runs import runs_of
 from diagnosis.wheels.settle import settled
 from replay.arrays.processors import each
+from replay.arrays.quantiles import median_of
 
 Array = NDArray[np.float64]
 
@@ -47,7 +48,7 @@ def follow(data: WheelsData, blocks: WheelBlocks, model: JointModel) -> tuple[Jo
         evidence = evidence_of_runs(blocks, model, done, i, runs)
         opening = blocks.u[:, i].reshape(n, blocks.width).mean(axis=1)
         driven = np.abs(opening)[~blocks.quiet[:, i]]
-        usual = float(np.median(driven)) if driven.size else 1.0
+        usual = float(median_of(driven)) if driven.size else 1.0
         others = faulty.sum(axis=1) - faulty[:, i].astype(np.float64)
         unseen = (blocks.unseen[:, i] != 0).astype(np.float64)
         rows = [

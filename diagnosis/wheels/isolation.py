@@ -29,6 +29,7 @@ from diagnosis.wheels.models import (
     Row,
     WheelFilterModel,
 )
+from replay.arrays.quantiles import quantile_of
 from replay.faults import FaultMode, Side
 from replay.machine.config import Limits
 
@@ -193,7 +194,7 @@ def _rests(y: Array, model: WheelFilterModel, dt: float) -> bool:
     means = inner[: inner.size // width * width].reshape(-1, width).mean(axis=1)
     if means.size < _FEW_MEANS:
         return True
-    low, high = np.quantile(means, _INNER)
+    low, high = quantile_of(means, _INNER)
     return bool(high - low <= _AT_MOST * model.noise / np.sqrt(width) + 2 * model.rounding + _LEAST_MOVE * model.span)
 
 

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.wheels.parity import slipping
+from replay.arrays.quantiles import median_of, quantile_of
 from replay.control.kinematics import low_pass, speed_ratios, wheel_angles
 from replay.control.loop import Replay, any_finite
 from replay.machine.config import Machine
@@ -29,7 +30,7 @@ def body_speeds(y: Array, ratio: Array, turn: Array) -> Array:
         others = np.delete(speed, i, axis=1)
         known = np.isfinite(others).all(axis=1)
         if others.shape[1] and known.any():
-            out[known, i] = np.median(others[known], axis=1) * ratio[known, i] - turn[known, i]
+            out[known, i] = median_of(others[known], axis=1) * ratio[known, i] - turn[known, i]
     return out
 
 
@@ -49,11 +50,11 @@ def against_command(y: Array, reference: Array) -> float:
     commanded = np.abs(r[r != 0.0])
     if not commanded.size:
         return 0.0
-    least = _MOVES * float(np.quantile(commanded, 0.9))
+    least = _MOVES * float(quantile_of(commanded, 0.9))
     driving = (np.abs(v) > least) & (np.abs(r) > least)
     against = (driving & (v * r < 0.0)).sum(axis=0)
     seen = driving.sum(axis=0)
-    return float(np.median(against[seen > 0] / seen[seen > 0])) if seen.any() else 0.0
+    return float(median_of(against[seen > 0] / seen[seen > 0])) if seen.any() else 0.0
 
 
 def slip_of(

@@ -17,6 +17,7 @@ from diagnosis.results.limited import limited
 from diagnosis.wheels.blocks import per_sample
 from diagnosis.wheels.findings import WheelFindings, WheelPath
 from diagnosis.wheels.own_swings import is_opened, opened
+from replay.arrays.quantiles import median_known, quantile_known
 from replay.faults import FaultMode, Side
 
 Array = NDArray[np.float64]
@@ -68,13 +69,13 @@ def _judged(f: Finding, i: int, path: WheelPath, rough: Mapping[int, Array]) -> 
     length = _length(path)
     places = slice(f.start // length, max(f.start // length + 1, f.stop // length))
     known = np.isfinite(rough[i][places]).any()
-    mine = float(np.nanmedian(rough[i][places])) if known else np.inf
-    rougher = known and mine > _RAISED * float(np.nanquantile(rough[i], _QUIET))  # noise, whatever the slow rest is
+    mine = float(median_known(rough[i][places])) if known else np.inf
+    rougher = known and mine > _RAISED * float(quantile_known(rough[i], _QUIET))  # noise, whatever the slow rest is
     if share is not None and share < (_SLOW_AT_ALL if rougher else _QUICK):
         return opened(f, _SLOW)
     for j, other in rough.items():
         if j != i and np.isfinite(other[places]).any():
-            meanwhile, usual = float(np.nanmedian(other[places])), float(np.nanquantile(other, _QUIET))
+            meanwhile, usual = float(median_known(other[places])), float(quantile_known(other, _QUIET))
             if meanwhile > max(_ROUGHER * usual, _OF_MINE * mine):
                 return limited(
                     f, _SHARED_P, "Another {wheel} becomes rough meanwhile: the ground or the supply may shake both."
@@ -108,7 +109,7 @@ def quick_share(y: Array, expected: Array, dt: float) -> float | None:
     if power <= 0.0 or not np.isfinite(changes).any():
         return None
     # the middle of them: a wheel that sticks and slips changes quickly now and then
-    return float(np.nanmedian(np.abs(changes)) / 0.6745 / np.sqrt(2.0 * power))
+    return float(median_known(np.abs(changes)) / 0.6745 / np.sqrt(2.0 * power))
 
 
 def _length(path: WheelPath) -> int:
@@ -123,5 +124,5 @@ def _roughness(path: WheelPath) -> Array:
     pieces = bent[: n * length].reshape(n, -1)
     known = np.isfinite(pieces).any(axis=1)
     out = np.full(n, np.nan)
-    out[known] = np.nanmedian(pieces[known], axis=1) / 0.6745 / np.sqrt(6.0)
+    out[known] = median_known(pieces[known], axis=1) / 0.6745 / np.sqrt(6.0)
     return out

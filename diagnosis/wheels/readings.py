@@ -20,6 +20,7 @@ from diagnosis.channels.noise_growth import noise_growth
 from diagnosis.channels.sample_status import PAIR
 from diagnosis.wheels.blocks import WheelBlocks
 from diagnosis.wheels.step_kernel import RESTLESS, RESTS
+from replay.arrays.quantiles import median_known, median_of, quantile_of
 
 Array = NDArray[np.float64]
 
@@ -83,9 +84,9 @@ def _usual_speed(y: Array) -> Array:
     known = np.isfinite(y)
     out = np.zeros(len(y))
     whole = known.all(axis=1)
-    out[whole] = np.median(y[whole], axis=1)
+    out[whole] = median_of(y[whole], axis=1)
     some = known.any(axis=1) & ~whole
-    out[some] = np.nanmedian(y[some], axis=1)
+    out[some] = median_known(y[some], axis=1)
     return out
 
 
@@ -98,7 +99,7 @@ def speed_noises(y: Array, status: NDArray[np.int8], habits: Sequence[Habit], dt
     known = np.array([g for g in found if g is not None]).reshape(-1, 3)
     if len(known) < _SIBLINGS:
         return [g if g is not None and g.grows else None for g in found]
-    floor, share = (float(x) for x in np.median(known[:, :2], axis=0))
+    floor, share = (float(x) for x in median_of(known[:, :2], axis=0))
     out: list[SpeedNoise | None] = []
     for g, habit in zip(found, habits, strict=True):
         if g is not None and (g.floor > _ALIKE * floor or g.share > _ALIKE * share + 1e-3):
@@ -119,7 +120,7 @@ def _growth(y: Array, new: NDArray[np.bool_], habit: Habit, dt: float) -> SpeedN
     if found is None:
         return None
     moving = size[size > 0.0]
-    return _at(found.floor, found.share, float(np.median(moving)) if moving.size else 0.0, habit)
+    return _at(found.floor, found.share, float(median_of(moving)) if moving.size else 0.0, habit)
 
 
 def _at(floor: float, share: float, speed: float, habit: Habit) -> SpeedNoise:
@@ -178,7 +179,7 @@ def _patience(rests: Array, habits: Sequence[Habit]) -> float:
     """Longest rest that says nothing [s], by the usual rests of the sensor that rests least but one."""
     if len(habits) < _SIBLINGS:
         return np.inf
-    usual = [float(np.quantile(one[one > 0.0], _RESTED)) if (one > 0.0).any() else 0.0 for one in rests.T]
+    usual = [float(quantile_of(one[one > 0.0], _RESTED)) if (one > 0.0).any() else 0.0 for one in rests.T]
     return max(_LEAST_REST_S, _LONG * float(np.sort(usual)[1]))
 
 

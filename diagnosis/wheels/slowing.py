@@ -13,6 +13,7 @@ from diagnosis.results.limited import limited
 from diagnosis.results.result import Hypothesis
 from diagnosis.results.sentence import About, is_about
 from diagnosis.wheels.inputs import WheelsData
+from replay.arrays.quantiles import median_known
 from replay.faults import FaultMode, Side, State
 
 _PASS_S, _SLOWED_S, _PASSED_S = 0.8, 0.5, 0.3  # before the onset, likewise, and after it
@@ -103,12 +104,12 @@ def _slows(data: WheelsData, i: int, f: Finding) -> bool:
     others = np.delete(part, i, axis=1)
     known = np.isfinite(part[:, i]) & np.isfinite(others).any(axis=1)
     speed, share = np.abs(part[:, i]), np.full(len(part), np.nan)
-    share[known] = speed[known] / np.maximum(np.abs(np.nanmedian(others[known], axis=1)), TURNS * data.span)
+    share[known] = speed[known] / np.maximum(np.abs(median_known(others[known], axis=1)), TURNS * data.span)
     if np.isfinite(share[: cut - start]).sum() < _FEW:
         return False
     least, most = _BETWEEN
     inside, levels = np.ones(len(part) - (cut - start), np.bool_), []
     for x in (speed, share):
-        levels.append(float(np.nanmedian(x[: cut - start])))
+        levels.append(float(median_known(x[: cut - start])))
         inside &= (x[cut - start :] > least * levels[-1]) & (x[cut - start :] < most * levels[-1])
     return bool(levels[-1] > _TURNED and np.count_nonzero(inside) >= max(_FEW, round(_PASSES_S / data.dt)))

@@ -15,6 +15,7 @@ from diagnosis.results.limited import limited
 from diagnosis.wheels.inputs import WheelsData
 from diagnosis.wheels.slowing import or_held
 from replay.arrays.blocks import blocks
+from replay.arrays.quantiles import median_known, median_of, quantile_known, quantile_of
 from replay.faults import FaultMode, Side
 
 Array = NDArray[np.float64]
@@ -78,8 +79,8 @@ def _may_creep(data: WheelsData, i: int, f: Finding) -> Finding:
     read = read[read > 0.0]
     if not read.size or not np.isfinite(opening).any():
         return f
-    least = float(np.quantile(read, _LEAST_READ))
-    given, unseen, _ = effective(np.full(1, np.nanmedian(opening)), plant, float(np.nanmedian(opening)))
+    least = float(quantile_of(read, _LEAST_READ))
+    given, unseen, _ = effective(np.full(1, median_known(opening)), plant, float(median_known(opening)))
     counts = least > _STEPS_OF_NONE * _least_step(data.y[:, i])  # it reads nothing between 0 and that
     creeps = counts and plant.K * float(given[0] + unseen[0]) < _CREEPS * least
     return limited(f, _TREMBLING, _CREEP) if creeps else f
@@ -100,7 +101,7 @@ def _off_before(data: WheelsData, i: int, f: Finding, told: Sequence[Finding]) -
         others = np.delete(y, i, axis=1)
         if not len(y):
             return 0.0, np.inf
-        return float(np.median(np.abs(y[:, i] - np.median(others, axis=1)))), float(np.median(np.ptp(others, axis=1)))
+        return float(median_of(np.abs(y[:, i] - median_of(others, axis=1)))), float(median_of(np.ptp(others, axis=1)))
 
     (early, _), (late, apart) = off(before), off(after)
     return limited(f, _TREMBLING, _OFF_BEFORE) if late > _FAR_OFF * apart and early > _ALREADY * late else f
@@ -113,14 +114,14 @@ def _with_company(data: WheelsData, i: int, f: Finding) -> Finding:
     own = data.y[part, i]
     if f.mode is not FaultMode.STUCK or not np.isfinite(own).any() or not np.isfinite(others).any():
         return f
-    level = float(np.nanmedian(own))
+    level = float(median_known(own))
     if _rests(data, i, part):
         return or_shifted(f, _RESTS)
     if moves_on(data, i, part):
         return f
     step = _step_at(data.y[:, i], level)
     near = max(_STEPS * step if np.isfinite(step) else 0.0, _AS_OTHERS * abs(level))
-    if abs(level - float(np.nanmedian(others))) <= near:
+    if abs(level - float(median_known(others))) <= near:
         return limited(f, _TREMBLING, _ALL_STAY)
     return limited(f, _TREMBLING, _GOES_ON) if _goes_on(data, i, f, near) else f
 
@@ -135,8 +136,8 @@ def _goes_on(data: WheelsData, i: int, f: Finding, near: float) -> bool:
     if not np.isfinite(y[before]).any() or not moving.size or repeats < _REPEATS * moving.size:
         return False
     inside = slice(f.start, f.stop)
-    same = abs(float(np.nanmedian(y[before]) - np.nanmedian(y[inside]))) <= near
-    asked = [float(np.nanmedian(u[part])) if np.isfinite(u[part]).any() else np.nan for part in (before, inside)]
+    same = abs(float(median_known(y[before]) - median_known(y[inside]))) <= near
+    asked = [float(median_known(u[part])) if np.isfinite(u[part]).any() else np.nan for part in (before, inside)]
     return bool(same and abs(asked[0] - asked[1]) <= _SHUT)
 
 
@@ -145,10 +146,10 @@ def _rests(data: WheelsData, i: int, part: slice) -> bool:
     others, opening = np.abs(np.delete(data.y[part], i, axis=1)), np.abs(data.u[part, i])
     known = np.isfinite(others).any(axis=1)
     fastest = np.max(others[known], axis=1, where=np.isfinite(others[known]), initial=0.0)
-    stands = known.any() and float(np.quantile(fastest, _STANDING)) <= TURNS * data.span
+    stands = known.any() and float(quantile_of(fastest, _STANDING)) <= TURNS * data.span
     opening = opening[np.isfinite(opening)]
-    shut = opening.size > 0 and float(np.quantile(opening, _STANDING)) <= _SHUT
-    return bool(stands and shut and abs(float(np.nanmedian(data.y[part, i]))) > TURNS * data.span)
+    shut = opening.size > 0 and float(quantile_of(opening, _STANDING)) <= _SHUT
+    return bool(stands and shut and abs(float(median_known(data.y[part, i]))) > TURNS * data.span)
 
 
 def followed(data: WheelsData, start: int, stop: int) -> slice:
@@ -160,15 +161,15 @@ def moves_on(data: WheelsData, i: int, part: slice) -> bool:
     """Whether the valve's opening, or the speed of most other wheels, which turn, changes meanwhile."""
     step = _least_step(data.y[:, i])
     others = np.delete(data.y[part], i, axis=1)
-    if others.size and np.isfinite(others).any() and float(np.nanmedian(np.abs(others))) <= TURNS * data.span:
+    if others.size and np.isfinite(others).any() and float(median_known(np.abs(others))) <= TURNS * data.span:
         return False  # all others stand: a wheel that stands reads one value, its offset too
     with np.errstate(invalid="ignore"):
-        moved = [float(np.nanquantile(c, 0.95) - np.nanquantile(c, 0.05)) for c in others.T if np.isfinite(c).any()]
+        moved = [float(quantile_known(c, 0.95) - quantile_known(c, 0.05)) for c in others.T if np.isfinite(c).any()]
     opening = data.u[part, i]
     opening = opening[np.isfinite(opening)]
-    opened = float(np.quantile(opening, 0.95) - np.quantile(opening, 0.05)) if opening.size else 0.0
+    opened = float(quantile_of(opening, 0.95) - quantile_of(opening, 0.05)) if opening.size else 0.0
     far = max(_MOVED * data.span, _STEPS * step if np.isfinite(step) else 0.0)
-    return opened > _OPENED or bool(moved and float(np.median(moved)) > far)
+    return opened > _OPENED or bool(moved and float(median_of(moved)) > far)
 
 
 def _step_at(y: Array, level: float) -> float:

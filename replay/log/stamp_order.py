@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from replay.arrays.blocks import blocks
+from replay.arrays.quantiles import median_of
 from replay.log.raw_log import Channel, RawLog
 from replay.number_words import told
 
@@ -132,7 +133,7 @@ def _usual(stamps: Stamps) -> float:
     parts = [stamps[k : k + _SAMPLE] for k in range(0, len(stamps), max(_SAMPLE, len(stamps) // 8))]
     steps = np.concatenate([np.diff(np.clip(p, -(2**62), 2**62)) for p in parts])
     rising = steps[steps > 0]
-    return float(np.median(rising)) if len(rising) else 0.0
+    return float(median_of(rising)) if len(rising) else 0.0
 
 
 def _leaves_order(stamps: Stamps, limit: int) -> bool:
@@ -266,8 +267,8 @@ def spread_ticks(stamps: Stamps, values: Sequence[object] | NDArray[np.generic])
     if len(first) < 3:
         return None
     ticks = np.diff(stamps[first])
-    tick = int(np.median(ticks))
-    usual = float(np.median(count))
+    tick = int(median_of(ticks))
+    usual = float(median_of(count))
     room = np.append(np.minimum(ticks, tick), tick)  # a tick without samples before the next is a gap
     share = np.arange(len(stamps)) - np.repeat(first, count)
     width = room / np.maximum(count, 1.0)

@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from replay.arrays.quantiles import median_of, quantile_of
 from replay.machine.config import Machine
 from replay.signals.timeline import Timeline
 
@@ -97,7 +98,7 @@ def measured_turns(line: Timeline, machine: Machine) -> tuple[Array, Array, floa
 
 def _medians(x: Array, width: int) -> Array:
     """Medians of `width` steps each, shape (m,); NaN where one is not known. `x` of shape (n,)."""
-    return np.asarray(np.median(x[: x.size // width * width].reshape(-1, width), axis=1), dtype=np.float64)
+    return np.asarray(median_of(x[: x.size // width * width].reshape(-1, width), axis=1), dtype=np.float64)
 
 
 def _doubts(
@@ -150,7 +151,7 @@ def _speed(seen: Mapping[str, Array], machine: Machine) -> Array:
         return np.full(len(next(iter(seen.values()), np.empty(0))), np.nan)
     side = np.column_stack(speeds)
     known = np.isfinite(side).all(axis=1)
-    return np.where(known, np.median(np.where(np.isfinite(side), side, 0.0), axis=1), np.nan)
+    return np.where(known, median_of(np.where(np.isfinite(side), side, 0.0), axis=1), np.nan)
 
 
 def _pairs(seen: Mapping[str, Array], machine: Machine) -> Iterator[_Pair]:
@@ -171,7 +172,7 @@ def _pairs(seen: Mapping[str, Array], machine: Machine) -> Iterator[_Pair]:
 def _lives(speed: Array | None) -> bool:
     """Whether a speed is logged, and is more than one value: a dead one turns the machine by nothing that it does."""
     known = np.zeros(0) if speed is None else speed[np.isfinite(speed)]
-    return bool(known.size and np.mean(known == np.median(known)) < _ONE_VALUE)
+    return bool(known.size and np.mean(known == median_of(known)) < _ONE_VALUE)
 
 
 def _measured(seen: Mapping[str, Array], speed: Array, dt: float) -> Iterator[_View]:
@@ -179,7 +180,7 @@ def _measured(seen: Mapping[str, Array], speed: Array, dt: float) -> Iterator[_V
     if yaw is None:
         return
     rest = (np.abs(speed) < _STILL) & np.isfinite(yaw)
-    bias = float(np.median(yaw[rest])) if np.count_nonzero(rest) * dt >= _STILL_S else 0.0
+    bias = float(median_of(yaw[rest])) if np.count_nonzero(rest) * dt >= _STILL_S else 0.0
     yield _View("imu.yaw_rate", "the measured yaw rate", yaw - bias)
 
 
@@ -223,7 +224,7 @@ def _alike(a: Array, b: Array, dt: float) -> int:
     a, b = a[known], b[known]
     if not a.size:
         return 0
-    least = [max(_TURNS * float(np.quantile(np.abs(x), _USUAL)), _LEAST_TURN) for x in (a, b)]
+    least = [max(_TURNS * float(quantile_of(np.abs(x), _USUAL)), _LEAST_TURN) for x in (a, b)]
     clear = (np.abs(a) > least[0]) & (np.abs(b) > least[1])
     shares = []
     for side in (clear & (b > 0), clear & (b < 0)):
@@ -252,7 +253,7 @@ def _axles(
         path = turn * (ends[0][1] - ends[1][1]) / speed
     x = np.column_stack([ends[0][2], -ends[1][2]])
     known = np.isfinite(path) & np.isfinite(x).all(axis=1)
-    known &= np.abs(speed) > _MOVES * float(np.quantile(np.abs(speed[np.isfinite(speed)]), _USUAL))
+    known &= np.abs(speed) > _MOVES * float(quantile_of(np.abs(speed[np.isfinite(speed)]), _USUAL))
     x, y = x[known], path[known]
     if len(y) * dt < 4 * _LEAST_S or min(np.std(x, axis=0)) < _LEAST_TURN:
         return ""
@@ -263,7 +264,7 @@ def _axles(
     for _ in range(3):
         c = np.linalg.lstsq(x[kept], y[kept], rcond=None)[0]
         off = np.abs(y - x @ c)
-        kept = off <= np.quantile(off, 1 - _TRIMMED)
+        kept = off <= quantile_of(off, 1 - _TRIMMED)
     if 1 - float(np.sum(off[kept] ** 2)) / float(np.sum(y[kept] ** 2)) < _SOUND or min(abs(c)) < _HALF:
         return ""
     by = "the measured yaw rate" if yaw is not None else "what the wheels turn"

@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from replay.arrays.quantiles import median_of, quantile_of
 from replay.log.source_options import SignalSource
 from replay.machine.config import Machine
 from replay.machine.quantities import DOUBTED_UNITS
@@ -127,7 +128,7 @@ def _apart(values: Mapping[str, Array], origins: Mapping[str, SignalSource], mac
     if not ratios:
         return None
     logs = np.array(list(ratios.values()))
-    middle = float(np.median(logs))
+    middle = float(median_of(logs))
     agree = int(np.count_nonzero(np.abs(logs - middle) < _NEAR))
     gross = abs(middle) > _GROSS and agree >= _VALVES and 2 * agree > logs.size
     alike = logs.size > _VALVES and abs(middle) > _SOME and float(np.ptp(logs)) < _ALIKE
@@ -161,7 +162,7 @@ def _gain(values: Mapping[str, Array], name: str, dt: float) -> float | None:
     y, u = position[use], command[use]
     if min(np.std(y), np.std(u)) <= 0.0 or np.corrcoef(position[known], command[known])[0, 1] < _FOLLOWS:
         return None
-    middle = float(np.median(y / u))
+    middle = float(median_of(y / u))
     return float(np.log(middle)) if middle > 0.0 else None
 
 
@@ -193,10 +194,10 @@ def _resting_open(timeline: Timeline, every: int, values: Mapping[str, Array], o
     rests, largest = [], max(_peak(values[n]) for n in names)
     for n in names:
         at_rest = values[n][still & np.isfinite(values[n])]
-        if at_rest.size < _LEAST or np.median(np.abs(at_rest - np.median(at_rest))) > _EVEN * largest:
+        if at_rest.size < _LEAST or median_of(np.abs(at_rest - median_of(at_rest))) > _EVEN * largest:
             return None
-        rests.append(float(np.median(at_rest)))
-    rest = float(np.median(rests))
+        rests.append(float(median_of(at_rest)))
+    rest = float(median_of(rests))
     if abs(rest) < _REST * largest or np.ptp(rests) > _EVEN * largest:
         return None
     first = origins[names[0]]
@@ -236,7 +237,7 @@ def _scaled(name: str, origin: SignalSource, machine: Machine, factor: float) ->
 
 def _peak(values: Array) -> float:
     finite = np.abs(values[np.isfinite(values)])
-    return float(np.quantile(finite, 0.99)) if finite.size else 0.0
+    return float(quantile_of(finite, 0.99)) if finite.size else 0.0
 
 
 def _listed(names: Sequence[str]) -> str:

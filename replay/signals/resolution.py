@@ -6,14 +6,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from replay.arrays.blocks import blocks
+from replay.arrays.quantiles import median_of, quantile_of
 
 Array = NDArray[np.float64]
 
 _WINDOW_S = 0.25
-_SOME, _WIDER = (
-    4_000,
-    2.0,
-)  # values that tell where a low quantile lies, and times its share, up to which values are ranked
+# values that tell where a low quantile lies, and times its share, up to which values are ranked
+_SOME, _WIDER = 4_000, 2.0
 
 
 def rounding_step(values: Array) -> float:
@@ -34,7 +33,7 @@ def rounding_step(values: Array) -> float:
     if steps.size < 20:
         return 0.0
     smallest = _low_quantile(steps, 0.01)
-    step = float(np.median(steps[steps < 1.5 * smallest]))
+    step = float(median_of(steps[steps < 1.5 * smallest]))
     multiple = steps / step
     whole = np.rint(multiple)
     multiple *= whole
@@ -56,8 +55,8 @@ def _low_quantile(values: Array, share: float) -> float:
     some = values[:: max(1, values.size // _SOME)]
     near = min(int(_WIDER * share * some.size) + 1, some.size - 1)
     few = values[values <= np.partition(some, near)[near]]
-    ranked = np.partition(few if few.size > k + 1 else values, (k, k + 1))
-    a, b, t = float(ranked[k]), float(ranked[k + 1]), place - k
+    ranked = np.partition(few if few.size > k + 1 else values, k)
+    a, b, t = float(ranked[k]), float(ranked[k + 1 :].min()), place - k
     return a + (b - a) * t if t < 0.5 else b - (b - a) * (1.0 - t)
 
 
@@ -111,4 +110,4 @@ def white_noise(values: Array, dt: float, quantile: float = 0.4) -> float:
         return float("nan")
     rms = np.concatenate(found)
     rms = rms[np.isfinite(rms)]
-    return float(np.quantile(rms, quantile)) if rms.size >= 3 else float("nan")
+    return float(quantile_of(rms, quantile)) if rms.size >= 3 else float("nan")

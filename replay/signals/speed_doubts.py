@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from replay.arrays.quantiles import median_of, quantile_of
 from replay.log.source_options import SignalSource
 from replay.machine.config import Machine
 from replay.machine.toml_text import signal_line
@@ -104,7 +105,7 @@ def speed_doubt(
     if len(factors) < _WHEELS:
         return None
     logs = np.array(list(factors.values()))
-    middle = float(np.median(logs))
+    middle = float(median_of(logs))
     alike = int(np.count_nonzero(np.abs(logs - middle) < _ALIKE))
     if abs(middle) < _SOME or alike < _WHEELS or 2 * alike <= len(pairs) or np.any(np.abs(logs) < _FITS):
         return None
@@ -143,16 +144,16 @@ def _of_wheel(timeline: Timeline, wheel: str, every: int) -> float | None:
     known = logs[np.isfinite(logs)]
     if known.size < 0.9 * logs.size:
         return None
-    middle = float(np.median(known))
-    parts = [float(np.median(part)) for part in np.array_split(known, _PARTS)]
-    if 1.4826 * float(np.median(np.abs(known - middle))) > _EVEN or np.ptp(parts) > _ALIKE:
+    middle = float(median_of(known))
+    parts = [float(median_of(part)) for part in np.array_split(known, _PARTS)]
+    if 1.4826 * float(median_of(np.abs(known - middle))) > _EVEN or np.ptp(parts) > _ALIKE:
         return None
     return middle
 
 
 def _moves(x: Array) -> NDArray[np.bool_]:
     size = np.where(np.isfinite(x), np.abs(x), 0.0)
-    return np.asarray(size > _MOVED * max(float(np.quantile(size, 0.99)), 1e-9))
+    return np.asarray(size > _MOVED * max(float(quantile_of(size, 0.99)), 1e-9))
 
 
 def _by(witness: Witness, timeline: Timeline, wheels: Sequence[str]) -> bool | None:
@@ -161,13 +162,13 @@ def _by(witness: Witness, timeline: Timeline, wheels: Sequence[str]) -> bool | N
     for leaf in ("v", f"v{_SECOND}"):
         every = [np.asarray(timeline.signals[f"wheel.{w}.{leaf}"], dtype=np.float64) for w in wheels]
         each = np.abs([_blocks(x, witness.width) for x in every])
-        speed = np.median(each, axis=0)
+        speed = median_of(each, axis=0)
         use = _moves(witness.speed) & _moves(speed)
         with np.errstate(invalid="ignore"):  # in a turn no wheel goes as fast as the body
             use &= np.ptp(each, axis=0) < _STRAIGHT * speed
         if np.count_nonzero(use) * witness.width * timeline.dt < _LEAST_S:
             return None
-        off.append(abs(float(np.median(np.log(speed[use] / witness.speed[use])))))
+        off.append(abs(float(median_of(np.log(speed[use] / witness.speed[use])))))
     agree = [x < _SLIPS for x in off]
     return agree[0] if agree[0] != agree[1] else None
 
@@ -195,11 +196,11 @@ def _second_is_wrong(timeline: Timeline, wheels: list[str], every: int) -> bool:
         if np.count_nonzero(use) >= _LEAST:
             size = np.log(np.abs(r[use]))
             apart.append(
-                (float(np.median(np.log(np.abs(y[use])) - size)), float(np.median(np.log(np.abs(x[use])) - size)))
+                (float(median_of(np.log(np.abs(y[use])) - size)), float(median_of(np.log(np.abs(x[use])) - size)))
             )
     if not apart:
         return False
-    first, second = np.abs(np.median(np.array(apart), axis=0))
+    first, second = np.abs(median_of(np.array(apart), axis=0))
     return bool(second > first)
 
 

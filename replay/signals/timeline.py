@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from replay.arrays.blocks import blocks, release
 from replay.arrays.column_store import ColumnStore
 from replay.arrays.compiling import njit
+from replay.arrays.quantiles import median_of
 from replay.errors import LogError
 from replay.log.empty_log import without_numbers
 from replay.signals.signal import Signal, Signals
@@ -127,10 +128,10 @@ def median_period(stamps: NDArray[np.int64]) -> int:
     """Median distance of stamps [ns]; of stamps in bunches, half of the distance on the whole. Stamps of shape (n,); 0 for fewer than two."""
     if stamps.size < 2:
         return 0
-    median = int(np.median(np.diff(stamps)))
+    median = int(median_of(np.diff(stamps)))
     if stamps.size <= 2 * _BUNCH:
         return median
-    return max(median, int(np.median(stamps[_BUNCH:] - stamps[:-_BUNCH])) // (2 * _BUNCH))
+    return max(median, int(median_of(stamps[_BUNCH:] - stamps[:-_BUNCH])) // (2 * _BUNCH))
 
 
 class _Periods:

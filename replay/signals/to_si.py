@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from replay.arrays.blocks import blocks, release
 from replay.arrays.column_store import ColumnStore
+from replay.arrays.quantiles import quantile_of
 from replay.errors import ConfigError
 from replay.log.source_options import SignalSource
 from replay.log.stamp_order import spread_ticks
@@ -216,7 +217,7 @@ def magnitudes(values: NDArray[Any]) -> NDArray[np.float64]:
 def peak_of(values: NDArray[Any]) -> float:
     """99th percentile of the magnitude; 0 where there is no number. `values` of shape (n,), the peak in their unit."""
     finite = magnitudes(values)
-    return float(np.percentile(finite, 99)) if len(finite) else 0.0
+    return float(quantile_of(finite, 0.99)) if len(finite) else 0.0
 
 
 def choose_motor_or_wheel(signal: str, origin: SignalSource, values: NDArray[Any], machine: Machine) -> SignalSource:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from diagnosis.wheels.frames.signals import MissionSignals, WheelSignals
 from diagnosis.wheels.frames.windows import MIDDLE, WINDOWS, Steps, bounded, cuts, windowed
+from replay.arrays.quantiles import median_of
 
 Array = NDArray[np.float64]
 
@@ -152,7 +153,7 @@ def _shapes(w: Array, mean: Array, drives: NDArray[np.bool_]) -> Array:
     q = RELATIONS
     known = np.maximum(w[:, [q, q + 1, q + 2, q + 5]], 1e-9)
     spread = np.sqrt(np.maximum(w[:, 2 * q : 2 * q + 4] / known - mean[:, [0, 1, 2, 5]] ** 2, 0.0)) + 1e-5
-    usual = np.array([np.median(x) if (x := s[drives & np.isfinite(s)]).size else 1.0 for s in spread.T])
+    usual = np.array([median_of(x) if (x := s[drives & np.isfinite(s)]).size else 1.0 for s in spread.T])
     out = [*np.log10(spread / usual).T]
     for product, first in ((2 * q + 4, 0), (2 * q + 5, 2)):
         joint = w[:, product] / known[:, first] - mean[:, first] * mean[:, 1]
@@ -185,9 +186,9 @@ def deviation_features(i: int, found: Mapping[int, Deviations]) -> Array:
         stated = own.values[k][:, :_STATED]
         if others:
             z = np.nan_to_num(np.array([o.scaled[k] for o in others]))
-            v = np.median(np.nan_to_num(np.array([o.values[k] for o in others])), axis=0)[:, :_STATED]
+            v = median_of(np.nan_to_num(np.array([o.values[k] for o in others])), axis=0)[:, :_STATED]
             top = np.take_along_axis(z, np.abs(z).argmax(axis=0)[None], axis=0)[0]
-            out += [np.median(z, axis=0), top, v, np.nan_to_num(stated) - v]
+            out += [median_of(z, axis=0), top, v, np.nan_to_num(stated) - v]
         else:
             out.append(np.zeros((frames, 2 * (RELATIONS + _STATED))))
         out.append(stated)

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from diagnosis.wheels.frames.signals import MissionSignals, WheelSignals
 from diagnosis.wheels.frames.windows import MISSING, Steps, bounded, windowed
 from diagnosis.wheels.models import JointModel
+from replay.arrays.quantiles import median_of
 
 Array = NDArray[np.float64]
 
@@ -54,7 +55,7 @@ def _others(i: int, model: JointModel, seen: MissionSignals) -> Array:
     if not apart:
         return np.zeros((6, len(seen.speed)))
     found = np.array(apart)
-    return np.concatenate([np.median(found, axis=0), np.abs(found).max(axis=0)])
+    return np.concatenate([median_of(found, axis=0), np.abs(found).max(axis=0)])
 
 
 def _share(a: Array, b: Array) -> Array:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from replay.arrays.quantiles import median_of
 from replay.readers.common.clock_steps import lead_of
 
 _DRIFT_NS = 20_000_000
@@ -41,10 +42,10 @@ class Lead:
         if n < 12 or not 0.1 < _extent(header) / max(_extent(log), 1.0) < 10:
             return None
         ends = slice(0, n // 3), slice(n - n // 3, n)
-        at = tuple(int(np.median(log[e] - log[0])) + int(log[0]) for e in ends)
+        at = tuple(int(median_of(log[e] - log[0])) + int(log[0]) for e in ends)
         lead = lead_of(header, log)
-        ahead = tuple(int(np.median(lead[e])) for e in ends)
-        scatter = max(float(np.median(np.abs(lead[e] - a))) for e, a in zip(ends, ahead, strict=True))
+        ahead = tuple(int(median_of(lead[e])) for e in ends)
+        scatter = max(float(median_of(np.abs(lead[e] - a))) for e, a in zip(ends, ahead, strict=True))
         return Lead(count, (at[0], at[1]), (ahead[0], ahead[1]), scatter)
 
     @property

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from replay.arrays.quantiles import median_of
 from replay.log.raw_log import Channel, Clock
 from replay.log.reading_notes import Report
 from replay.number_words import told
@@ -114,7 +115,7 @@ class Clocks:
         out[rows] = own
         zero = ~given & (stamps == 0)
         if zero.any():
-            lead = int(np.median(lead_of(own, beside)))
+            lead = int(median_of(lead_of(own, beside)))
             shift = lead if abs(lead) > FAR_NS else 0
             if name == "header" or self.clock == name:
                 say(f"{label}: {zero.sum()} of {len(log)} {name} stamps are zero; log stamps are used instead")
@@ -124,7 +125,7 @@ class Clocks:
     def _compare(self, label: str, stamps: NDArray[np.int64], log: NDArray[np.int64]) -> None:
         """Remember how a topic's header clock relates to the log clock, and say where it drifts."""
         thin = slice(None, None, max(1, len(log) // _SAMPLES))
-        ahead = int(np.median(lead_of(stamps[thin], log[thin])))
+        ahead = int(median_of(lead_of(stamps[thin], log[thin])))
         lead = Lead.of(log[thin], stamps[thin], len(log))
         if abs(ahead) > FAR_NS:
             self.far.setdefault(_span(ahead), []).append(label)

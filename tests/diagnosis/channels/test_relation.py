@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from diagnosis.channels.relation import Relation, _loss, relation_of, relations_of_kind, valves_of_kind
+from diagnosis.channels.relation import Relation, _Filled, _loss, relation_of, relations_of_kind, valves_of_kind
 
 DT, N = 0.001, 60_000
 Array = np.ndarray
@@ -140,3 +140,19 @@ def test_nothing_settles_after_a_gap_of_the_reference() -> None:
     whole, seen = follows.expected(x, 0.01), follows.expected(known, 0.01)
     assert np.isnan(seen[1002:1032]).all()
     assert seen[1032:] == pytest.approx(whole[1032:], abs=2e-3)
+
+
+def test_lags_and_plays_that_are_tried_at_once_are_each_as_if_alone() -> None:
+    x = np.cumsum(np.random.default_rng(8).normal(0.0, 0.1, 500))
+    x[40:60] = np.nan
+    ways = [(0.0, 0.0), (0.02, 0.0), (0.0, 0.3), (0.05, 0.1)]
+    together = _Filled.of(x).followed(ways, 0.001)
+    for (lag, play), found in zip(ways, together, strict=True):
+        alone = Relation(lag=lag, play=play).expected(x, 0.001)
+        assert np.array_equal(found, alone, equal_nan=True)
+        held = y = float(x[0])
+        for k in range(40):
+            held = min(max(held, x[k] - play / 2), x[k] + play / 2)
+            keep = float(np.exp(-0.001 / lag)) if lag else 0.0
+            y = keep * y + (1.0 - keep) * held
+            assert found[k] == y

@@ -49,3 +49,12 @@ def test_what_is_no_number_and_what_is_absurd_stays() -> None:
 def test_probabilities_are_kept_to_a_256th() -> None:
     name, p = "evidence.FR.sensor.p_stuck", np.linspace(0, 1, 1000)
     assert np.abs(stored(name, p, grid_of(name, p)) - p).max() <= 1 / 512 + 1e-9
+
+
+def test_the_grid_takes_what_is_finite_and_small_enough() -> None:
+    huge = 2.0**24
+    values = np.array([np.nan, np.inf, -np.inf, -0.0, 0.4, -0.13, huge + 4.0, -3e38, 1e-45], np.float32)
+    found = stored("wheel.FR.v", values, 0.25)
+    expected = np.array([np.nan, np.inf, -np.inf, 0.0, 0.5, -0.25, huge + 4.0, -3e38, 0.0], np.float32)
+    assert np.array_equal(found, expected, equal_nan=True)
+    assert not np.signbit(found[[3, 8]]).any()
