@@ -26,8 +26,8 @@ from diagnosis.steering.models import SteeringModel
 from diagnosis.steering.path import start_states
 from diagnosis.steering.plant import SteeringPlant
 from diagnosis.steering.prediction_kernel import predict
-from diagnosis.steering.step_kernel import advance
 from diagnosis.steering.valve_map import ValveMap, expected_rate, rate_at
+from tests.diagnosis.steering.kernels import advance
 
 VALVE = ValveMap(4.0, 4.4, 0.01, 0.012, 0.25, 0.24)
 MODEL = SteeringModel(
@@ -123,7 +123,7 @@ def test_model_is_filterpys_extended_kalman_filter(m: int) -> None:
         )
         if ACTUATOR[m] in (INEFFICIENT, NOISY):
             kf.x[2, 0] = min(max(kf.x[2, 0], 0.1), 0.92)
-        block = Block(y, 2.6e-7 if not dead else 0.0, 10.0, driven, SPREAD, u, PACE, PAIR)
+        block = Block(y, 2.6e-7 if not dead else 0.0, 10.0, driven, SPREAD, u, PACE, np.int8(PAIR))
         advance(m, block, NOTHING, constants, bank)
         assert_allclose(z[m], kf.x[:, 0], atol=1e-9, rtol=1e-9)
         assert_allclose(P[m], kf.P, atol=1e-9, rtol=1e-7)

@@ -14,9 +14,10 @@ from diagnosis.steering.filter_state import Array, Block, BlockSeries, FilterBan
 from diagnosis.steering.model_bank import HEALTHY, MODELS, NO_SIGNAL, NOISY, SENSOR, STUCK
 from diagnosis.steering.models import model_of
 from diagnosis.steering.path import AxleFilter, allowed_models, start_states
-from diagnosis.steering.step_kernel import advance, enter
+from diagnosis.steering.step_kernel import enter
 from diagnosis.steering.waiting_kernel import learning_cost, most_gained, switch_cost
 from replay.arrays.compiling import njit
+from tests.diagnosis.steering.kernels import advance
 from tests.diagnosis.steering.test_path import DT, PLANT, SensorNoise, blocks_of, driven_by
 
 SECONDS = 16.0
