@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from diagnosis.results.machine_words import MachineWords
+from diagnosis.results.plain_numbers import with_minus_signs
 
 #: What a sentence on a gyro has in it where it is off by a constant, and where the ground is named already.
 GYRO_CONSTANT, GYRO_SLIP = "more than the {wheels} make", "unless the ground let them slip"
@@ -53,9 +54,9 @@ class MachineEvent:
         return replace(
             self,
             title=words.fill(self.title),
-            text=words.fill(self.text),
-            doubt=words.fill(self.doubt),
-            act=words.fill(self.act),
+            text=with_minus_signs(words.fill(self.text)),
+            doubt=with_minus_signs(words.fill(self.doubt)),
+            act=with_minus_signs(words.fill(self.act)),
         )
 
 

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.results.result import Epsilon, Sat
-from diagnosis.wheels.models import A_BIAS, A_GAIN, A_NONE, A_STUCK, S_GAIN, TOTAL_SENSOR, WheelFilterModel
+from diagnosis.wheels.models import A_BIAS, A_GAIN, A_NONE, A_STUCK, S_GAIN, S_NONE, TOTAL_SENSOR, WheelFilterModel
 
 Array = NDArray[np.float64]
 
@@ -39,7 +39,9 @@ def estimate(m: int, y: Array, z: Array, P: Array, model: WheelFilterModel) -> t
     if m in TOTAL_SENSOR:
         if not y.size:
             return Epsilon(1.0, 1.0, 1.0), None
-        level, rms = float(np.mean(y)), float(np.sqrt(np.mean(y**2)))
+        # of a silent sensor readings at the ends, before it fell silent or when it came back, are none of its own
+        level = float(np.median(y) if m == S_NONE else np.mean(y))
+        rms = float(np.sqrt(np.mean(y**2)))
         half = 1.96 * model.rounding
         return Epsilon(1.0, 1.0, 1.0), Sat(level, rms, level - half, level + half, "m/s")
     if m in (S_GAIN, A_GAIN):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 
 from diagnosis.results.machine_event import GYRO_CONSTANT, GYRO_SLIP, gyro_or_slip
+from diagnosis.results.machine_words import HYDRAULIC
 
 
 @pytest.mark.parametrize(
@@ -23,3 +24,7 @@ def test_a_gyro_that_stays_is_the_gyros() -> None:
     )
     assert event.title == "The gyro contradicts the {wheels}"
     assert "lip" not in event.text
+
+
+def test_what_happens_to_the_machine_is_told_with_minus_signs() -> None:
+    assert "−0.10 × what" in gyro_or_slip("the gyro reads -0.10 × what the {wheel}s make").worded(HYDRAULIC).text
