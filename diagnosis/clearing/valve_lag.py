@@ -49,7 +49,10 @@ def delayed(opening: Array, dt: float, delay_s: float, lag_s: float) -> Array:
 
 
 def misfit(rate: Array, opening: Array, use: Flags) -> float:
-    """Mean share of their rates that the openings of all axles leave unexplained [1], by the best dead band and gain of each; infinite of none."""
+    """Mean share of their rates that the openings of all axles leave unexplained [1], by the best dead band and gain of each; infinite of none.
+
+    Rates [rad/s], openings [1] and what counts, of shape (cells, axles).
+    """
     left = []
     for r, u, some in zip(rate.T, opening.T, use.T, strict=True):
         past = np.sign(u[some]) * np.maximum(np.abs(u[some]) - _DEAD[:, np.newaxis], 0.0)

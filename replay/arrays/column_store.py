@@ -13,6 +13,7 @@ import math
 import mmap
 import os
 import tempfile
+import threading
 import weakref
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
@@ -53,6 +54,9 @@ class ColumnStore:
     flush: int = 4 << 20
     used: int = field(default=0, init=False)
     _maps: weakref.WeakSet[mmap.mmap] = field(default_factory=weakref.WeakSet, init=False, repr=False)
+    _mapping: threading.Lock = field(
+        default_factory=threading.Lock, init=False, repr=False
+    )  # families make columns at once
     _ones: dict[int, NDArray[np.float64]] = field(default_factory=dict, init=False, repr=False)
 
     def column(self, dtype: DTypeLike, width: tuple[int, ...] = (), rows: int | None = None) -> Column:
@@ -165,7 +169,9 @@ class ColumnStore:
 
     def release(self) -> None:
         """Let go of the memory of all columns in temporary files until they are read again."""
-        for mapped in list(self._maps):
+        with self._mapping:
+            maps = list(self._maps)
+        for mapped in maps:
             unload(mapped)
 
     def end_stage(self) -> None:
@@ -191,7 +197,8 @@ class ColumnStore:
     def _mapped(self, file: IO[bytes], size: int, dtype: np.dtype[Any]) -> NDArray[Any]:
         """Numbers of a temporary file, shape (n,); `size` 0 for all of it."""
         mapped = mmap.mmap(file.fileno(), size, access=mmap.ACCESS_WRITE)
-        self._maps.add(mapped)
+        with self._mapping:
+            self._maps.add(mapped)
         return np.frombuffer(mapped, dtype)
 
 

@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import errno
 import gc
+import sys
 import tempfile
+import threading
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
+from numpy.typing import NDArray
 
+from replay.arrays import column_store
 from replay.arrays.blocks import blocks, release
 from replay.arrays.column_store import ColumnStore
 from replay.errors import LogError
@@ -153,3 +157,21 @@ def test_full_temporary_folder_is_said(tiny: ColumnStore, monkeypatch: pytest.Mo
         tiny.keep(np.arange(1000.0))
     with pytest.raises(LogError, match=r"set TMPDIR"):
         tiny.zeros((1000,), np.float64)
+
+
+def test_columns_are_made_by_one_thread_while_another_lets_go_of_them(
+    tiny: ColumnStore, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    usual = sys.getswitchinterval()
+    monkeypatch.setattr(column_store, "unload", lambda mapped: None)
+    kept: list[NDArray[Any]] = []
+    making = threading.Thread(target=lambda: kept.extend(tiny.zeros((4096,), np.float64) for _ in range(400)))
+    sys.setswitchinterval(1e-6)
+    try:
+        making.start()
+        while making.is_alive():
+            tiny.release()
+    finally:
+        sys.setswitchinterval(usual)
+        making.join()
+    assert len(kept) == 400
