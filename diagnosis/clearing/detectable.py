@@ -33,8 +33,6 @@ _NOISE_MARGIN: Mapping[float | None, float] = {
     10.0: 0.8,
     None: 1.0,
 }  # loops answer to noise, and make it larger
-_MOST_EXCESS = 4.0  # a sensor or valve that gives more than five times as much leaves its range
-_MOST: Mapping[Deviation, float] = {Deviation.INEFFICIENT: 1.0, Deviation.EXCESS: _MOST_EXCESS}
 _STEERED_S = 0.5  # of a fault of a steering axle, which mostly rests
 
 
@@ -125,7 +123,7 @@ def _row(
     if unit:
         sizes = (_NOISE_MARGIN if deviation is Deviation.NOISY else _MARGIN[g.kind])[length] * sizes
     size = float(quantile_of(sizes, _SURE, method="higher")) if sizes.size else np.inf
-    if size > _MOST.get(deviation, np.inf):
+    if unit == "1" and deviation is Deviation.INEFFICIENT and size > 1.0:
         size = np.inf
     share = None if natural is None or not sizes.size else float(np.mean(sizes <= natural))
     known = size if np.isfinite(size) else None

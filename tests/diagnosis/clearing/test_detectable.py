@@ -144,17 +144,6 @@ def test_a_loop_that_counters_an_excess_hides_some_of_it() -> None:
     np.testing.assert_allclose(countered(less), [0.0, 0.0, 0.25, 1.0, np.inf, np.inf])
 
 
-@pytest.mark.parametrize(("size", "shown"), [(2.0, True), (18.0, False)])
-def test_more_than_any_sensor_or_valve_can_give_is_not_shown(
-    monkeypatch: pytest.MonkeyPatch, size: float, shown: bool
-) -> None:
-    monkeypatch.setattr(Gauges, "excesses", lambda self, places: np.full(places.first.size, size))
-    rows = detectable(in_cells(simulated(), base=False)).rows
-    some = [r for r in rows if r.deviation is Deviation.EXCESS and r.for_s == 10.0 and r.places]
-    assert some
-    assert all((r.size is not None) is shown for r in some)
-
-
 def test_an_angle_that_is_off_shows_where_the_machine_goes_straight() -> None:
     off = np.full(600, np.nan)
     off[100:300] = 0.01
