@@ -138,7 +138,7 @@ def _wheels(cells: Cells) -> Iterator[Gauges]:
     clear_at, top = cells.machine.limits.clear_at, cells.machine.max_speed
     used = np.where(np.isfinite(opening), opening, command)
     followed = as_followed(cells, opening, command, valves.OPENING)
-    responses = resp.responses_of(cells, speed, used, cells.reference, beyond_dead=True)
+    responses = resp.wheel_responses(cells)
     limits = response_limits(
         responses, measured_twice(cells), clear_at, cells.carried_shares, cells.ahead, driven=len(cells.driven)
     )

@@ -106,6 +106,19 @@ def responses_of(
     return found
 
 
+def wheel_responses(cells: Cells) -> Responses:
+    """Those of all wheels outside their stated faults, by measured openings where there are any, else by commands: what is checked, and what would show."""
+
+    def found() -> Responses:
+        command, opening = cells.wheels("u"), cells.wheels("u_applied")
+        apart = np.column_stack([cells.apart(wheel) for wheel in cells.machine.wheels])
+        speed = np.where(apart, cells.wheels("v"), np.nan)
+        used = np.where(np.isfinite(opening), opening, command)
+        return responses_of(cells, speed, used, cells.reference, beyond_dead=True)
+
+    return cells.once_beside("responses of wheels", found)
+
+
 def _in_turns(found: Responses, evened: Responses) -> Responses:
     """What deviates and changes as it is and with turns evened out: a wheel that turns far, or is on its way there, follows no straight line."""
     changes = [

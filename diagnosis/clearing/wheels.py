@@ -18,7 +18,7 @@ from diagnosis.clearing.opening_offsets import opening_offsets
 from diagnosis.clearing.openings import openings_tell
 from diagnosis.clearing.pairs import FALLS, pairs_fall
 from diagnosis.clearing.plant_response import LIMIT, beside_plant
-from diagnosis.clearing.responses import OTHERS, USUAL_TOP, largest, others_at, responses_of
+from diagnosis.clearing.responses import OTHERS, USUAL_TOP, largest, others_at, responses_of, wheel_responses
 from diagnosis.clearing.same_side import beside_its_side
 from diagnosis.clearing.seconds import alone_apart, less_at_starts, off_second
 from diagnosis.clearing.valves import valve_checks
@@ -68,7 +68,7 @@ def wheel_checks(cells: Cells, clear_at: float) -> Iterator[Checked]:
     used = np.where(np.isfinite(opening), opening, command)
     apart = np.column_stack([cells.apart(wheel) for wheel in cells.machine.wheels])
     speed, second, opening = (np.where(apart, x, np.nan) for x in (speed, second, opening))
-    responses = responses_of(cells, speed, used, reference, beyond_dead=True)
+    responses = wheel_responses(cells)
     tells = openings_tell(cells, responses)
     windows, lasting = responses.windows, responses.usual
     slow = responses_of(cells, speed, used, reference, CREEPING * USUAL_TOP, over_time=False, beyond_dead=True).windows
