@@ -138,7 +138,7 @@ def wheel_checks(cells: Cells, clear_at: float) -> Iterator[Checked]:
             if not all(twice[i]):  # of a wheel that is measured twice on both sides, it is the ground's doing
                 yield worst(cells, (*about, either, Check.EXCESS), windows[:, i], own.above, apart=True)
                 yield lasts(cells, (*about, either, Check.LASTING_EXCESS), lasting[i].above, own.lasting_above)
-            if tells and not any(twice[i]) and i in beside:
+            if tells and not twice[i][1] and i in beside:
                 yield worst(cells, (*about, either, Check.SAME_SIDE), *beside[i], apart=True)
             if tells and (not any(twice[i]) or powered == PAIR) and np.isfinite(offsets[1][i]):
                 about_opening = (*about, either, Check.OPENING_OFFSET)

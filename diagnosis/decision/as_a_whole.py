@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 
 from diagnosis.clearing.cells import Array, Cells
 from diagnosis.clearing.yaw import turn_by_angles
-from diagnosis.decision.common_response import common_change, common_spell
+from diagnosis.decision.common_response import common_change
+from diagnosis.decision.common_spell import common_spell
 from diagnosis.decision.course import FEW, FLOOR, Course
 from diagnosis.decision.scale import bodies
 from diagnosis.results.machine_event import (

@@ -50,7 +50,9 @@ def test_a_wheel_that_is_measured_twice_on_both_sides_keeps_its_limit_of_what_is
     usual = usual_limits(TWICE, CLEAR_AT)
     limits = response_limits(of, [TWICE] * 4, CLEAR_AT)
     assert [(limit.above, limit.lasting_above) for limit in limits] == [(usual.above, usual.lasting_above)] * 4
-    assert limits[0].below == pytest.approx(0.288)  # the others' are much less: what is left is behind its valve
+    assert (
+        limits[0].below == usual.below < 0.288
+    )  # the others' are much less, but what is left is behind its valve; a loss that counts is beyond it
 
 
 def test_a_change_that_one_wheel_alone_makes_counts_although_it_is_measured_twice() -> None:

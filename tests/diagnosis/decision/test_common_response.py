@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from diagnosis.decision.common_response import _largest, _spell, _unusual
+from diagnosis.decision.common_response import _largest
 
 N = 160
 RNG = np.random.default_rng(7)
@@ -31,26 +31,3 @@ def test_what_is_never_driven_alike_is_not_known() -> None:
     level = np.where(np.arange(N) < 80, 0.0, 1.0)
     found = _largest(level, level)
     assert found is None or found[0] == 0.0
-
-
-@pytest.mark.parametrize("off", [-0.35, 0.3])
-def test_a_spell_beside_what_is_usual_at_the_same_speed(off: float) -> None:
-    inside = (np.arange(N) >= 60) & (np.arange(N) < 72)
-    found = _spell(np.arange(N), _unusual(LEVEL, VALVE + off * inside), 10)
-    assert found is not None
-    assert found.off == pytest.approx(off, abs=0.06)
-    assert 59 <= found.start <= 63
-    assert found.unusual < 0.03
-
-
-def test_what_is_as_usual_at_its_speed_is_no_spell() -> None:
-    found = _spell(np.arange(N), _unusual(LEVEL, VALVE), 10)
-    assert found is not None
-    assert abs(found.off) < 0.03
-
-
-def test_speeds_that_are_hardly_driven_tell_nothing() -> None:
-    at = np.arange(6)
-    assert np.isnan(_unusual(np.arange(6.0), np.zeros(6))).all()
-    assert _spell(at, _unusual(np.arange(6.0), np.zeros(6)), 4) is None
-    assert _spell(at, np.zeros(6), 10) is None
