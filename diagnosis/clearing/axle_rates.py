@@ -38,8 +38,9 @@ class Rates(NamedTuple):
         Against the axle's usual one, and no more than against that of each side where it is steered to both for a while in both halves of
         the mission.
     apart : list[float | None]
-        How far that over the mission is from the other axle's, or, of the only one, from what the machine file's [steering] lets
-        expect; None where an axle is hardly steered.
+        How far that over the mission is from the other axle's, or, of the only one, from `planned`; None where an axle is hardly steered.
+    planned : list[float | None]
+        How far it is from what the machine file's [steering] lets expect; None without that, or where an axle is hardly steered.
     ahead : list[tuple[float, ...]]
         By how much each axle is ahead of its neighbours over the mission, as `apart` has it, but with its sign; empty of the only one.
     weight : Array, shape (cells, axles)
@@ -55,6 +56,7 @@ class Rates(NamedTuple):
     frame: Frame
     off: Array
     apart: list[float | None]
+    planned: list[float | None]
     ahead: list[tuple[float, ...]]
     weight: Array
     changes: list[float | None]
@@ -98,9 +100,10 @@ def _rates(cells: Cells, rate: Array, opening: Array, use: Flags) -> Rates:
         whole = np.log(np.maximum(turned.sum(axis=0) / opened.sum(axis=0), 1e-3))
     whole = np.where(steered.sum(axis=0) * cells.dt >= _FEW_S, whole, np.nan)
     apart: list[float | None] = [None] * len(whole)
+    planned = _by_plants(cells, turned, np.where(steered, opening, 0.0))
     one = len(apart) == 1 or (len(apart) > 1 and one_joint(cells, 0, 1))
     if one:
-        apart = [_by_plant(cells, turned[:, 0], np.where(steered, opening, 0.0)[:, 0])] * len(apart)
+        apart = planned[:1] * len(apart)
     for j in np.flatnonzero(np.isfinite(whole) & (turned.sum(axis=0) <= 0.0)):
         apart[j] = _WRONG_WAY
     ahead: list[tuple[float, ...]] = [()] * len(whole)
@@ -117,7 +120,7 @@ def _rates(cells: Cells, rate: Array, opening: Array, use: Flags) -> Rates:
     changes, off = [_changes(cells, frame, evened, j) for j in range(len(whole))], _nearest([off, evened])
     as_they_are, by_side = _parted(tried), _parted(ways)
     parted = [a if b is None else b if a is None else min(a, b) for a, b in zip(as_they_are, by_side, strict=True)]
-    return Rates(frame, off, apart, ahead, turned, changes, parted)
+    return Rates(frame, off, apart, planned, ahead, turned, changes, parted)
 
 
 def _between(rate: Array, opening: Array, use: Flags, dead: Array) -> float:
@@ -231,19 +234,20 @@ def _nearest(off: Sequence[Array]) -> Array:
     return np.asarray(np.where(low > 0.0, low, np.where(high < 0.0, high, 0.0 * low)))
 
 
-def _by_plant(cells: Cells, ahead: Array, opening: Array) -> float | None:
-    """How far the rates of the only steered axle are off those that its plant gives at these openings, over the mission [ln].
+def _by_plants(cells: Cells, ahead: Array, opening: Array) -> list[float | None]:
+    """How far the rates of each axle are off those that its plant gives at these openings, over the mission [ln].
 
-    None without a plant, or where it is hardly steered. Rates ahead [rad/s] and openings [1] of shape (cells,).
+    None without a plant, or where it is hardly steered. Rates ahead [rad/s] and openings [1] of shape (cells, axles).
     """
-    plant = cells.machine.steering.get(cells.machine.axles[0])
-    if plant is None or np.count_nonzero(opening) * cells.dt < _FEW_S:
-        return None
-    size, up = np.abs(opening), opening > 0.0
-    given = np.where(up, plant.slope_up, plant.slope_down) * np.maximum(
-        size - np.where(up, plant.dead_up, plant.dead_down), 0.0
-    )
-    for sign, most in ((up, plant.limit_up), (~up, plant.limit_down)):
-        given = np.where(sign & (given > most), most, given) if most is not None else given
-    expected = float(given[opening != 0.0].sum())
-    return abs(float(np.log(max(ahead.sum() / expected, 1e-3)))) if expected > 0.0 else None
+    found: list[float | None] = []
+    for axle, turned, opened in zip(cells.machine.axles, ahead.T, opening.T, strict=True):
+        plant, expected = cells.machine.steering.get(axle), 0.0
+        if plant is not None and np.count_nonzero(opened) * cells.dt >= _FEW_S:
+            size, up = np.abs(opened), opened > 0.0
+            slope, dead = np.where(up, plant.slope_up, plant.slope_down), np.where(up, plant.dead_up, plant.dead_down)
+            given = slope * np.maximum(size - dead, 0.0)
+            for sign, most in ((up, plant.limit_up), (~up, plant.limit_down)):
+                given = np.where(sign & (given > most), most, given) if most is not None else given
+            expected = float(given[opened != 0.0].sum())
+        found.append(abs(float(np.log(max(turned.sum() / expected, 1e-3)))) if expected > 0.0 else None)
+    return found

@@ -102,6 +102,8 @@ def axle_checks(cells: Cells, clear_at: float) -> Iterator[Checked]:
             # both sides of which are measured twice needs nothing to compare with
             if not twice or (against is Check.LASTING_RATE and rates.apart[j] is not None):
                 yield lasts(cells, (*about, either, against), rates.apart[j], RATE[1] * share)
+            if against is Check.LASTING_RATE and rates.planned[j] is not None:  # what all axles lose no other one shows
+                yield lasts(cells, (*about, either, Check.PLANT_RATE), rates.planned[j], share)
 
 
 def _beside_second(cells: Cells, axle: str, angle: Array, second: Array, clear_at: float) -> Checked:

@@ -54,6 +54,7 @@ _DEAF, _WILD, _DEAF_S = (
 #: Of the change that counts; s without a break, and in all: of 17 + 20 healthy missions (tuning, a user's) none was so far behind for more than 2 s, a loader
 #: that drives into its heap for 4.
 _NEARLY, _BEHIND_S, _AGAIN_S = 0.85, 5.0, 15.0
+_AS_FAST = "as fast as steering angles and {wheel} speeds make it"
 _GEAR = 0.62  # ln: what changes by more is another gear
 _BEYOND_TOP = 1.6  # times the top speed of the machine file, which no machine reaches
 _STANDS, _CLOSED, _CREEPS = 0.01, 0.03, 0.035  # of the top speed; of full opening; of the top speed
@@ -276,13 +277,16 @@ def _beside_gyro(cells: Cells) -> Iterator[MachineEvent]:
     turns = power >= (_TURNS * _usual(np.abs(x))) ** 2 * min(frame.length, frame.cells)
     course = Course(np.where(turns, frame.sums(x * y) / np.where(turns, power, 1.0), np.nan), cells)
     found = _turns_otherwise(course, _counts(cells))
+    if found is None:  # the speeds beside a stated fault may be one side's
+        stated = np.column_stack([cells.explained(wheel) for wheel in cells.machine.wheels]).any(axis=1)
+        found = _turns_briefly(course._replace(share=np.where(stated, np.nan, course.share)), _counts(cells))
     if found is not None:
         yield found._replace(text=f"By the gyro (imu.yaw_rate) the machine {found.text}").event(gyro_otherwise)
 
 
 def _turns_otherwise(course: Course, counts: float) -> Said | None:
     """How the machine turns by the gyro, and when, where that is another share by `counts` [ln]; None where it is not."""
-    what, share, usual = "as fast as steering angles and {wheel} speeds make it", course.share, course.usual
+    what, share, usual = _AS_FAST, course.share, course.usual
     if course.mostly(_FEW_CHANGE * counts, counts):
         return Said(f"{_turning(usual)} {what} throughout")
     deaf, wild = (
@@ -295,6 +299,15 @@ def _turns_otherwise(course: Course, counts: float) -> Said | None:
         return Said(f"{_turning(float(median_of(share[slice(*spell)])))} {what} at {when}", (when.span,))
     found = course.changes(what, counts, _MANY) or course.changes(what, _FEW_CHANGE * counts, FEW)
     return None if found is None else found._replace(text=f"turns {found.text}")
+
+
+def _turns_briefly(course: Course, counts: float) -> Said | None:
+    """The same of a spell that stands out of turns that are else alike."""
+    spell = course.spell(_NEARLY * counts, _SPELL_S)
+    if spell is None:
+        return None
+    inside, when = float(median_known(course.share[slice(*spell)])), Stated.of(*course.span(*spell), digits=0)
+    return Said(f"turns {inside:.2f} times {_AS_FAST} at {when}, and {course.usual:.2f} times else", (when.span,))
 
 
 def _turning(share: float) -> str:

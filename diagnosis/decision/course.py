@@ -5,11 +5,12 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from diagnosis.clearing.cells import Array, Cells
 from diagnosis.results.said import Said, Stated
-from replay.arrays.quantiles import median_of, quantile_of
+from replay.arrays.quantiles import median_known, median_of, quantile_of
 from replay.arrays.runs import runs_of
 
 Flags = NDArray[np.bool_]
@@ -18,6 +19,8 @@ FEW = 10  # windows, of which a usual share is known
 _CUTS = 60  # moments at which a change is looked for first
 FLOOR = 0.03  # of a share, for its logarithm
 _NEARLY_ALL = 0.15, 0.85  # quantiles
+_INSIDE, _OUTSIDE = 0.5, 12  # of a spell that is known; windows known elsewhere
+_FAR = 3.0  # times what the rest is off the median, root mean square
 
 
 class Course(NamedTuple):
@@ -91,3 +94,30 @@ class Course(NamedTuple):
         """First window of the longest run of `flags`, shape (windows,), and the one behind it; None where none is as long as `least_s` [s]."""
         first, last = max(runs_of(flags), key=lambda r: r[1] - r[0], default=(0, 0))
         return (first, last) if (last - first) * self.cells.frame.hop * self.cells.dt >= least_s else None
+
+    def spell(self, counts: float, length_s: float) -> tuple[int, int] | None:
+        """First window of the spell that is furthest off the median, and the one behind it; None where none is by `counts` [ln].
+
+        Nor by three times what the rest is off it, root mean square: what varies anyway has no spells. `length_s` in s.
+        """
+        frame = self.cells.frame
+        hop_s = frame.hop * self.cells.dt
+        long, beside = (
+            max(1, round(length_s / hop_s)),
+            frame.length // frame.hop,
+        )  # windows that share time with a spell
+        known = np.isfinite(self.share)
+        if self.share.size < long or np.count_nonzero(known) < _OUTSIDE:
+            return None
+        off = self.log - float(median_of(self.log[known]))
+        number, squares = (np.concatenate([[0.0], np.cumsum(x)]) for x in (known, np.where(known, off, 0.0) ** 2))
+        first = np.arange(self.share.size - long + 1)
+        before, after = np.maximum(first - beside, 0), np.minimum(first + long + beside, self.share.size)
+        outside = number[-1] - number[after] + number[before]
+        asked = first[(number[first + long] - number[first] >= _INSIDE * long) & (outside >= _OUTSIDE)]
+        if not asked.size:
+            return None
+        middle = median_known(sliding_window_view(off, long)[asked], axis=1)
+        rest = np.sqrt((squares[-1] - squares[after] + squares[before])[asked] / outside[asked])
+        k = int(np.argmax(np.where(np.abs(middle) >= _FAR * rest, np.abs(middle), 0.0)))
+        return (int(asked[k]), int(asked[k]) + long) if abs(middle[k]) >= max(counts, _FAR * rest[k]) else None

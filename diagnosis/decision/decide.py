@@ -50,6 +50,10 @@ _COMPARED_WHEELS = 3
 _UNEXPLAINED_S = 0.5
 _MOSTLY = 0.5
 _NO_YAW = "An offset of a steering sensor that is there from start to end, or grows slowly, does not show in this log; a yaw rate (imu.yaw_rate) would show it."
+_ALL_AXLES = (
+    "What all steering {valve}s lose from start to end does not show in this log; [steering] in the machine file, which `mfhca fit` writes from healthy "
+    "missions, would show it."
+)
 
 _BESIDE_NOTHING = "No second speed to compare with"
 
@@ -156,6 +160,7 @@ def decide(
     caveats += () if found.status is Verdict.READY else loads
     caveats += limits_of(limits)
     hidden = (_NO_YAW,) if any(_offset_hidden(checks, axle) for axle in axles) else ()
+    hidden += (words.fill(_ALL_AXLES),) if _common_loss_hidden(checks) else ()
     if not told or short != unseen:
         caveats += unseen
     if found.status is Verdict.READY:
@@ -186,6 +191,13 @@ def _offset_hidden(checks: Sequence[Checked], axle: str) -> bool:
     asked = {(c.check, c.side) for c in checks if c.component == axle}
     kinds = {check for check, _ in asked}
     return bool(asked) and Check.LASTING_YAW not in kinds and (Check.SECOND_MEASUREMENT, Side.SENSOR) not in asked
+
+
+def _common_loss_hidden(checks: Sequence[Checked]) -> bool:
+    """Whether axles are held against each other alone: neither against a second measurement of their valves nor against a plant."""
+    beside = {c.component for c in checks if c.check is Check.LASTING_RATE}
+    twice = {c.component for c in checks if c.check is Check.SECOND_MEASUREMENT and c.side is Side.ACTUATOR}
+    return bool(beside - twice - {c.component for c in checks if c.check is Check.PLANT_RATE})
 
 
 def _reservations(

@@ -193,6 +193,23 @@ def test_the_overlap_of_steering_valves_is_found_from_their_rates() -> None:
     assert dead_bands(rate, opening).max() == 0.0  # what one axle needs more of is a fault's
 
 
+def test_what_both_axles_lose_from_start_to_end_shows_against_the_machine_file() -> None:
+    mission = simulated()
+    plant = AxlePlant(slope_up=1.0, slope_down=1.0, dead_up=0.0, dead_down=0.0, lag=0.1, play=0.0)
+
+    def rates(*slopes: float) -> list[Checked]:
+        cells = in_cells(mission, base=True)
+        steering = {a: replace(plant, slope_up=s, slope_down=s) for a in cells.machine.axles for s in slopes}
+        checks = checks_of(replace(cells, machine=replace(cells.machine, steering=steering)), HYDRAULIC)
+        return [c for c in checks if c.check is Check.PLANT_RATE]
+
+    assert rates() == []
+    off = float(np.mean([c.worst for c in rates(1.0) if c.worst is not None]))
+    usual = min((float(np.exp(sign * off)) for sign in (-1.0, 1.0)), key=lambda slope: rates(slope)[0].worst or 0.0)
+    assert [c.passed for c in rates(usual)] == [True, True]
+    assert [c.passed for c in rates(2.0 * usual)] == [False, False]
+
+
 def test_the_only_steered_axle_is_held_against_the_machine_file_or_its_second_measurements() -> None:
     mission = simulated()
     cells = in_cells(mission, base=True)

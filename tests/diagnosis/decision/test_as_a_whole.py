@@ -138,3 +138,21 @@ def test_wheels_that_fall_behind_again_and_again_are_told_with_each_of_these_tim
     assert found is not None
     assert "again and again, for 18 s in all" in found.text
     assert found.spans == ((10.0, 15.0), (30.0, 35.0), (50.0, 55.0), (70.0, 75.0))
+
+
+@pytest.mark.parametrize(("share", "noise", "found"), [(0.6, 0.03, True), (0.9, 0.03, False), (0.6, 0.3, False)])
+def test_a_spell_of_another_share_stands_out_of_a_quiet_course_alone(share: float, noise: float, found: bool) -> None:
+    course = np.exp(np.random.default_rng(3).normal(0.0, noise, 120))
+    course[::3] = np.nan
+    course[50:62] *= share
+    cells = cast(Cells, SimpleNamespace(dt=0.1, frame=SimpleNamespace(hop=5, length=30)))
+    spell = Course(course, cells).spell(0.245, 6.0)
+    assert (spell is not None) is found
+    assert spell is None or abs(spell[0] - 50) <= 2
+    assert Course(course[:20], cells).spell(0.245, 6.0) is None
+
+
+def test_a_gyro_that_reads_less_for_some_turns_is_told() -> None:
+    (text,) = told(6, "imu.yaw_rate", 0.55, 14.0, 21.0)
+    assert "turns 0.5" in text
+    assert "and 1.00 times else" in text

@@ -104,6 +104,16 @@ def test_an_offset_that_nothing_would_show_is_said() -> None:
     assert not shown.caveats
 
 
+def test_what_all_axles_lose_is_said_where_they_are_held_against_each_other_alone() -> None:
+    beside = replace(_UNSHOWN, check=Check.LASTING_RATE, worst=0.01, limit=0.17)
+    plant, twice = (
+        replace(beside, check=Check.PLANT_RATE),
+        replace(beside, check=Check.SECOND_MEASUREMENT, side=Side.ACTUATOR),
+    )
+    said = [verdict(machine(), checks=(beside, *more)).text for more in ((), (plant,), (twice,))]
+    assert ["What all steering valves lose from start to end" in text for text in said] == [True, False, False]
+
+
 def test_steering_that_was_judged_for_part_of_the_driving_is_said_beside_ready() -> None:
     parts = machine()
     decided = {part: 20.0 if part != ("front", "actuator") else 11.0 for part in parts}
