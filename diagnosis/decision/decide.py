@@ -49,7 +49,10 @@ _WHAT_TO_DO = re.compile(r": (?:log|let) ")
 _COMPARED_WHEELS = 3
 _UNEXPLAINED_S = 0.5
 _MOSTLY = 0.5
-_NO_YAW = "An offset of a steering sensor that is there from start to end, or grows slowly, does not show in this log; a yaw rate (imu.yaw_rate) would show it."
+_NO_YAW = (
+    "An offset of a steering sensor, or a scale of all of them, that is there from start to end, or grows slowly, does not show in this log; a yaw rate "
+    "(imu.yaw_rate) would show it."
+)
 _ALL_AXLES = (
     "What all steering {valve}s lose from start to end does not show in this log; [steering] in the machine file, which `mfhca fit` writes from healthy "
     "missions, would show it."
