@@ -98,7 +98,7 @@ def _machine(data: Mapping[str, Any]) -> Machine:
     axles = () if geometry is None else geometry.axles
     signals = {_of_own_axle(k, axles): _signal(k, v) for k, v in data.get("signals", {}).items()}
     machine = Machine(
-        name=str(head.get("name", base.name if wheels == list(base.wheels) else "unnamed machine")),
+        name=str(head.get("name", base.name if set(wheels) == set(base.wheels) else "unnamed machine")),
         id=str(head.get("id", "")),
         wheels=tuple(wheels),
         geometry=geometry,
@@ -169,8 +169,9 @@ def _assumed(machine: Machine, data: Mapping[str, Any]) -> tuple[str, ...]:
 
 def _geometry(geo: dict[str, Any], wheels: tuple[str, ...], base: Machine) -> Geometry | None:
     assert base.geometry is not None
+    usual = set(wheels) == set(base.wheels)  # a machine puts them in its own order
     if not geo:
-        return base.geometry if wheels == base.wheels else None
+        return base.geometry if usual else None
     diameter = geo.pop("wheel_diameter", None)
     per_wheel = {k: v for k, v in geo.items() if isinstance(v, dict)}
     if per_wheel:
@@ -185,12 +186,12 @@ def _geometry(geo: dict[str, Any], wheels: tuple[str, ...], base: Machine) -> Ge
             {w: _place(w, v, wheels) for w, v in per_wheel.items()}, _number("geometry.wheel_diameter", diameter)
         )
     _known("geometry", geo, set(_STANDARD))
-    if set(geo) - {"wheel_offset"} == set() and diameter is not None and wheels != base.wheels:
+    if set(geo) - {"wheel_offset"} == set() and diameter is not None and not usual:
         raise ConfigError(
             "geometry gives a wheel_diameter but no places; add x, y, offset and steer per wheel, e.g. "
             f"[geometry.{wheels[0]}]"
         )
-    if wheels != base.wheels:
+    if not usual:
         raise ConfigError(
             f"geometry.wheelbase and joint_spacing fit the wheels {list(base.wheels)}; this machine has "
             f"{list(wheels)}: give x, y, offset and steer per wheel, e.g. [geometry.{wheels[0]}]"

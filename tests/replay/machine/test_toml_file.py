@@ -295,3 +295,17 @@ def test_what_is_left_out_is_named(folder: Path, text: str, words: str) -> None:
 def test_the_least_driving_speed_of_fast_machines_is_that_of_a_yard(folder: Path) -> None:
     assert load(folder, "[geometry]\nmax_speed = 3.6\n").limits.driving_speed == pytest.approx(0.5)
     assert load(folder, "[geometry]\nmax_speed = 40\n").limits.driving_speed == 2.0
+
+
+def test_the_usual_four_wheels_have_their_places_in_any_order(tmp_path: Path) -> None:
+    machine = load(
+        tmp_path, '[machine]\nwheels = ["FL", "FR", "RL", "RR"]\n[geometry]\nwheelbase = 3.0\njoint_spacing = 1.5\n'
+    )
+    assert machine.geometry is not None
+    assert list(machine.geometry.wheels) == ["FL", "FR", "RL", "RR"]
+    assert [(w.x, w.y) for w in machine.geometry.wheels.values()] == [
+        (1.5, 0.75),
+        (1.5, -0.75),
+        (-1.5, 0.75),
+        (-1.5, -0.75),
+    ]
