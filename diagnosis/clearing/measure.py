@@ -174,13 +174,22 @@ def late(speed: Array, reference: Array, dt: float) -> list[float | None]:
         changes, commanded = np.diff(v), np.diff(c)
         alike.append([_alike(changes, commanded, int(k)) for k in steps])
         best = int(np.argmax(alike[-1]))
-        found.append(float(steps[best] * dt) if alike[-1][best] > 0.3 else None)
+        found.append(float((steps[best] + _top(alike[-1], best)) * dt) if alike[-1][best] > 0.3 else None)
     known = sorted(x for x in found if x is not None)
     middle = known[(len(known) - 1) // 2] if known else 0.0
     there = int(np.argmin(np.abs(steps * dt - middle)))
     # a delay at which it is no more alike than at that of the others is none of its own
     same = [a[there] >= _AS_ALIKE * max(a) for a in alike]
     return [None if x is None else 0.0 if s else abs(x - middle) for x, s in zip(found, same, strict=True)]
+
+
+def _top(alike: Sequence[float], best: int) -> float:
+    """By how many cells the top of a parabola through the largest of some values and its neighbours lies beside it."""
+    if not 0 < best < len(alike) - 1:
+        return 0.0
+    before, top, after = alike[best - 1 : best + 2]
+    bend = before - 2.0 * top + after
+    return 0.5 * (before - after) / bend if bend < 0.0 else 0.0
 
 
 def _alike(x: Array, y: Array, delay: int) -> float:
