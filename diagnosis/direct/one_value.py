@@ -1,11 +1,11 @@
-"""A speed sensor that repeats one value while its wheel turns, where all others tremble: it is stuck, however near it is to the second one.
+"""A speed sensor that repeats one value while its wheel turns, where the others tremble, or its second one goes on: it is stuck, however near both are.
 
-What is compared with a second measurement alone is hardly off while the machine goes on at one speed.
+What is compared with a second measurement alone is hardly off while the machine goes on at one speed, or comes back to it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -28,6 +28,9 @@ _TREMBLES = 0.3  # of the readings of a wheel that turns, which are not the one 
 _LEAST_S, _FAR = 1.0, 8.0  # of one value, and times its own longest other run
 _STEPS = 1.0  # of the reading, by which all of them tremble: by less one value may be held between two steps
 _INSIDE = 0.5  # of its time: said already
+#: Of the value, and steps of the reading, by which the second sensor leaves it, for a part of its time, and goes on
+_LEAVES, _LEAVES_STEPS, _MUCH = 0.05, 10.0, 0.3
+_OTHERS_TREMBLE = "the other speed sensors go on trembling"
 _P = 0.96  # as of frozen speeds that have no second one
 _OPEN = (CODE[State.HEALTHY], CODE[State.NOT_ASSESSED], CODE[State.NOT_EXCITED])
 
@@ -35,7 +38,7 @@ _OPEN = (CODE[State.HEALTHY], CODE[State.NOT_ASSESSED], CODE[State.NOT_EXCITED])
 def with_frozen_readings(
     found: Mapping[str, IdentifiedPair], assessments: Mapping[str, Assessment]
 ) -> dict[str, Assessment]:
-    """Assessments of speed sensors with those told as stuck that repeat one value while all others go on trembling.
+    """Assessments of speed sensors with those told as stuck that repeat one value while the others tremble, or their second one goes on.
 
     Parameters
     ----------
@@ -45,29 +48,47 @@ def with_frozen_readings(
         What was found of them.
     """
     out = dict(assessments)
-    if len(found) <= _OTHERS:
-        return out
+    held = {wheel: frozen_of(one.pair.y, one.pair.span, one.pair.dt) for wheel, one in found.items()}
     for wheel, one in found.items():
-        span, dt = one.pair.span, one.pair.dt
-        runs = [
-            r
-            for r in frozen_of(one.pair.y, span, dt)
-            if (r.stop - r.start) * dt >= max(_LEAST_S, _FAR * r.usual_s) and _alone(found, wheel, r)
-        ]
-        for r in runs:
-            out[wheel] = _with(out[wheel], one, r)
+        dt = one.pair.dt
+        for r in held[wheel]:
+            if (r.stop - r.start) * dt < max(_LEAST_S, _FAR * r.usual_s):
+                continue
+            why = _goes_on(one, r) or (_OTHERS_TREMBLE if _stands_out(found, held, wheel, r) else None)
+            if why is not None:
+                out[wheel] = _with(out[wheel], one, r, why)
     return out
 
 
-def _alone(found: Mapping[str, IdentifiedPair], wheel: str, r: Frozen) -> bool:
-    """Whether the wheel turns by its second sensor, all other speeds tremble meanwhile, and this one does elsewhere."""
+def _goes_on(one: IdentifiedPair, r: Frozen) -> str | None:
+    """That the second sensor leaves such a value far behind meanwhile; None where it does not."""
+    x = one.samples.x[r.start : r.stop]
+    x = x[np.isfinite(x)]
+    least = max(_LEAVES * abs(r.value), _LEAVES_STEPS * rounding_step(one.pair.y[one.pair.fresh]))
+    if not x.size or float(np.mean(np.abs(x - r.value) >= least)) < _MUCH:
+        return None
+    low, high = float(x.min()), float(x.max())
+    return (
+        f"its second sensor reads {plain(low)} to {plain(high)} {{speed_unit}} meanwhile"
+        if high - low >= least
+        else None
+    )
+
+
+def _stands_out(
+    found: Mapping[str, IdentifiedPair], held: Mapping[str, Sequence[Frozen]], wheel: str, r: Frozen
+) -> bool:
+    """Whether the wheel turns by its second sensor, the other speeds tremble meanwhile, most of them at least, and this one does elsewhere."""
     one = found[wheel]
     x = one.samples.x[r.start : r.stop]
     if not np.isfinite(x).any() or abs(float(np.nanmedian(x))) <= TURNS * one.pair.span:
         return False
     inside = np.zeros(one.pair.y.size, np.bool_)
     inside[r.start : r.stop] = True
-    others = [_trembling(pair, inside) for name, pair in found.items() if name != wheel]
+    free = [pair for name, pair in found.items() if name != wheel and not _holds(held[name], r)]
+    if len(free) <= (len(found) - 1) / 2:
+        return False  # their log holds them
+    others = [_trembling(pair, inside) for pair in free]
     known = [t for t in others if t is not None]
     own = _trembling(one, ~inside)
     if own is None or len(known) < _OTHERS:
@@ -76,12 +97,17 @@ def _alone(found: Mapping[str, IdentifiedPair], wheel: str, r: Frozen) -> bool:
     return min(share for share, _ in (*known, own)) >= _TREMBLES and steps >= _STEPS
 
 
+def _holds(held: Sequence[Frozen], r: Frozen) -> bool:
+    """Whether another sensor repeats one value for most of that time as well."""
+    return sum(max(0, min(h.stop, r.stop) - max(h.start, r.start)) for h in held) > _INSIDE * (r.stop - r.start)
+
+
 def _trembling(one: IdentifiedPair, where: NDArray[np.bool_]) -> tuple[float, float] | None:
     """`trembling` of new readings."""
     return trembling(one.pair.y[where & one.pair.fresh], TURNS * one.pair.span)
 
 
-def _with(a: Assessment, one: IdentifiedPair, r: Frozen) -> Assessment:
+def _with(a: Assessment, one: IdentifiedPair, r: Frozen, why: str) -> Assessment:
     """An assessment with one more stuck reading, unless a fault of most of that time is said already."""
     told = sum(max(0, min(f.stop, r.stop) - max(f.start, r.start)) for f in a.findings)
     if told > _INSIDE * (r.stop - r.start):
@@ -89,10 +115,10 @@ def _with(a: Assessment, one: IdentifiedPair, r: Frozen) -> Assessment:
     states = a.states.copy()
     inside = states[r.start : r.stop]
     inside[np.isin(inside, _OPEN)] = CODE[State.STUCK]
-    return replace(a, states=states, findings=tuple(sorted((*a.findings, _told(one, r)), key=lambda f: f.start)))
+    return replace(a, states=states, findings=tuple(sorted((*a.findings, _told(one, r, why)), key=lambda f: f.start)))
 
 
-def _told(one: IdentifiedPair, r: Frozen) -> Finding:
+def _told(one: IdentifiedPair, r: Frozen, why: str) -> Finding:
     length = (r.stop - r.start) * one.pair.dt
     stuck = Hypothesis(Side.SENSOR.value, FaultMode.STUCK.value, _P)
     return Finding(
@@ -106,7 +132,7 @@ def _told(one: IdentifiedPair, r: Frozen) -> Finding:
         sat=Sat(r.value, abs(r.value), r.value, r.value, "m/s"),
         evidence=(
             f"{one.pair.y_name} stays at {plain(r.value)} {{speed_unit}} to the last digit for {lasting(length, 2)}; the longest that it stays at "
-            f"another value is {r.usual_s:.2f} s, and all other speed sensors go on trembling.",
+            f"another value is {r.usual_s:.2f} s, and {why}.",
         ),
         tier=Tier.DIRECT,
     )

@@ -26,12 +26,12 @@ def speeds(noise: float = 0.005, step: float = STEP) -> dict[str, Array]:
     return {w: np.asarray(np.round((TRUE + noise * rng.standard_normal(SIZE)) / step) * step) for w in WHEELS}
 
 
-def told(y: dict[str, Array], *findings: Finding) -> dict[str, Assessment]:
+def told(y: dict[str, Array], *findings: Finding, second: Array = TRUE) -> dict[str, Assessment]:
     fresh = np.ones(SIZE, np.bool_)
     pairs = {
         w: SimpleNamespace(
             pair=SimpleNamespace(y=v, fresh=fresh, dt=DT, span=5.0, y_name=f"wheel.{w}.v"),
-            samples=SimpleNamespace(x=TRUE),
+            samples=SimpleNamespace(x=second),
         )
         for w, v in y.items()
     }
@@ -68,3 +68,24 @@ def test_two_sensors_show_no_habit() -> None:
 def test_what_is_told_already_is_not_told_twice() -> None:
     known = Finding(405, 635, Side.SENSOR, FaultMode.STUCK, 0.9, (), None, None, (), Tier.DIRECT)
     assert told(held(speeds()), known)["RR"].findings == (known,)
+
+
+def test_two_that_freeze_together_are_both_stuck_beside_two_that_tremble() -> None:
+    y = held(speeds())
+    y["FR"][420:630] = -0.878
+    after = told(y)
+    assert [bool(after[w].findings) for w in WHEELS] == [True, False, True, False]
+    y["FL"][400:640] = -0.88
+    assert not any(a.findings for a in told(y).values())  # most of them: their log holds them
+
+
+def test_a_second_sensor_that_goes_on_leaves_a_frozen_one_behind() -> None:
+    moving = TRUE + 0.4 * np.sin(np.arange(SIZE) / 60.0)
+    y = {w: np.asarray(np.round(moving / STEP) * STEP) for w in WHEELS}
+    for w in ("RR", "FR"):
+        y[w][400:560] = y[w][400]
+    after = told(y, second=moving)
+    (f,) = after["RR"].findings
+    assert (f.start, f.stop) == (pytest.approx(400, abs=3), pytest.approx(560, abs=3))
+    assert "its second sensor reads" in f.evidence[0]
+    assert not after["RL"].findings
