@@ -17,7 +17,7 @@ from replay.arrays.quantiles import median_known
 Flags = NDArray[np.bool_]
 Places = NDArray[np.intp]
 
-SPELLS_S = 6.0, 15.0
+SPELLS_S = 4.0, 15.0
 _IN, _OUT, _BESIDE_S = (
     0.7,
     2.0,
