@@ -88,13 +88,13 @@ def enter(m, bank, mean, cov):  # type: ignore[no-untyped-def]
         cov[m, 2] = (0.3 * span) ** 2
 
 
-@njit(cache=True)
+@njit(cache=True, no_cpython_wrapper=True)
 def _beyond(b, power, passing):  # type: ignore[no-untyped-def]
     """What a sample costs a mismatch that is larger than two instruments have; the usual one is held small by its walk."""
     return _BEYOND * max(b * b / (power * passing) - _LARGE, 0.0) if passing > 1.0 else 0.0
 
 
-@njit(cache=True)
+@njit(cache=True, no_cpython_wrapper=True)
 def _update(y, x, white, passing, constant, bank, mean, cov, out):  # type: ignore[no-untyped-def]
     """Kalman update of every model with y = H·[·,·] + n; writes the innovations' log-likelihoods."""
     own = bank.r * white
@@ -150,7 +150,7 @@ def _update(y, x, white, passing, constant, bank, mean, cov, out):  # type: igno
         out[m] = -0.5 * (e * e * i + np.log(2 * np.pi * s))
 
 
-@njit(cache=True)
+@njit(cache=True, no_cpython_wrapper=True)
 def _blind(y, x, bank, mean, cov, out):  # type: ignore[no-untyped-def]
     """Log-likelihood of one sample where x jumps about: only a y that does not join in says something, one bit at most."""
     noise, constant = np.sqrt(bank.r), np.sqrt(bank.constant_r)
@@ -166,7 +166,7 @@ def _blind(y, x, bank, mean, cov, out):  # type: ignore[no-untyped-def]
     cov[CONSTANT, 0] *= bank.constant_r / s
 
 
-@njit(cache=True)
+@njit(cache=True, no_cpython_wrapper=True)
 def _stands_beside(y, x, white, bank, mean, out):  # type: ignore[no-untyped-def]
     """Healthy is as well who stands while a steady x jitters, rather than joining in: `mean[CONSTANT, 1]` is what x was of late."""
     late = mean[CONSTANT, 1]
@@ -175,7 +175,7 @@ def _stands_beside(y, x, white, bank, mean, out):  # type: ignore[no-untyped-def
         out[EXACT] = max(out[EXACT], -0.5 * ((y - late) ** 2 / r + np.log(2 * np.pi * r)))
 
 
-@njit(cache=True)
+@njit(cache=True, no_cpython_wrapper=True)
 def likelihoods(k, samples, bank, mean, cov, out):  # type: ignore[no-untyped-def]
     """Log-likelihood of sample k under every model; where nothing moves, a zero reading speaks for no fault."""
     y, x, status, quiet = samples.y[k], samples.x[k], samples.status[k], samples.quiet[k]

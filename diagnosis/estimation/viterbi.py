@@ -52,7 +52,7 @@ def initial_state(model: ModeModel) -> FilterState:
     return state
 
 
-@njit(cache=True)
+@njit(cache=True, no_cpython_wrapper=True)
 def _enter_from_best(k, best, bank, state, back):  # type: ignore[no-untyped-def]
     """Let every model be entered from the best one, where that is worth what it costs."""
     top = state.score[best]

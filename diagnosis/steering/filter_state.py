@@ -101,7 +101,7 @@ class Block(NamedTuple):
     status: int
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@njit(cache=True, error_model="numpy", forceinline=True, no_cpython_wrapper=True)
 def resting(block: Block) -> Block:
     """The same block with a valve at rest."""
     return Block(block.mean, block.power, block.samples, 0.0, block.spread, 0.0, block.pace, block.status)
@@ -146,7 +146,7 @@ _pairs = trailing(2)
 known_states, known_covariances = trailing(STATES), trailing(STATES, STATES)
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def known(bank: FilterBank) -> FilterBank:
     """The same states, whose sizes the compiler knows; an argument of the caller keeps them alive."""
     return FilterBank(

@@ -36,7 +36,7 @@ _LOST_S = 0.03  # how long an axle may turn unseen
 _LEAST_GAIN, _MOST_GAIN = 0.1, 0.92  # of an inefficient part
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@njit(cache=True, error_model="numpy", forceinline=True, no_cpython_wrapper=True)
 def _known_noise(
     s: int, d: float, sensor: SensorConstants, nu: float, power: float, count: float
 ) -> tuple[float, float]:
@@ -56,7 +56,7 @@ def _known_noise(
     return -0.5 * nu * (log(v) + power / v), v / count + sensor.mean_rounding
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@njit(cache=True, error_model="numpy", forceinline=True, no_cpython_wrapper=True)
 def _learned_noise(alpha: float, beta: float, nu: float, power: float) -> float:
     """Log-likelihood of the white power with V ~ inverse gamma (α, β).
 
@@ -68,7 +68,7 @@ def _learned_noise(alpha: float, beta: float, nu: float, power: float) -> float:
     return lgamma(after) - lgamma(alpha) + alpha * log(beta) - after * log(scaled)
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@njit(cache=True, error_model="numpy", forceinline=True, no_cpython_wrapper=True)
 def _learn(m: int, gain: Array, total: float, innovation: float, z: Array, P: Array) -> None:
     """x += K·innovation, P −= K·gainᵀ with K = gain/total; what a model does not free has no gain and stays."""
     g0, g1, g2, g3, g4, g5 = gain[0], gain[1], gain[2], gain[3], gain[4], gain[5]
@@ -85,7 +85,7 @@ def _learn(m: int, gain: Array, total: float, innovation: float, z: Array, P: Ar
         P[m, i, 5] -= share * g5
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@njit(cache=True, error_model="numpy", forceinline=True, no_cpython_wrapper=True)
 def _white(m: int, block: Block, sensor: SensorConstants, bank: FilterBank) -> tuple[float, float, float, float, float]:
     """Degrees of freedom of a block's white power, its log-likelihood, the variance of the mean, and α and β behind it."""
     s, nu = SENSOR[m], sensor.white_dof * block.samples
@@ -105,13 +105,13 @@ def _white(m: int, block: Block, sensor: SensorConstants, bank: FilterBank) -> t
     return nu, likelihood, r, after, scaled
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@njit(cache=True, error_model="numpy", forceinline=True, no_cpython_wrapper=True)
 def _least_likelihood(nu: float, power: float, stop: float, constant: float) -> float:
     """Log-likelihood that a block is given which the model cannot explain."""
     return _OUTLIER - log(stop) - 0.5 * nu * (1 + log(max(power, constant)))
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", no_cpython_wrapper=True)
 def most_likely(m: int, block: Block, axle: AxleConstants, sensor: SensorConstants, bank: FilterBank) -> float:
     """The most that `update` may give a block whose model's sensor row has just been entered: as if the angle were as expected [log-likelihood].
 
@@ -122,7 +122,7 @@ def most_likely(m: int, block: Block, axle: AxleConstants, sensor: SensorConstan
     return float(max(likelihood, _least_likelihood(nu, block.power, axle.stop, sensor.constant)))
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def update(m: int, block: Block, least: float, axle: AxleConstants, sensor: SensorConstants, bank: FilterBank) -> float:
     """Kalman update with a block's mean, and the evidence of mean and white power; returns the log-likelihood.
 
@@ -161,7 +161,7 @@ def update(m: int, block: Block, least: float, axle: AxleConstants, sensor: Sens
     return float(likelihood)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", no_cpython_wrapper=True)
 def _learn_sensor_gain(
     m: int, nu: float, power: float, sensor: SensorConstants, z: Array, P: Array, gain: Array
 ) -> None:
@@ -181,7 +181,7 @@ def _learn_sensor_gain(
             P[m, i, j] -= gain[i] * gain[j] / total
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", no_cpython_wrapper=True)
 def _forget(m: int, i: int, std: float, z: Array, P: Array) -> None:
     """Give the constant x_i its prior again: it was learned from a block that a fault entered halfway."""
     z, P = known_states(z), known_covariances(P)
@@ -190,7 +190,7 @@ def _forget(m: int, i: int, std: float, z: Array, P: Array) -> None:
     P[m, i, i] = std * std
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@njit(cache=True, error_model="numpy", forceinline=True, no_cpython_wrapper=True)
 def measure_redundant(m: int, seen: RedundantBlock, g: float, rate_limit: float, bank: FilterBank) -> float:
     """Update with the second angle, the valve's opening and its share of the command; returns the log-likelihood."""
     bank = known(bank)
@@ -225,7 +225,7 @@ def measure_redundant(m: int, seen: RedundantBlock, g: float, rate_limit: float,
     return float(likelihood)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", no_cpython_wrapper=True)
 def _linear(
     m: int, h0: float, h2: float, h3: float, innovation: float, r: float, z: Array, P: Array, gain: Array
 ) -> float:

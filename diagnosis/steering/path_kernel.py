@@ -26,7 +26,7 @@ from replay.arrays.copying import put, put_rows
 from replay.arrays.numeric import uncounted
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@njit(cache=True, error_model="numpy", forceinline=True, no_cpython_wrapper=True)
 def _block(k: int, series: BlockSeries) -> Block:
     """Block k of an axle."""
     return Block(
@@ -41,7 +41,7 @@ def _block(k: int, series: BlockSeries) -> Block:
     )
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@njit(cache=True, error_model="numpy", forceinline=True, no_cpython_wrapper=True)
 def _redundant_block(k: int, seen: Redundancy) -> RedundantBlock:
     """What is measured redundantly in block k."""
     return RedundantBlock(

@@ -29,7 +29,7 @@ from replay.arrays.compiling import njit
 _CROSSING = 0.1  # of the gap that a model crosses: its standard deviation
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@njit(cache=True, error_model="numpy", forceinline=True, no_cpython_wrapper=True)
 def _drive(m: int, block: Block, axle: AxleConstants, bank: FilterBank) -> tuple[float, float, float]:
     """Rate that model m drives the axle to [rad/s], and its derivatives by a and b.
 
@@ -56,7 +56,7 @@ def _drive(m: int, block: Block, axle: AxleConstants, bank: FilterBank) -> tuple
     return f, by_a, 1.0
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@njit(cache=True, error_model="numpy", forceinline=True, no_cpython_wrapper=True)
 def _turn(m: int, move: float, driven: float, axle: AxleConstants, bank: FilterBank) -> float:
     """Turn the cylinder by `move`; returns the share of it that the sensor's shaft follows."""
     h = axle.play
@@ -79,7 +79,7 @@ def _turn(m: int, move: float, driven: float, axle: AxleConstants, bank: FilterB
     return followed / move if move != 0.0 else (1.0 if abs(after) >= h else 0.0)
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def predict(m: int, block: Block, axle: AxleConstants, coloured_decay: float, bank: FilterBank) -> None:
     """x = f(x, u), P = F P Fᵀ + Q over one block.
 
@@ -122,7 +122,7 @@ def predict(m: int, block: Block, axle: AxleConstants, coloured_decay: float, ba
         P[m, 0, 0], P[m, 1, 1] = axle.stop_variance, (0.02 * lift) ** 2
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@njit(cache=True, error_model="numpy", forceinline=True, no_cpython_wrapper=True)
 def _drift(m: int, spread: float, axle: AxleConstants, coloured_decay: float, z: Array, P: Array) -> None:
     """One block of the added rate b and of the sensor's offset c, which change by themselves."""
     a = ACTUATOR[m]
@@ -145,7 +145,7 @@ def _drift(m: int, spread: float, axle: AxleConstants, coloured_decay: float, z:
         _relax(m, np.int64(5), f_c, (1 - f_c * f_c) * (0.1 * axle.stop) ** 2, z, P)
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@njit(cache=True, error_model="numpy", forceinline=True, no_cpython_wrapper=True)
 def _relax(m: int, i: int, f: float, q: float, z: Array, P: Array) -> None:
     """One step of x_i' = f·x_i + noise of variance q."""
     z, P = known_states(z), known_covariances(P)

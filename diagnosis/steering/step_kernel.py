@@ -45,7 +45,7 @@ from replay.arrays.compiling import njit
 _SILENT_COST = -6.0
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", no_cpython_wrapper=True)
 def enter(m: int, old: int, constants: FilterConstants, bank: FilterBank) -> None:
     """Start model m from model `old`: the axle is carried over, a side that changes gets its prior."""
     bank = known(bank)
@@ -75,7 +75,7 @@ def enter(m: int, old: int, constants: FilterConstants, bank: FilterBank) -> Non
             P[m, 1, 1] += (0.3 * constants.axle.rate_limit) ** 2
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", no_cpython_wrapper=True)
 def _enter_actuator(m: int, constants: FilterConstants, z: Array, P: Array) -> None:
     """Prior of a valve's gain a and rate b: 0.5 ± 0.25 of an inefficient one, 0.6 ± 0.15 of a disturbed one."""
     z, P = known_states(z), known_covariances(P)
@@ -92,7 +92,7 @@ def _enter_actuator(m: int, constants: FilterConstants, z: Array, P: Array) -> N
         z[m, 2], P[m, 2, 2], P[m, 3, 3] = 0.6, 0.0225, (0.6 * rate_limit) ** 2
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", no_cpython_wrapper=True)
 def _enter_sensor(m: int, constants: FilterConstants, bank: FilterBank) -> None:
     """Prior of a sensor's gain d, offset c and noise: d is 0.5 ± 0.25 if inefficient, 0.65 ± 0.15 if noisy."""
     bank = known(bank)
@@ -113,7 +113,7 @@ def _enter_sensor(m: int, constants: FilterConstants, bank: FilterBank) -> None:
         noise[m, 0], noise[m, 1] = 0.5, 5.0 * white
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@njit(cache=True, error_model="numpy", forceinline=True, no_cpython_wrapper=True)
 def advance(m: int, block: Block, seen: RedundantBlock, constants: FilterConstants, bank: FilterBank) -> float:
     """One block of one model: prediction, update, log-likelihood; `driven` is NaN where nobody knows the opening."""
     axle, coloured_decay, P = constants.axle, constants.sensor.coloured_decay, bank.cov

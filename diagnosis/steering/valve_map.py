@@ -55,7 +55,7 @@ class ValveMap(NamedTuple):
         return (self.dead_up + self.dead_down) / 2
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def rate_at(u: float, valve: ValveMap) -> float:
     """Rate at an opening [rad/s]."""
     if u > valve.dead_up:

@@ -32,13 +32,13 @@ _NOISE_COST = 3.0  # of one kind of noise after the other [log-likelihood]
 _SURE = 0.01  # room for what rounding makes of variances [log-likelihood]
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@njit(cache=True, error_model="numpy", forceinline=True, no_cpython_wrapper=True)
 def _change(row: int, old: int) -> float:
     """Minus the log-probability that a part goes from one row to another without being healthy between them."""
     return _CHANGE_COST if row != HEALTHY and old != HEALTHY else 0.0
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", no_cpython_wrapper=True)
 def switch_cost(m: int, old: int, constants: FilterConstants) -> float:
     """Minus the log-probability of going from model `old` to m within one block."""
     s, s0 = SENSOR[m], SENSOR[old]
@@ -52,20 +52,20 @@ def switch_cost(m: int, old: int, constants: FilterConstants) -> float:
     return out
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@njit(cache=True, error_model="numpy", forceinline=True, no_cpython_wrapper=True)
 def learning_cost(m: int) -> float:
     """By how much entering model m must pay beyond its price [log-likelihood]."""
     return 0.0 if m in (HEALTHY_MODEL, NO_SIGNAL_MODEL) else _LEARNING_COST
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@njit(cache=True, error_model="numpy", forceinline=True, no_cpython_wrapper=True)
 def may_wait(m: int, old: int) -> bool:
     """Whether noise alone may tell that model m, entered from `old`, explains nothing."""
     s = SENSOR[m]
     return s != SENSOR[old] and s in (STUCK, NO_SIGNAL, NOISY)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", no_cpython_wrapper=True)
 def still_due(
     score: Array,
     top: float,
@@ -96,7 +96,7 @@ def still_due(
     return more
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", no_cpython_wrapper=True)
 def most_gained(m: int, block: Block, constants: FilterConstants, bank: FilterBank) -> float:
     """The most that `advance` may give model m, whose sensor's row has just been entered, for a block with samples [log-likelihood].
 

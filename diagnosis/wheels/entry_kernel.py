@@ -38,7 +38,7 @@ def is_scaled(m: int) -> bool:
     return m >= S_GAIN and m <= S_OU_LARGE
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def enter(m: int, old: int, k: WheelConstants, z: Array, P: Array) -> None:
     """Start model m from the state of model `old`: speed and load are carried over, the unknowns get their priors.
 

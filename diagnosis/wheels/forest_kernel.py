@@ -47,7 +47,7 @@ class Bitwise(NamedTuple):
     value: NDArray[np.float32]
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, forceinline=True, no_cpython_wrapper=True)
 def _place(lowest):  # type: ignore[no-untyped-def]
     """Place of a leaf among a tree's values, by its bit."""
     return np.int64(((np.uint64(lowest) * _DE_BRUIJN) & np.uint64(0xFFFFFFFF)) >> np.uint64(27))

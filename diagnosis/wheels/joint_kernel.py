@@ -43,7 +43,7 @@ _OTHER_LOAD = 9.0  # minus the log-probability that an unusual load begins or en
 _OTHER_NOISE = 4.0  # the same for noise of another strength
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", no_cpython_wrapper=True)
 def _enter_models(
     models: int, top: int, cost: float, k: WheelConstants, score: Array, z: Array, P: Array, back: NDArray[np.uint8]
 ) -> None:
@@ -63,7 +63,7 @@ def _enter_models(
             enter(m, top, k, z, P)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", no_cpython_wrapper=True)
 def _rank(models: int, score: Array, gain: Array) -> tuple[int, float, float]:
     """Add log-likelihoods to the scores: the best model, the probability of a fault, and the best score, which becomes 0."""
     most = -1e300

@@ -68,7 +68,7 @@ class RunEvidence(NamedTuple):
     spread: Array
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", no_cpython_wrapper=True)
 def _enter_all(models: int, old: int, k: WheelConstants, z: Array, P: Array) -> None:
     """Enter every model from model `old`, as that one ended."""
     fresh_z, fresh_P, hold_z, hold_P = z.copy(), P.copy(), z[old].copy(), P[old].copy()
@@ -80,7 +80,7 @@ def _enter_all(models: int, old: int, k: WheelConstants, z: Array, P: Array) -> 
         put_rows(fresh_P[old], hold_P)
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@njit(cache=True, error_model="numpy", forceinline=True, no_cpython_wrapper=True)
 def _block(n: int, blocks: RunInput) -> WheelInput:
     """Block n of the wheel."""
     x = blocks.inputs[n]

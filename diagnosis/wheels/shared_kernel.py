@@ -31,7 +31,7 @@ _CONSTANTS = len(WheelConstants._fields)
 _APART = 3.0  # standard deviations from which on wheels and sensors of the body contradict each other
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", no_cpython_wrapper=True)
 def constants_of(row: Array) -> WheelConstants:
     """Constants of one wheel. `row` of shape (constants,)."""
     return WheelConstants(*to_fixed_tuple(row, _CONSTANTS))
@@ -68,7 +68,7 @@ def weights(lag: float, here: Array, after: Array) -> None:
             after[q] += c * a ** (n - 1 - q)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", no_cpython_wrapper=True)
 def _trust_in(m: int) -> float:
     """Weight of a wheel in model m when the speed of the body is estimated."""
     if m >= A_GAIN:
@@ -80,7 +80,7 @@ def _trust_in(m: int) -> float:
     return 1.0 if m == HEALTHY else 0.15
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@njit(cache=True, error_model="numpy", forceinline=True, no_cpython_wrapper=True)
 def see(
     n: int, i: int, k: WheelConstants, known: bool, models: int, blocks: JointInput, state: JointState, work: JointWork
 ) -> None:
@@ -101,7 +101,7 @@ def see(
         work.speed[i], work.trust[i] = 0.0, 0.0
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@njit(cache=True, error_model="numpy", forceinline=True, no_cpython_wrapper=True)
 def feed(
     n: int, blocks: JointInput, constants: JointConstants, state: JointState, work: JointWork, inputs: Array
 ) -> None:
@@ -140,7 +140,7 @@ def feed(
             carried[i, DRIVE_NONE] += after * x * idle
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@njit(cache=True, error_model="numpy", forceinline=True, no_cpython_wrapper=True)
 def rolls_at(i: int, speed: Array, trust: Array) -> tuple[float, float]:
     """Weighted median of the other wheels' speeds of the body, and their mean distance from it; NaN without any.
 
@@ -163,7 +163,7 @@ def rolls_at(i: int, speed: Array, trust: Array) -> tuple[float, float]:
     return body, doubt
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@njit(cache=True, error_model="numpy", forceinline=True, no_cpython_wrapper=True)
 def lagged(m: int, k: WheelConstants, x: Array, z: Array, before: float) -> float:
     """What valve and lag alone ask of a wheel in model m after a block with inputs x [m/s].
 
@@ -179,7 +179,7 @@ def lagged(m: int, k: WheelConstants, x: Array, z: Array, before: float) -> floa
     return float(a * before + (1.0 - a) * asked)
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def with_sensors(body: float, doubt: float, sensed: float, std: float, least: float) -> tuple[float, float]:
     """Speed at which a wheel rolls, and its doubt, by the other wheels (`body`, `doubt`) and by sensors of the body.
 

@@ -69,7 +69,7 @@ class WheelInput(NamedTuple):
     unseen: float  # by how much faster its valve may drive it than anyone has seen [m/s]
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@njit(cache=True, error_model="numpy", forceinline=True, no_cpython_wrapper=True)
 def _fed(m: int, q: WheelInput, k: WheelConstants, z: Array) -> tuple[float, float]:
     """Opening as the pump feeds it, and the share that it feeds, while model m takes its part of the flow."""
     if m == A_GAIN or m == A_BIAS:
@@ -85,7 +85,7 @@ def _fed(m: int, q: WheelInput, k: WheelConstants, z: Array) -> tuple[float, flo
     return q.drive, share
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@njit(cache=True, error_model="numpy", forceinline=True, no_cpython_wrapper=True)
 def _tyre(m: int, q: WheelInput, k: WheelConstants, z: Array) -> tuple[float, float, float, float]:
     """Of ν' = a·ν + b·(drive + add + s·x): a, b, add and s, by whether the wheel runs free or its tyre holds or slides."""
     a = k.fade
@@ -116,7 +116,7 @@ def _tyre(m: int, q: WheelInput, k: WheelConstants, z: Array) -> tuple[float, fl
     return a, b, add, s
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@njit(cache=True, error_model="numpy", forceinline=True, no_cpython_wrapper=True)
 def _walk(m: int, k: WheelConstants) -> tuple[float, float]:
     """Share of c that is left after one block, and variance of what comes to it."""
     keep, noise = 1.0, 0.0
@@ -133,7 +133,7 @@ def _walk(m: int, k: WheelConstants) -> tuple[float, float]:
     return keep, noise
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def predict(m: int, q: WheelInput, k: WheelConstants, z: Array, P: Array) -> float:
     """z = F z + G, P = F P Fᵀ + Q of model m over one block; the share of a demand that the pump feeds.
 
@@ -173,7 +173,7 @@ def predict(m: int, q: WheelInput, k: WheelConstants, z: Array, P: Array) -> flo
     return float(share)
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@njit(cache=True, error_model="numpy", forceinline=True, no_cpython_wrapper=True)
 def _readout(m: int, q: WheelInput, k: WheelConstants, z: Array) -> tuple[float, float, float, float]:
     """Row H = [h0, 0, 0, h3] of model m, variance of one sample's noise, and of its steps from sample to sample."""
     own = k.noise**2 * q.white
@@ -200,13 +200,13 @@ def _readout(m: int, q: WheelInput, k: WheelConstants, z: Array) -> tuple[float,
     return 1.0, 0.0, own, own
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def least_steps(q: WheelInput, k: WheelConstants) -> float:
     """Variance of the steps from sample to sample [m²/s²] by which a block speaks for a model as well as it can."""
     return max(0.5 * q.jitter, k.constant_noise**2)
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def correct(m: int, q: WheelInput, share: float, k: WheelConstants, z: Array, P: Array, by_least: float) -> float:
     """Kalman update of model m with the block's mean; log-likelihood of mean and steps.
 

@@ -1,7 +1,7 @@
 """Caches of kernels: a wheel brings them compiled, for any processor of its kind.
 
 numba keeps what it compiled for one processor, beside the sources or in the user's folder of caches, and finds nothing
-there after an installation: a first diagnosis took eleven times the processor time of the next, nearly all of it
+there after an installation: a first diagnosis takes nine times the processor time of the next, nearly all of it
 compiling. A wheel that was built with numba at hand has the kernels of a diagnosis in `replay/compiled`, made for a
 common kind of processor (`shipped_kernels`). They are used where this machine's processor can run them, Python and
 numba are those that made them, and the sources are the same; else they are not there, and numba compiles as always.

@@ -45,7 +45,7 @@ class AdaptiveGains(NamedTuple):
 ADAPTIVE_STATES = 7  # θ̂ (5), ρ̂, v_f
 
 
-@njit(cache=True)
+@njit(cache=True, no_cpython_wrapper=True)
 def adaptive_step(v_ref: F, y: F, dt: float, u_max: float, g: AdaptiveGains, s: F, u: F) -> None:
     """Command of every wheel into `u`, shape (wheels,); `s`, shape (wheels, ADAPTIVE_STATES), is advanced.
 

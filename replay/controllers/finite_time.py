@@ -37,7 +37,7 @@ class FiniteTimeGains(NamedTuple):
 FINITE_TIME_STATES = 2  # ∫|e|^α sgn e, ρ̂
 
 
-@njit(cache=True)
+@njit(cache=True, no_cpython_wrapper=True)
 def finite_time_step(v_ref: F, y: F, dt: float, u_max: float, g: FiniteTimeGains, s: F, u: F) -> None:
     """Command of every wheel into `u`, shape (wheels,); `s`, shape (wheels, FINITE_TIME_STATES), is advanced.
 

@@ -41,7 +41,7 @@ class FuzzyGains(NamedTuple):
 FUZZY_STATES = 11  # θ̂ (9), ∫e, e_f
 
 
-@njit(cache=True)
+@njit(cache=True, no_cpython_wrapper=True)
 def fuzzy_step(v_ref: F, y: F, dt: float, u_max: float, g: FuzzyGains, s: F, u: F) -> None:
     """Command of every wheel into `u`, shape (wheels,); `s`, shape (wheels, FUZZY_STATES), is advanced.
 

@@ -10,13 +10,13 @@ from replay.arrays.compiling import njit
 F = NDArray[np.float64]
 
 
-@njit(cache=True)
+@njit(cache=True, no_cpython_wrapper=True)
 def clipped(raw: float, u_max: float) -> float:
     """Command within ±u_max. In fractions of full opening."""
     return float(min(max(raw, -u_max), u_max))
 
 
-@njit(cache=True)
+@njit(cache=True, no_cpython_wrapper=True)
 def winds_up(raw: float, e: float, u_max: float) -> bool:
     """Whether a command is beyond ±u_max and its error asks for more of it: u falls with e in every law.
 
@@ -25,7 +25,7 @@ def winds_up(raw: float, e: float, u_max: float) -> bool:
     return bool(abs(raw) >= u_max and raw * e < 0.0)
 
 
-@njit(cache=True)
+@njit(cache=True, no_cpython_wrapper=True)
 def bounded(value: float, bound: float) -> float:
     """Projection of a parameter estimate onto ±bound. In the unit of the estimate."""
     return float(min(max(value, -bound), bound))

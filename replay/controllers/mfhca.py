@@ -38,7 +38,7 @@ class MfhcaGains(NamedTuple):
 MFHCA_STATES = 1  # Ψ̂
 
 
-@njit(cache=True)
+@njit(cache=True, no_cpython_wrapper=True)
 def read_law(reading: int, v_ref: float, v: float, psi: float, lam: float, u_max: float) -> float:
     """u_a in its readings, L15 (14): 0 opposed, 1 signed, 2 printed, 3 sign_abs, 4 proportional alone, 5 event_reset.
 
@@ -59,7 +59,7 @@ def read_law(reading: int, v_ref: float, v: float, psi: float, lam: float, u_max
     return float(clipped(u, u_max))
 
 
-@njit(cache=True)
+@njit(cache=True, no_cpython_wrapper=True)
 def mfhca_step(v_ref: F, y: F, dt: float, u_max: float, g: MfhcaGains, s: F, u: F) -> None:
     """Command of every wheel into `u`, shape (wheels,); `s`, shape (wheels, MFHCA_STATES), is advanced.
 

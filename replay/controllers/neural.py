@@ -37,7 +37,7 @@ class NeuralGains(NamedTuple):
 NEURAL_STATES = NODES  # Ŵ
 
 
-@njit(cache=True)
+@njit(cache=True, no_cpython_wrapper=True)
 def neural_step(v_ref: F, y: F, dt: float, u_max: float, g: NeuralGains, s: F, u: F) -> None:
     """Command of every wheel into `u`, shape (wheels,); `s`, shape (wheels, NEURAL_STATES), is advanced.
 

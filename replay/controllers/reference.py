@@ -25,14 +25,14 @@ class PiGains(NamedTuple):
 PI_STATES = 1  # ∫e
 
 
-@njit(cache=True)
+@njit(cache=True, no_cpython_wrapper=True)
 def p_step(v_ref: F, y: F, u_max: float, g: PGains, u: F) -> None:
     """u = −k e, into `u`; all of shape (wheels,). Speeds in m/s, u in fractions of full opening."""
     for i in range(y.size):
         u[i] = clipped(-g.k * (y[i] - v_ref[i]), u_max)
 
 
-@njit(cache=True)
+@njit(cache=True, no_cpython_wrapper=True)
 def pi_step(v_ref: F, y: F, dt: float, u_max: float, g: PiGains, s: F, u: F) -> None:
     """u = f v_c − k_p e − k_i ∫e, into `u`; `s`, shape (wheels, PI_STATES), is advanced.
 

@@ -52,7 +52,7 @@ def world_state(wheels: int, controller: F) -> WorldState:
     return WorldState(z[0], z[1], z[2], np.zeros((2, wheels)), np.zeros(2), z[3], z[4], z[5], z[6], controller)
 
 
-@njit(cache=True)
+@njit(cache=True, no_cpython_wrapper=True)
 def _static(i: int, x: float, p: CoupledPlant) -> float:
     """Speed without load at an opening, by the map; beyond its ends as at them."""
     o, s = p.openings[i], p.speeds[i]
@@ -64,7 +64,7 @@ def _static(i: int, x: float, p: CoupledPlant) -> float:
     return float(s[o.size - 1])
 
 
-@njit(cache=True)
+@njit(cache=True, no_cpython_wrapper=True)
 def _driven(world: int, opening: F, p: CoupledPlant, state: WorldState, out: F) -> None:
     """share·p(u_v) of every wheel into `out`: play, map, and the pump that all share."""
     demand = 0.0
@@ -77,7 +77,7 @@ def _driven(world: int, opening: F, p: CoupledPlant, state: WorldState, out: F) 
         out *= p.flow / demand
 
 
-@njit(cache=True)
+@njit(cache=True, no_cpython_wrapper=True)
 def _tyres(world: int, k: int, v: F, r: Signals, p: CoupledPlant, state: WorldState, out: F) -> None:
     """f(slip) of every wheel into `out`; the body is where these forces sum to 0, by Newton's method from the step before."""
     ratio, turn, ground = r.ratio[k], r.turn[k], r.ground[k]
@@ -101,7 +101,7 @@ def _tyres(world: int, k: int, v: F, r: Signals, p: CoupledPlant, state: WorldSt
             out[i] = most * np.tanh(p.grip[i] * fade * slip / most)
 
 
-@njit(cache=True)
+@njit(cache=True, no_cpython_wrapper=True)
 def _read(k: int, first: bool, r: Signals, state: WorldState, y: F) -> None:
     """y* = y + δ_s Δv; a sensor held at its onset stays where it was in the other world."""
     for i in range(y.size):
@@ -114,7 +114,7 @@ def _read(k: int, first: bool, r: Signals, state: WorldState, y: F) -> None:
         state.reading[i] = y[i]
 
 
-@njit(cache=True)
+@njit(cache=True, no_cpython_wrapper=True)
 def _open(k: int, first: bool, r: Signals, u: F, u_max: float, state: WorldState, opening: F) -> None:
     """u_v* = u_v + δ_a (u* − u); a valve held at its onset stays where it was in the other world."""
     for i in range(u.size):

@@ -21,7 +21,7 @@ from replay.simulation.state import (
 )
 
 
-@njit(cache=True)
+@njit(cache=True, no_cpython_wrapper=True)
 def _faulted(c: int, k: int, value: float, normal: float, faults: FaultTable, state: PlantState) -> float:
     """L4, L8 (7): (1 − ε)·value + ε·sat while a fault of channel c is active."""
     row = state.row[c]
@@ -42,13 +42,13 @@ def _faulted(c: int, k: int, value: float, normal: float, faults: FaultTable, st
     return float((1.0 - epsilon) * value + epsilon * sat)
 
 
-@njit(cache=True)
+@njit(cache=True, no_cpython_wrapper=True)
 def _quantised(value: float, lsb: float) -> float:
     """Nearest multiple of a sensor's resolution; divided by 1/lsb so that decimal steps give short decimals."""
     return float(np.round(value / lsb) / (1.0 / lsb) + 0.0)
 
 
-@njit(cache=True)
+@njit(cache=True, no_cpython_wrapper=True)
 def _references(k: int, v: float, omega: float, p: PlantModel, state: PlantState, v_ref: F) -> None:
     """L1 (1), L2 (2): v_c,i = s·|v_k| − (ω_b + φ̇)·d_i and φ_c of wheels and axles, held at standstill."""
     for i in range(p.x.size):
@@ -69,13 +69,13 @@ def _references(k: int, v: float, omega: float, p: PlantModel, state: PlantState
             state.axle_ref[a] = min(max(np.arctan2(s * v_y, s * v), -p.max_steer), p.max_steer)
 
 
-@njit(cache=True)
+@njit(cache=True, no_cpython_wrapper=True)
 def _law(v_ref: float, v: float, psi: float, p: PlantModel) -> float:
     """u_a, L15 (14), in the simulated reading."""
     return float(read_law(p.law, v_ref, v, psi, p.lam, p.u_max))
 
 
-@njit(cache=True)
+@njit(cache=True, no_cpython_wrapper=True)
 def _reset_at_jumps(i: int, e: float, p: PlantModel, state: PlantState) -> None:
     """Ψ̂ ← √(λ|e|) where the short mean of |e| rises over the long one; again only once they have met."""
     error = state.error[i]
@@ -88,7 +88,7 @@ def _reset_at_jumps(i: int, e: float, p: PlantModel, state: PlantState) -> None:
         error[2] = 0.0
 
 
-@njit(cache=True)
+@njit(cache=True, no_cpython_wrapper=True)
 def _friction(i: int, p: PlantModel, state: PlantState) -> float:
     """Friction under wheel i: ice where a fixed field of waves over the ground exceeds its level."""
     yaw = state.body[3]
@@ -100,7 +100,7 @@ def _friction(i: int, p: PlantModel, state: PlantState) -> float:
     return p.mu_ice if height > p.ice_level else p.mu
 
 
-@njit(cache=True)
+@njit(cache=True, no_cpython_wrapper=True)
 def _drive(slope: float, u: F, p: PlantModel, state: PlantState, slip: F) -> None:
     """One step of τ v̇ = −v + K u − leakage − droop·F with the shared pump, and of the body and its path; fills `slip`."""
     n = p.x.size
@@ -149,7 +149,7 @@ def _drive(slope: float, u: F, p: PlantModel, state: PlantState, slip: F) -> Non
     state.body[3] += p.dt * state.body[4]
 
 
-@njit(cache=True)
+@njit(cache=True, no_cpython_wrapper=True)
 def _steer(u: F, p: PlantModel, state: PlantState) -> None:
     """One step of the axle cylinders: rate by valve opening, limited, with lag and end stops."""
     for a in range(2):

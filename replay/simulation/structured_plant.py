@@ -37,7 +37,7 @@ def _opened(u: float, forward: float, reverse: float) -> float:
     return 0.0
 
 
-@njit(cache=True)
+@njit(cache=True, no_cpython_wrapper=True)
 def _flows(k: int, u: F, p: PlantModel, m: StructureModel, state: PlantState, s: StructureState, flow: F) -> None:
     """Speeds that valves and pump would give the wheels without load, into `flow`; spools follow their commands."""
     n = u.size
@@ -66,7 +66,7 @@ def _flows(k: int, u: F, p: PlantModel, m: StructureModel, state: PlantState, s:
         flow[i] = given * np.sign(flow[i])
 
 
-@njit(cache=True)
+@njit(cache=True, no_cpython_wrapper=True)
 def _accelerate(
     i: int,
     flow: float,
@@ -91,7 +91,7 @@ def _accelerate(
         state.v[i] = v + p.dt / p.tau[i] * (target - v)
 
 
-@njit(cache=True)
+@njit(cache=True, no_cpython_wrapper=True)
 def _move(
     k: int, slope: float, u: F, p: PlantModel, m: StructureModel, state: PlantState, s: StructureState, slip: F, flow: F
 ) -> None:
@@ -133,7 +133,7 @@ def _move(
     state.body[3] += p.dt * state.body[4]
 
 
-@njit(cache=True)
+@njit(cache=True, no_cpython_wrapper=True)
 def _steer(u: F, p: PlantModel, m: StructureModel, state: PlantState) -> None:
     """One step of the axle cylinders behind valves with a dead band and a gain of each direction."""
     for a in range(2):
@@ -147,7 +147,7 @@ def _steer(u: F, p: PlantModel, m: StructureModel, state: PlantState) -> None:
             state.phi_rate[a] = 0.0
 
 
-@njit(cache=True)
+@njit(cache=True, no_cpython_wrapper=True)
 def _command(
     i: int, v_ref: float, v: float, p: PlantModel, m: StructureModel, state: PlantState, s: StructureState
 ) -> float:
@@ -167,7 +167,7 @@ def _command(
     return float(min(max(u, -p.u_max), p.u_max))
 
 
-@njit(cache=True)
+@njit(cache=True, no_cpython_wrapper=True)
 def _steer_command(a: int, phi: float, p: PlantModel, m: StructureModel, state: PlantState, s: StructureState) -> float:
     e = state.axle_ref[a] - phi
     u = p.k_ps * e + s.steer_integral[a]

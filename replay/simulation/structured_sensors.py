@@ -17,7 +17,7 @@ def play(value: float, held: float, half: float) -> float:
     return float(min(max(held, value - half), value + half))
 
 
-@njit(cache=True)
+@njit(cache=True, no_cpython_wrapper=True)
 def read_speed(i: int, k: int, v: float, normal: float, p: PlantModel, m: StructureModel, s: StructureState) -> float:
     """What a wheel's healthy speed sensor reads. In m/s."""
     v = v * (1.0 + m.scale[i])

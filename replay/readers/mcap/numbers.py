@@ -16,13 +16,13 @@ def u16(data, at):  # type: ignore[no-untyped-def]
     return np.uint64(data[p]) | np.uint64(data[p + np.uint64(1)]) << np.uint64(8)
 
 
-@njit(cache=True)
+@njit(cache=True, no_cpython_wrapper=True)
 def u32(data, at):  # type: ignore[no-untyped-def]
     """Number at a place, lowest byte first."""
     return u16(data, at) | u16(data, np.uint64(at) + np.uint64(2)) << np.uint64(16)
 
 
-@njit(cache=True)
+@njit(cache=True, no_cpython_wrapper=True)
 def u64(data, at):  # type: ignore[no-untyped-def]
     """Number at a place, lowest byte first."""
     return u32(data, at) | u32(data, np.uint64(at) + np.uint64(4)) << np.uint64(32)

@@ -42,7 +42,7 @@ from replay.readers.mcap.numbers import u16, u32, u64
 _SLACK = 64
 
 
-@njit(cache=True)
+@njit(cache=True, no_cpython_wrapper=True)
 def _end(data, at, stop):  # type: ignore[no-untyped-def]
     """End of the record by its length, or −1 where it leaves the bytes."""
     if at + 9 > stop:
@@ -53,7 +53,7 @@ def _end(data, at, stop):  # type: ignore[no-untyped-def]
     return np.int64(at + 9) + np.int64(length)
 
 
-@njit(cache=True)
+@njit(cache=True, no_cpython_wrapper=True)
 def _over(data, at, end, parts):  # type: ignore[no-untyped-def]
     """Behind `parts` length-prefixed parts, or −1 where they leave the record."""
     for _ in range(parts):
@@ -66,7 +66,7 @@ def _over(data, at, end, parts):  # type: ignore[no-untyped-def]
     return np.int64(at)
 
 
-@njit(cache=True)
+@njit(cache=True, no_cpython_wrapper=True)
 def _chunk_fits(data, at, end):  # type: ignore[no-untyped-def]
     """Whether a record of any opcode has the content of a chunk: the packed size ends where the record does."""
     if end - at < 49:
@@ -79,7 +79,7 @@ def _chunk_fits(data, at, end):  # type: ignore[no-untyped-def]
     return packed <= np.uint64(left) and np.int64(packed) >= left - _SLACK
 
 
-@njit(cache=True)
+@njit(cache=True, no_cpython_wrapper=True)
 def _fits(data, at, stop):  # type: ignore[no-untyped-def]
     """End of the record where its content agrees with its length, else −1."""
     end = _end(data, at, stop)
@@ -131,7 +131,7 @@ def _fits(data, at, stop):  # type: ignore[no-untyped-def]
     return end
 
 
-@njit(cache=True)
+@njit(cache=True, no_cpython_wrapper=True)
 def _packed(data, at, stop):  # type: ignore[no-untyped-def]
     """Whether a zstd or lz4 frame begins where that of a chunk would."""
     for text in (3, 4):
@@ -141,7 +141,7 @@ def _packed(data, at, stop):  # type: ignore[no-untyped-def]
     return False
 
 
-@njit(cache=True)
+@njit(cache=True, no_cpython_wrapper=True)
 def _mended(data, at, stop):  # type: ignore[no-untyped-def]
     """End of a record whose opcode, content or length is wrong, where something else tells it, else −1."""
     end = _end(data, at, stop)
@@ -160,13 +160,13 @@ def _mended(data, at, stop):  # type: ignore[no-untyped-def]
     return np.int64(-1)
 
 
-@njit(cache=True)
+@njit(cache=True, no_cpython_wrapper=True)
 def _named(data, at, named):  # type: ignore[no-untyped-def]
     """Whether the record is no message, or one of a channel that is named."""
     return data[at] != MESSAGE or named[np.int64(u16(data, at + 9))] > 0
 
 
-@njit(cache=True)
+@njit(cache=True, no_cpython_wrapper=True)
 def _resume(data, at, stop, named, packed):  # type: ignore[no-untyped-def]
     """First place from which three records follow one another, or fewer up to the end; −1 where there is none.
 
@@ -194,7 +194,7 @@ def _resume(data, at, stop, named, packed):  # type: ignore[no-untyped-def]
     return np.int64(-1)
 
 
-@njit(cache=True)
+@njit(cache=True, no_cpython_wrapper=True)
 def _cut(data, at, stop):  # type: ignore[no-untyped-def]
     """Whether a record that the end of the bytes cuts off may start here."""
     return at + 9 > stop or (0 < data[at] <= DATA_END and u64(data, at + 1) < np.uint64(1 << 40))

@@ -18,7 +18,7 @@ from replay.readers.messages.cdr_rows import FREE, FixedLayout, Ints, OpenTable,
 _TILE = 32
 
 
-@njit(cache=True)
+@njit(cache=True, no_cpython_wrapper=True)
 def turn8(v: Any) -> Any:
     """Number of eight bytes in the other byte order."""
     v = ((v & np.uint64(0x00FF00FF00FF00FF)) << np.uint64(8)) | ((v >> np.uint64(8)) & np.uint64(0x00FF00FF00FF00FF))
@@ -26,7 +26,7 @@ def turn8(v: Any) -> Any:
     return (v << np.uint64(32)) | (v >> np.uint64(32))
 
 
-@njit(cache=True)
+@njit(cache=True, no_cpython_wrapper=True)
 def turn4(v: Any) -> Any:
     """Number of four bytes in the other byte order."""
     v = np.uint32(v)
@@ -34,7 +34,7 @@ def turn4(v: Any) -> Any:
     return np.uint32(np.uint32(v << np.uint32(16)) | np.uint32(v >> np.uint32(16)))
 
 
-@njit(cache=True)
+@njit(cache=True, no_cpython_wrapper=True)
 def turn2(v: Any) -> Any:
     """Number of two bytes in the other byte order."""
     return np.uint16((np.uint32(v) << np.uint32(8)) | (np.uint32(v) >> np.uint32(8)))

@@ -47,14 +47,14 @@ class BagRecords(NamedTuple):
     mended: int
 
 
-@njit(cache=True)
+@njit(cache=True, no_cpython_wrapper=True)
 def _u32(data, at):  # type: ignore[no-untyped-def]
     return (
         np.int64(data[at]) | np.int64(data[at + 1]) << 8 | np.int64(data[at + 2]) << 16 | np.int64(data[at + 3]) << 24
     )
 
 
-@njit(cache=True)
+@njit(cache=True, no_cpython_wrapper=True)
 def _record(data, at, stop):  # type: ignore[no-untyped-def]
     """Parse the header at `at`: (type or 0, place of the data's length, connection, time, fields it must have)."""
     if at + 8 > stop:

@@ -18,7 +18,7 @@ INTERIOR, LEAF = 5, 13
 OK, DAMAGED, OTHER_TYPES, BEYOND = 0, 1, 2, 3
 
 
-@njit(cache=True)
+@njit(cache=True, no_cpython_wrapper=True)
 def big_endian(data, at, width):  # type: ignore[no-untyped-def]
     """Signed big-endian integer of `width` bytes."""
     value = np.int64(np.int8(data[at])) if width else np.int64(0)
@@ -27,13 +27,13 @@ def big_endian(data, at, width):  # type: ignore[no-untyped-def]
     return value
 
 
-@njit(cache=True)
+@njit(cache=True, no_cpython_wrapper=True)
 def u16(data, at):  # type: ignore[no-untyped-def]
     """Big-endian integer of two bytes."""
     return np.int64(data[at]) << 8 | np.int64(data[at + 1])
 
 
-@njit(cache=True)
+@njit(cache=True, no_cpython_wrapper=True)
 def unsigned(data, at):  # type: ignore[no-untyped-def]
     """Big-endian integer of four bytes."""
     return u16(data, at) << 16 | u16(data, at + 2)
@@ -57,7 +57,7 @@ def varint(data, at, stop):  # type: ignore[no-untyped-def]
     return value, -1
 
 
-@njit(cache=True)
+@njit(cache=True, no_cpython_wrapper=True)
 def page_head(data, page, number):  # type: ignore[no-untyped-def]
     """Start of the page, start of its tree header, and where the page ends."""
     start = (number - 1) * page
@@ -76,7 +76,7 @@ def _key(data: NDArray[np.uint8], page: int, place: tuple[int, int, int], cell: 
     return otherwise
 
 
-@njit(cache=True)
+@njit(cache=True, no_cpython_wrapper=True)
 def _is_wanted(wanted, bottom, top):  # type: ignore[no-untyped-def]
     """Whether a row bottom < row ≤ top is wanted."""
     place = np.searchsorted(wanted, bottom, "right")
@@ -140,7 +140,7 @@ def walk(data, page, root, seen, wanted, all_rows):  # type: ignore[no-untyped-d
     return leaves[:n].copy(), suspects[:bad].copy()
 
 
-@njit(cache=True)
+@njit(cache=True, no_cpython_wrapper=True)
 def parse(data, at, stop, total, topic_column, stamp_column, data_column):  # type: ignore[no-untyped-def]
     """Topic, stamp and place of the data in the record of `total` bytes at `at`, of which those before `stop` lie there.
 
@@ -191,7 +191,7 @@ def parse(data, at, stop, total, topic_column, stamp_column, data_column):  # ty
     return (status if found == 3 else OTHER_TYPES), topic, stamp, start, length
 
 
-@njit(cache=True)
+@njit(cache=True, no_cpython_wrapper=True)
 def _copy(out, data):  # type: ignore[no-untyped-def]
     for i in range(len(out)):  # a plain index from 0: this loop becomes wide moves
         out[i] = data[i]

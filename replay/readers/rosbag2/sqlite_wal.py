@@ -44,7 +44,7 @@ def _mapped(file: IO[bytes]) -> NDArray[np.uint8]:
         return np.memmap(file, np.uint8, "r")
 
 
-@njit(cache=True)
+@njit(cache=True, no_cpython_wrapper=True)
 def _wal_sum(log, at, until, little, s0, s1):  # type: ignore[no-untyped-def]
     """Running checksum of a write-ahead log over the bytes `at` to `until`."""
     for p in range(at, until, 8):

@@ -13,7 +13,7 @@ from replay.readers.common.compiled import part
 _MISSING = -(2**63)
 
 
-@njit(cache=True)
+@njit(cache=True, no_cpython_wrapper=True)
 def _digits(data: NDArray[np.uint8], at: int, count: int, stop: int) -> Any:
     """Value of `count` digits, −1 where they are not all there."""
     if at + count > stop:
@@ -26,7 +26,7 @@ def _digits(data: NDArray[np.uint8], at: int, count: int, stop: int) -> Any:
     return value
 
 
-@njit(cache=True)
+@njit(cache=True, no_cpython_wrapper=True)
 def _days(year: int, month: int, day: int) -> int:
     """Days from 1970-01-01 in the Gregorian calendar, years counted from March."""
     y = year - (month <= 2)

@@ -112,7 +112,7 @@ def _leading_zeros(_context: Any, _w: Any) -> Any:
     return types.int64(types.uint64), build
 
 
-@njit(cache=True)
+@njit(cache=True, no_cpython_wrapper=True)
 def bits_of(w: Any, q: int) -> tuple[bool, Any]:
     """Bits of the double nearest to w · 10**q, w > 0; False where the caller has to find it."""
     if q < _LOWEST or q > _HIGHEST:
@@ -143,7 +143,7 @@ def bits_of(w: Any, q: int) -> tuple[bool, Any]:
     return True, (mantissa & ~_HIDDEN) | (np.uint64(exponent) << _U52)
 
 
-@njit(cache=True)
+@njit(cache=True, no_cpython_wrapper=True)
 def _settled(w: Any, q: int, negative: bool, inexact: bool) -> tuple[int, Any]:
     """Kind and bits of ±w · 10**q, w > 0, where more digits than w holds may follow (`inexact`)."""
     good, bits = bits_of(w, q)
@@ -155,7 +155,7 @@ def _settled(w: Any, q: int, negative: bool, inexact: bool) -> tuple[int, Any]:
     return FLOAT, np.int64(bits | (_U1 << _U63)) if negative else np.int64(bits)
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, forceinline=True)
 def number(data: NDArray[np.uint8], at: int, decimal: np.uint8) -> tuple[int, Any, int]:
     """Read one number.
 
@@ -252,7 +252,7 @@ def number(data: NDArray[np.uint8], at: int, decimal: np.uint8) -> tuple[int, An
     return kind, value, i
 
 
-@njit(cache=True)
+@njit(cache=True, no_cpython_wrapper=True)
 def _again(data: NDArray[np.uint8], at: int, stop: int, decimal: np.uint8) -> tuple[Any, int, bool]:
     """First 19 significant digits, how many digits were left out, and whether one of these is not zero."""
     w: Any = _U0

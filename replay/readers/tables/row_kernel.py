@@ -35,7 +35,7 @@ def _packed(word: str) -> tuple[int, int]:
 WORDS = np.array([(*_packed(w), code) for code, row in _WORDS.items() for w in row.split(",")], np.uint64)
 
 
-@njit(cache=True)
+@njit(cache=True, no_cpython_wrapper=True)
 def _word(data: NDArray[np.uint8], at: int, stop: int) -> Any:
     """What a cell that is no number says; 0 where it is text."""
     if stop - at > 16:
@@ -56,14 +56,14 @@ def _word(data: NDArray[np.uint8], at: int, stop: int) -> Any:
     return 0
 
 
-@njit(cache=True)
+@njit(cache=True, no_cpython_wrapper=True)
 def _to_real(column: NDArray[np.int64], reals: NDArray[np.float64], rows: int) -> None:
     for i in range(rows):
         value = column[i]
         reals[i] = np.nan if value == MISSING else np.float64(value)
 
 
-@njit(cache=True)
+@njit(cache=True, no_cpython_wrapper=True)
 def _quoted(data: NDArray[np.uint8], at: int, stop: int) -> int:
     """Where the quote that closes the one before `at` stands; `stop` where it does not come."""
     j = at
@@ -77,7 +77,7 @@ def _quoted(data: NDArray[np.uint8], at: int, stop: int) -> int:
     return stop
 
 
-@njit(cache=True)
+@njit(cache=True, no_cpython_wrapper=True)
 def _moment(data: NDArray[np.uint8], start: int, end: int, counters: NDArray[np.int64]) -> Any:
     """Moment of a cell of text that may hold a date or a time of day."""
     value = iso_ns(data, start, end)
@@ -88,7 +88,7 @@ def _moment(data: NDArray[np.uint8], start: int, end: int, counters: NDArray[np.
     return value
 
 
-@njit(cache=True)
+@njit(cache=True, no_cpython_wrapper=True)
 def _worded(data: NDArray[np.uint8], start: int, end: int, counters: NDArray[np.int64]) -> tuple[int, Any]:
     """Kind and value of a cell that is no number: a truth, an infinity, nothing, or text (both `BAD`)."""
     said = _word(data, start, end)

@@ -143,6 +143,40 @@ def test_a_kernel_may_be_decorated_either_way() -> None:
     assert (one(1), two(1)) == (2, 3)
 
 
+@pytest.mark.parametrize("first", ["Python", "a kernel"])
+def test_what_is_compiled_for_kernels_alone_refuses_python(first: str) -> None:
+    @njit(no_cpython_wrapper=True)
+    def part(x: int) -> int:
+        return x + 1
+
+    @njit
+    def whole(x: int) -> int:
+        return int(part(x))
+
+    if first == "a kernel":
+        assert whole(1) == 2
+    with pytest.raises(TypeError, match="part is called by kernels alone"):
+        part(1)
+    assert whole(1) == 2
+
+
+def test_a_part_hands_on_to_no_kernel_that_it_is_put_into_its_callers() -> None:
+    @njit
+    def called(x: int) -> int:
+        return x + 1
+
+    @njit(forceinline=True)
+    def part(x: int) -> int:
+        return int(called(x))
+
+    @njit
+    def whole(x: int) -> int:
+        return int(part(x))
+
+    assert whole(1) == 2
+    assert [k.overloads[k.signatures[0]].fndesc.inline for k in (called, part)] == [False, True]
+
+
 def test_with_caches_of_another_numba_kernels_are_compiled_and_kept_as_always(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(compiling, "_cache_of", None)
 
