@@ -46,6 +46,18 @@ def target(commands, weights, bounds, limit, delay):  # type: ignore[no-untyped-
     return out
 
 
+@njit(cache=True, no_cpython_wrapper=True)
+def _top(score, k):  # type: ignore[no-untyped-def]
+    """Largest score of block k; NaN where one is."""
+    top = score[k, 0]
+    for m in range(score.shape[1]):
+        if np.isnan(score[k, m]):
+            return score[k, m]
+        if score[k, m] > top:
+            top = score[k, m]
+    return top
+
+
 @njit(cache=True)
 def posterior(score, enters, leaves):  # type: ignore[no-untyped-def]
     """Forward and backward probabilities of states, of which the first is the healthy one that all others are entered from.
@@ -61,7 +73,7 @@ def posterior(score, enters, leaves):  # type: ignore[no-untyped-def]
     forward = np.empty((blocks, states))
     backward = np.ones((blocks, states))
     for k in range(blocks):
-        top = score[k].max()
+        top = _top(score, k)
         total = 0.0
         stay, enter, leave = 1.0 - enters[k], enters[k] / (states - 1), leaves[k]
         for m in range(states):
@@ -76,7 +88,7 @@ def posterior(score, enters, leaves):  # type: ignore[no-untyped-def]
         for m in range(states):
             forward[k, m] /= total
     for k in range(blocks - 2, -1, -1):
-        top = score[k + 1].max()
+        top = _top(score, k + 1)
         total = 0.0
         stay, enter, leave = 1.0 - enters[k + 1], enters[k + 1] / (states - 1), leaves[k + 1]
         first = backward[k + 1, 0] * np.exp(max(score[k + 1, 0] - top, -300.0))
@@ -90,7 +102,11 @@ def posterior(score, enters, leaves):  # type: ignore[no-untyped-def]
         total += backward[k, 0]
         for m in range(states):
             backward[k, m] /= total
-    out = forward * backward
     for k in range(blocks):
-        out[k] /= out[k].sum()
-    return out
+        total = 0.0
+        for m in range(states):
+            forward[k, m] *= backward[k, m]
+            total += forward[k, m]
+        for m in range(states):
+            forward[k, m] = forward[k, m] / total if total != 0.0 else np.nan
+    return forward

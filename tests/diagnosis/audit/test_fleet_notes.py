@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from pathlib import Path
 from typing import Any
 
@@ -50,13 +51,19 @@ def with_silent() -> Any:
     return report, columns
 
 
-@pytest.fixture
-def stopped(tmp_path: Path) -> Path:
-    """A machine whose newest mission stopped it."""
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("stopped")
     missions = [Sample("old", day=0.0), Sample("new", day=1.0, verdict="stop", faults=[SILENT])]
-    path = stored(tmp_path, missions, {"new": with_silent})
+    path = stored(folder, missions, {"new": with_silent})
     compare(path, "new")
-    return tmp_path
+    return folder
+
+
+@pytest.fixture
+def stopped(made: Path, tmp_path: Path) -> Path:
+    """A machine whose newest mission stopped it."""
+    return shutil.copytree(made, tmp_path, dirs_exist_ok=True)
 
 
 def compare(path: Path, *names: str) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from pathlib import Path
 from typing import Any
 
@@ -29,18 +30,25 @@ def written(folder: Path, sample: Sample, made: tuple[dict[str, Any], Any], star
     write_result(MissionResult(whole_report(report), columns), folder / "missions" / sample.name)
 
 
-@pytest.fixture
-def store(tmp_path: Path) -> Path:
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("store")
     missions = [Sample("new", day=1.0), Sample("old", day=0.0), Sample("other", "HX-2", day=2.0)]
-    path = samples.write_store(tmp_path / "fleet.sqlite", missions)
+    path = samples.write_store(folder / "fleet.sqlite", missions)
     with Store.open(path, read_only=True) as opened:
         starts = dict(
             opened.database.rows("SELECT m.name, r.start_ns FROM mission m JOIN result r ON r.id = m.result", ())
         )
-    written(tmp_path, missions[0], report_samples.five_faults(), starts["new"])
-    written(tmp_path, missions[1], report_samples.no_faults(), starts["old"])
-    written(tmp_path, missions[2], report_samples.no_faults(), starts["other"])
-    return path
+    written(folder, missions[0], report_samples.five_faults(), starts["new"])
+    written(folder, missions[1], report_samples.no_faults(), starts["old"])
+    written(folder, missions[2], report_samples.no_faults(), starts["other"])
+    return folder
+
+
+@pytest.fixture
+def store(made: Path, tmp_path: Path) -> Path:
+    """Three missions of two machines, with their pages."""
+    return shutil.copytree(made, tmp_path, dirs_exist_ok=True) / "fleet.sqlite"
 
 
 def compare(path: Path, *names: str) -> list[tuple[str, dict[str, Any]]]:

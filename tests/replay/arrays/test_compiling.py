@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import ast
 import os
 import platform
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -175,6 +177,20 @@ def test_a_part_hands_on_to_no_kernel_that_it_is_put_into_its_callers() -> None:
 
     assert whole(1) == 2
     assert [k.overloads[k.signatures[0]].fndesc.inline for k in (called, part)] == [False, True]
+
+
+_SLOW = re.compile(r"\.(max|min)\(\)|np\.(argsort|sort|median|unique)\(")
+
+
+def test_no_kernel_uses_what_takes_seconds_to_compile() -> None:
+    found = []
+    for path in (p for folder in ("replay", "diagnosis") for p in sorted((ROOT / folder).rglob("*.py"))):
+        if "njit(" not in (text := path.read_text("utf-8")):
+            continue
+        for part in ast.parse(text).body:
+            if isinstance(part, ast.FunctionDef) and any("njit" in ast.unparse(d) for d in part.decorator_list):
+                found += [f"{path.name}: {part.name}: {m[0]}" for m in _SLOW.finditer(ast.unparse(part))]
+    assert not found
 
 
 def test_with_caches_of_another_numba_kernels_are_compiled_and_kept_as_always(monkeypatch: pytest.MonkeyPatch) -> None:
