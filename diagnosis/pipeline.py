@@ -27,6 +27,7 @@ from diagnosis.clearing.beside import (
 from diagnosis.clearing.contradicted import without_contradicted
 from diagnosis.clearing.made_by_axles import without_made_by_axles
 from diagnosis.clearing.nothing_moves import supply_gone
+from diagnosis.clearing.one_supply import less_sure_beside_supply
 from diagnosis.clearing.standing_out import what_stands_out, without_explained, without_followers
 from diagnosis.decision import quality
 from diagnosis.decision.as_a_whole import as_a_whole
@@ -308,7 +309,11 @@ def _with_machine_events(judged: Judged) -> Judged:
     if not events:
         return judged
     found = judged.found
-    return replace(judged, found=replace(found, events=(*found.events, *(e.worded(found.words) for e in events))))
+    all_events = (*found.events, *(e.worded(found.words) for e in events))
+    told = less_sure_beside_supply(
+        found.assessments, all_events, judged.machine.axles, found.words, judged.mission.timeline.dt
+    )
+    return replace(judged, found=replace(found, assessments=told, events=all_events))
 
 
 def _require_something(assessments: Mapping[tuple[str, str], Assessment], mission: Mission, machine: Machine) -> None:

@@ -19,30 +19,19 @@ from diagnosis.clearing.cells import Cells
 from diagnosis.clearing.drop_outs import fault_of_drop_outs
 from diagnosis.clearing.jumps import fault_of_jumps
 from diagnosis.clearing.limits import Limits, measured_twice, usual_limits
+from diagnosis.clearing.one_supply import agree_twice, less_sure_together
 from diagnosis.clearing.openings import speeds_follow_openings
 from diagnosis.clearing.second_angles import scaled_angles
 from diagnosis.clearing.spikes import fault_of_spikes
-from diagnosis.clearing.still import rate_of
 from diagnosis.clearing.untold_faults import fault_of_angle, fault_of_axle, fault_of_wheel
 from diagnosis.results.assessment import Assessment, Finding
 from diagnosis.results.clearing import Check, Checked
-from diagnosis.results.limited import limited
 from diagnosis.results.machine_event import MachineEvent
 from diagnosis.results.machine_words import MachineWords
 from diagnosis.results.sentence import mapped
 from diagnosis.results.vocabulary import Kind, Tier
-from replay.faults import FaultMode, Side, State
+from replay.faults import FaultMode, Side
 
-_BRIEF_S, _MOSTLY, _TOGETHER = 5.0, 0.6, 0.55  # of both axles; of the time; of any fault, set by hand
-_AT_ONCE = "Another axle stands at the same time: parts fail one at a time, so that what supplies or holds the machine is as likely to hold both."
-_SLOWED = "The {wheel}s fell far behind their commands at the same time: an engine that stalls, or what else supplies the machine, stops its steering as well."
-_ALL_RESTS = (
-    "Nothing else of the machine moved at the time: what supplies the axle may have been off, as while an engine that died is started again, "
-    "and a machine at rest does not show it."
-)
-_RESTS, _TURNS, _NEARLY = 0.02, 0.015, 0.9  # of the top speed; rad/s; of the time
-_BEFORE_S, _BEHIND_S = 1.0, 0.5  # before the axle stands; in which most wheels are behind
-_DRIVES, _BEHIND, _WHEELS = 0.1, 0.5, 2  # of the top speed; of a wheel's command; wheels that are told to drive
 #: A component and its side.
 Part = tuple[str, str]
 
@@ -77,11 +66,11 @@ def what_stands_out(checks: Sequence[Checked], cells: Cells, words: MachineWords
         found |= {wheel: fault for wheel in rough if (fault := leaps(wheel, cells)) is not None}
     axles = {c.component: fault_of_axle(c, cells) for c in checks if _does_not_answer(c, cells)}
     still = {component: fault for component, fault in axles.items() if fault is not None}
-    found |= _less_sure_together(still, cells)
+    found |= less_sure_together(still, checks, cells)
     alone = _alone(checks, cells) or _off_its_plant(checks, cells)
     wheel = alone or (None if _stated(cells) else _alone_not_following(checks, cells))
     if wheel is not None:
-        agree = _agree(checks, wheel.component)
+        agree = agree_twice(checks, wheel.component)
         told = fault_of_wheel(wheel, cells, alone=alone is not None, agree=agree)
         quick = told is not None and told.mode is FaultMode.OUTSIDE_TABLE  # as one is that a torque lets run
         if told is not None and (not quick or speeds_follow_openings(cells, surely=True)):
@@ -90,59 +79,6 @@ def what_stands_out(checks: Sequence[Checked], cells: Cells, words: MachineWords
         component: replace(f, evidence=tuple(mapped(text, words.fill) for text in f.evidence))
         for component, f in found.items()
     }
-
-
-def _less_sure_together(found: Mapping[str, Finding], cells: Cells) -> dict[str, Finding]:
-    """Axles that stand for a moment at the same time, while the wheels make little of their commands, or nothing moves, less sure: by one supply, all stop.
-
-    Parts fail one at a time.
-    """
-
-    def together(f: Finding) -> bool:
-        others = [g for g in found.values() if g is not f and g.mode is f.mode]
-        common = [min(f.stop, g.stop) - max(f.start, g.start) for g in others]
-        return max(common, default=0) >= _MOSTLY * (f.stop - f.start)
-
-    def less_sure(f: Finding, why: str) -> Finding:
-        return limited(f, f.probability * _TOGETHER / _faulty(f), why)
-
-    def why(component: str, f: Finding) -> str | None:
-        if f.mode is not FaultMode.NO_SIGNAL or (f.stop - f.start) * cells.timeline.dt >= _BRIEF_S:
-            return None
-        if together(f):
-            return _AT_ONCE
-        return _SLOWED if _machine_slows(f, cells) else _ALL_RESTS if _all_rests(component, f, cells) else None
-
-    reasons = {component: why(component, f) for component, f in found.items()}
-    return {c: f if (reason := reasons[c]) is None else less_sure(f, reason) for c, f in found.items()}
-
-
-def _machine_slows(f: Finding, cells: Cells) -> bool:
-    """Whether most wheels make less than half of what they are told for a while in, or just before, the time in which an axle stands."""
-    before = round(_BEFORE_S / cells.dt)
-    part = slice(max(0, f.start // cells.width - before), -(-f.stop // cells.width))
-    speed, asked = np.abs(cells.wheels("v")[part]), np.abs(cells.reference[part])
-    with np.errstate(invalid="ignore"):
-        told = asked > _DRIVES * cells.machine.max_speed
-        behind = told & (speed < _BEHIND * asked)
-    most = (behind.sum(axis=1) > 0.5 * told.sum(axis=1)) & (told.sum(axis=1) >= _WHEELS)
-    return float(np.count_nonzero(most) * cells.dt) >= _BEHIND_S
-
-
-def _all_rests(component: str, f: Finding, cells: Cells) -> bool:
-    """Whether no wheel rolls and no other axle turns while an axle stands."""
-    part = slice(f.start // cells.width, -(-f.stop // cells.width))
-    others = [j for j, axle in enumerate(cells.machine.axles) if axle != component]
-    speed, rate = np.abs(cells.wheels("v")[part]), np.abs(rate_of(cells.axles("phi"), cells.dt)[part][:, others])
-    if not np.isfinite(speed).any():
-        return False
-    with np.errstate(invalid="ignore"):
-        moves = (speed > _RESTS * cells.machine.max_speed).any(axis=1) | (rate > _TURNS).any(axis=1)
-    return float(np.mean(~moves)) >= _NEARLY
-
-
-def _faulty(f: Finding) -> float:
-    return sum(h.p for h in f.hypotheses if h.mode != State.HEALTHY.value)
 
 
 def without_explained(
@@ -203,12 +139,6 @@ def _off_its_plant(checks: Sequence[Checked], cells: Cells) -> Checked | None:
         return None
     first, second, *_ = own
     return first if _times(first) >= _BY_FILE and _times(second) <= _AS_FILED else None
-
-
-def _agree(checks: Sequence[Checked], wheel: str) -> bool:
-    """Whether the speed and the opening of a wheel are both measured twice, and pass that check."""
-    own = {c.side: c.passed for c in checks if (c.component, c.check) == (wheel, Check.SECOND_MEASUREMENT)}
-    return own.get(Side.SENSOR, False) and own.get(Side.ACTUATOR, False)
 
 
 def _known(check: Checked) -> bool:

@@ -103,12 +103,12 @@ def fault_of_wheel(check: Checked, cells: Cells, *, alone: bool, agree: bool = F
         )
     )
     sizes = Epsilon(float(middle), float(min(low, high)), float(max(low, high)))
-    side, why = (Side.ACTUATOR, _BEHIND) if below and agree else (Side.SENSOR_OR_ACTUATOR, _UNTOLD)
+    side, why = (Side.ACTUATOR, _BEHIND) if below and agree else (Side.SENSOR_OR_ACTUATOR, UNTOLD)
     rows = _STANDS if mode is FaultMode.NO_SIGNAL else None
     return finding_of((start, stop), mode, sizes, (text, why), side, rows, p=_P if below else _P_ABOVE)
 
 
-_UNTOLD = (
+UNTOLD = (
     "No row of the tables fits well enough to say whether the sensor or the {valve} fails: a second measurement of either "
     "would tell them apart."
 )
@@ -138,7 +138,7 @@ def fault_of_axle(check: Checked, cells: Cells) -> Finding | None:
         return None
     text = f"The {check.component} axle stands still while its {{valve}} is commanded to {100 * check.worst:.0f}{{percent}}; {moves}"
     least = max(0.0, 1.0 - check.limit / check.worst)  # what is left of the command moves no axle
-    return finding_of((start, stop), FaultMode.NO_SIGNAL, Epsilon(1.0, least, 1.0), (text, _UNTOLD))
+    return finding_of((start, stop), FaultMode.NO_SIGNAL, Epsilon(1.0, least, 1.0), (text, UNTOLD))
 
 
 def fault_of_angle(check: Checked, cells: Cells) -> Finding:

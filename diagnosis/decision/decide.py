@@ -162,7 +162,7 @@ def decide(
     loads = smallest_loads(assessments, words)
     caveats += () if found.status is Verdict.READY else loads
     caveats += limits_of(limits)
-    hidden = (_NO_YAW,) if any(_offset_hidden(checks, axle) for axle in axles) else ()
+    hidden: tuple[str, ...] = (_NO_YAW,) if any(_offset_hidden(checks, axle) for axle in axles) else ()
     hidden += (words.fill(_ALL_AXLES),) if _common_loss_hidden(checks) else ()
     if not told or short != unseen:
         caveats += unseen

@@ -33,6 +33,8 @@ class MachineEvent:
     body : bool
         Whether it is that a sensor of the body, as a gyro, contradicts what wheels or axles read: an axle that does not answer its own command is
         not explained by it, but may be why.
+    supply : bool
+        Whether it is that all wheels give less than they should: what supplies them may be why, of whatever else it drives as well.
     spans : tuple[tuple[float, float], ...]
         Begin and end of each time at which it was so [s], by time; empty where it was so throughout.
     """
@@ -43,6 +45,7 @@ class MachineEvent:
     act: str
     model: bool = False
     body: bool = False
+    supply: bool = False
     spans: tuple[tuple[float, float], ...] = ()
 
     def at(self, spans: Sequence[tuple[float, float]]) -> MachineEvent:
@@ -173,13 +176,14 @@ def less_than_told(text: str) -> MachineEvent:
         more = ": what supplies or loads them all, or the scale of commands or speeds, is not as it should be; no part is blamed for it."
         act = "check the unit and scale of commanded and measured speeds, and what all {wheels} share (supply, oil, load), and diagnose again"
         doubt = "the machine makes another share of its commands throughout"
-        return MachineEvent("The {wheels} do not make their commands", text + more, doubt, act)
+        return MachineEvent("The {wheels} do not make their commands", text + more, doubt, act, supply=True)
     act = "look for what all {wheels} share (supply, oil, load, a slope, limits of the controller), and record a mission on level ground again"
     more = (
         ": what supplies or loads them all has changed, or all their speeds read otherwise; no part is blamed for it."
     )
     doubt = "the machine made another share of its commands for a part of the mission"
-    return MachineEvent("The {wheels} make another share of their commands for a time", text + more, doubt, act)
+    title = "The {wheels} make another share of their commands for a time"
+    return MachineEvent(title, text + more, doubt, act, supply=True)
 
 
 def other_response(text: str) -> MachineEvent:
@@ -187,7 +191,7 @@ def other_response(text: str) -> MachineEvent:
     more = ": what supplies or loads them all, or the gear, has changed, or all their speeds read otherwise; no part is blamed for it."
     act = "look for what all {wheels} share (supply, oil, load, gear), and record a mission under one load and in one gear"
     doubt = "all {wheels} make another speed of the same openings for a part of the mission"
-    return MachineEvent("The {wheels} answer otherwise for a part of the mission", text + more, doubt, act)
+    return MachineEvent("The {wheels} answer otherwise for a part of the mission", text + more, doubt, act, supply=True)
 
 
 def beyond_the_top(text: str) -> MachineEvent:

@@ -74,10 +74,10 @@ def _flows(k: int, u: F, p: PlantModel, m: StructureModel, state: PlantState, s:
             order[j], against[j] = order[j - 1], against[j - 1]
             j -= 1
         order[j], against[j] = i, x
-    for i in order:
-        given = min(abs(flow[i]), left)
+    for wheel in order:
+        given = min(abs(flow[wheel]), left)
         left -= given
-        flow[i] = given * np.sign(flow[i])
+        flow[wheel] = given * np.sign(flow[wheel])
 
 
 @njit(cache=True, no_cpython_wrapper=True)

@@ -12,12 +12,8 @@ import pytest
 from diagnosis.clearing.added_findings import with_findings
 from diagnosis.clearing.cells import Cells
 from diagnosis.clearing.checks import checks_of
-from diagnosis.clearing.standing_out import (
-    _less_sure_together,
-    what_stands_out,
-    without_explained,
-    without_followers,
-)
+from diagnosis.clearing.one_supply import less_sure_together
+from diagnosis.clearing.standing_out import what_stands_out, without_explained, without_followers
 from diagnosis.clearing.untold_faults import fault_of_wheel, finding_of
 from diagnosis.results.assessment import CODE, Assessment, Finding
 from diagnosis.results.clearing import Check, Checked
@@ -297,6 +293,6 @@ def test_axles_that_stand_for_a_moment_at_once_or_while_the_machine_slows_or_res
         axle: finding_of((round(100 * a), round(100 * (a + seconds))), FaultMode.NO_SIGNAL, None, ())
         for axle, a in zip(("front", "rear"), starts, strict=True)
     }
-    for f in _less_sure_together(found, cells).values():
+    for f in less_sure_together(found, (), cells).values():
         faulty = sum(h.p for h in f.hypotheses if h.mode != "healthy")
         assert faulty == pytest.approx(0.95 if sure else 0.55)
