@@ -229,7 +229,7 @@ def _when(report: InspectReport) -> str:
 
 def _undated(ns: int) -> bool:
     """Whether a stamp is of simulated time, or counted from a start, and tells no date."""
-    return 0 <= ns < _DATED_NS
+    return abs(ns) < _DATED_NS
 
 
 def _start(ns: int, digits: int = 0) -> str:

@@ -73,8 +73,8 @@ def shown_moment(start_ns: int) -> str:
     except (ValueError, OverflowError, OSError):
         return "an unknown time"
     shown = f"{moment:%Y-%m-%d %H:%M:%S} UTC"
-    if 0 <= start_ns < UNDATED_NS:
-        return f"{start_ns / 1e9:.0f} s of a clock without a date (simulated time, or counted from a start)"
+    if abs(start_ns) < UNDATED_NS:
+        return f"{round(start_ns / 1e9)} s of a clock without a date (simulated time, or counted from a start)"
     if not local.utcoffset():
         return shown
     day = "" if local.date() == moment.date() else f"{local:%Y-%m-%d} "

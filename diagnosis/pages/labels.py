@@ -112,7 +112,7 @@ def grouped(value: int) -> str:
     return f"{value:,}".replace(",", "\u202f").replace("-", "−")
 
 
-#: Stamps below are of a clock without a date: simulated time, or time since something was switched on [ns since 1970].
+#: Stamps nearer to 1970 are of a clock without a date: simulated time, or time since something was switched on [ns since 1970].
 UNDATED_NS = 365 * 86_400 * 10**9
 
 

@@ -23,7 +23,7 @@ def when_words(fault: IntervalRow, report: ReportDocument) -> str:
     """
     start, stop, whole = fault["start_s"], fault["stop_s"], report["log"]["duration_s"]
     at = report["log"]["start_ns"] + round(start * 1e9)
-    dated = "" if 0 <= at < UNDATED_NS else f" ({utc(at)[11:]}.{at // 10**6 % 1000:03d} UTC)"
+    dated = "" if abs(at) < UNDATED_NS else f" ({utc(at)[11:]}.{at // 10**6 % 1000:03d} UTC)"
     began = "was there from the beginning" if start <= 0 else f"began at {clock(start, _DIGITS)}{dated}"
     ending = ending_of(fault, report)
     if ending is Ending.LASTS:

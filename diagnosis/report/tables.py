@@ -262,7 +262,7 @@ def _action(action: ActionRow, intervals: Mapping[str, IntervalRow], report: Rep
 def _when(report: ReportDocument, duration: float) -> Markup:
     """Begin, end and length of the mission, for the first screen."""
     start = report["log"]["start_ns"]
-    if 0 <= start < UNDATED_NS:
+    if abs(start) < UNDATED_NS:
         return Markup("Clock without a date, {}").format(clock(duration))
     end = start + round(duration * 1e9)
     same = utc(start)[:10] == utc(end)[:10]
@@ -275,7 +275,7 @@ def _facts(report: ReportDocument, duration: float) -> list[tuple[str, str]]:
     facts = [
         ("Machine", machine["id"] or machine["name"] or "unnamed"),
         ("Start (UTC)", utc_mark(log["start_ns"], both=True))
-        if not 0 <= log["start_ns"] < UNDATED_NS
+        if abs(log["start_ns"]) >= UNDATED_NS
         else ("Start", "clock without a date"),
         ("Duration", clock(duration)),
         (words_of(machine).moving.capitalize(), clock(log["driving_s"])),

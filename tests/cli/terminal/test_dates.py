@@ -95,3 +95,4 @@ def test_a_time_beyond_calendars_is_no_error() -> None:
 def test_a_clock_without_a_date_is_said_to_have_none() -> None:
     assert shown_moment(12 * 10**9).startswith("12 s of a clock without a date")
     assert shown_moment(73_214 * 10**9).startswith("73214 s of a clock without a date")
+    assert shown_moment(-1_400_000).startswith("0 s of a clock without a date")
