@@ -102,10 +102,8 @@ class Course(NamedTuple):
         """
         frame = self.cells.frame
         hop_s = frame.hop * self.cells.dt
-        long, beside = (
-            max(1, round(length_s / hop_s)),
-            frame.length // frame.hop,
-        )  # windows that share time with a spell
+        long = max(1, round(length_s / hop_s))
+        beside = frame.length // frame.hop  # windows that share time with a spell
         known = np.isfinite(self.share)
         if self.share.size < long or np.count_nonzero(known) < _OUTSIDE:
             return None

@@ -52,7 +52,7 @@ def with_frozen_readings(
     for wheel, one in found.items():
         dt = one.pair.dt
         for r in held[wheel]:
-            if (r.stop - r.start) * dt < max(_LEAST_S, _FAR * r.usual_s):
+            if (r.stop - r.start) * dt < max(_LEAST_S, _FAR * r.usual_s) or _most_hold(held, wheel, r):
                 continue
             why = _goes_on(one, r) or (_OTHERS_TREMBLE if _stands_out(found, held, wheel, r) else None)
             if why is not None:
@@ -78,23 +78,26 @@ def _goes_on(one: IdentifiedPair, r: Frozen) -> str | None:
 def _stands_out(
     found: Mapping[str, IdentifiedPair], held: Mapping[str, Sequence[Frozen]], wheel: str, r: Frozen
 ) -> bool:
-    """Whether the wheel turns by its second sensor, the other speeds tremble meanwhile, most of them at least, and this one does elsewhere."""
+    """Whether the wheel turns by its second sensor, the other speeds that are not held tremble meanwhile, and this one does elsewhere."""
     one = found[wheel]
     x = one.samples.x[r.start : r.stop]
     if not np.isfinite(x).any() or abs(float(np.nanmedian(x))) <= TURNS * one.pair.span:
         return False
     inside = np.zeros(one.pair.y.size, np.bool_)
     inside[r.start : r.stop] = True
-    free = [pair for name, pair in found.items() if name != wheel and not _holds(held[name], r)]
-    if len(free) <= (len(found) - 1) / 2:
-        return False  # their log holds them
-    others = [_trembling(pair, inside) for pair in free]
+    others = [_trembling(pair, inside) for name, pair in found.items() if name != wheel and not _holds(held[name], r)]
     known = [t for t in others if t is not None]
     own = _trembling(one, ~inside)
     if own is None or len(known) < _OTHERS:
         return False
     steps = min(size for _, size in known) / max(rounding_step(one.pair.y[one.pair.fresh]), 1e-12)
     return min(share for share, _ in (*known, own)) >= _TREMBLES and steps >= _STEPS
+
+
+def _most_hold(held: Mapping[str, Sequence[Frozen]], wheel: str, r: Frozen) -> bool:
+    """Whether most other sensors repeat one value meanwhile, too: their log does."""
+    others = [_holds(runs, r) for name, runs in held.items() if name != wheel]
+    return bool(others) and sum(others) >= len(others) / 2
 
 
 def _holds(held: Sequence[Frozen], r: Frozen) -> bool:

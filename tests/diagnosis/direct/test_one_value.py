@@ -89,3 +89,6 @@ def test_a_second_sensor_that_goes_on_leaves_a_frozen_one_behind() -> None:
     assert (f.start, f.stop) == (pytest.approx(400, abs=3), pytest.approx(560, abs=3))
     assert "its second sensor reads" in f.evidence[0]
     assert not after["RL"].findings
+    for w in ("RL", "FL"):
+        y[w][400:560] = y[w][400]
+    assert not any(a.findings for a in told(y, second=moving).values())  # all of them: their log holds them
