@@ -34,7 +34,7 @@ _AT_ONCE = 8  # lags and plays
 _ROUNDS, _FINE = 5, (0.8, 0.9, 0.95, 1.05, 1.1, 1.25)
 _USUAL = 0.35
 _SIBLINGS, _ALIKE, _SCALES = 3, 0.6, 0.01  # channels of one kind; steps, and share, by which they may differ
-_UNLIKE = 1.6  # times the usual play or lag of valves of one kind
+_UNLIKE = np.array([1.6, 1.6, 1.5])  # times the usual play, lag and lateness of valves of one kind
 
 
 class Relation(NamedTuple):
@@ -87,7 +87,7 @@ def relations_of_kind(found: Sequence[Relation], dt: float) -> list[Relation]:
 
 
 def valves_of_kind(found: Sequence[Relation], dt: float) -> list[Relation]:
-    """Relations of three or more valves of one kind: play, lag and scale that no other has are a fault's, and become the usual ones.
+    """Relations of three or more valves of one kind: play, lag, delay and scale that no other has are a fault's, and become the usual ones.
 
     Positions that merely come late are all as late as most of them are. `dt` is a step [s].
     """
@@ -97,10 +97,10 @@ def valves_of_kind(found: Sequence[Relation], dt: float) -> list[Relation]:
         return relations_of_kind(found, dt)
     scale = float(median_of([r.gain for r in found]))
     found = [r if abs(r.gain - scale) <= _SCALES else r._replace(gain=scale) for r in found]
-    size = np.array([(r.play, r.lag) for r in found])
+    size = np.array([(r.play, r.lag, r.delay * dt + r.lag) for r in found])
     usual = quantile_of(size, 0.5, axis=0, method="lower")
-    typical = found[int(np.argmin(np.abs(size - usual) @ np.array([1.0, 0.5])))]
-    odd = (size > _UNLIKE * usual + np.array([_PLAYS[0], _LAGS_S[3]])).any(axis=1)
+    typical = found[int(np.argmin(np.abs(size - usual) @ np.array([1.0, 0.5, 0.0])))]
+    odd = (size > _UNLIKE * usual + np.array([_PLAYS[0], _LAGS_S[3], max(_DELAY_S, 0.5 * dt)])).any(axis=1)
     return [typical._replace(gain=r.gain) if strange else r for r, strange in zip(found, odd, strict=True)]
 
 

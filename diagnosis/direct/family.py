@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 
 import numpy as np
 
 from diagnosis.channels.habit import Habit, identify_habit, of_kind
-from diagnosis.channels.relation import relations_of_kind, valves_of_kind
+from diagnosis.channels.relation import Relation, relations_of_kind, valves_of_kind
 from diagnosis.direct.assess import assess_identified
 from diagnosis.direct.at_once import without_shared_moments
 from diagnosis.direct.gain_spread import usual_spread
@@ -101,21 +102,33 @@ def _identified(pairs: dict[Part, Pair], limits: Limits, mission: MissionView) -
         zip(pairs, each(lambda part: identify(pairs[part], limits), pairs, mission.timeline.size, begun), strict=True)
     )
     for side in (SENSOR, ACTUATOR):
-        kind = {part: one for part, one in found.items() if part[1] == side}
-        usual = usual_of_kind([one.own for one in kind.values()])
-        own = [one.relation for one in kind.values()]
+        kind = [part for part in found if part[1] == side]
+        own = [found[part].relation for part in kind]
         alike = (
             relations_of_kind(own, mission.timeline.dt) if side == SENSOR else valves_of_kind(own, mission.timeline.dt)
         )
-        most = most_noise_of_kind([one.model.noise for one in kind.values()])
-        for (part, one), relation in zip(kind.items(), alike, strict=True):
-            exceeds = usual is not None and one.own.exceeds(usual)
-            louder = most is not None and one.model.noise > most
-            mission.timeline.store.release()
-            if exceeds or louder or relation != one.relation:
-                found[part] = identify(one.pair, limits, usual if exceeds else None, relation, most)
+        found |= _of_kind({part: found[part] for part in kind}, alike, limits, mission)
+        if any(found[part].relation != relation for part, relation in zip(kind, own, strict=True)):
+            # what the others seemed to be off by was their relation's doing, not noise that this one may have
+            found |= _of_kind({part: found[part] for part in kind}, alike, limits, mission)
         spread = usual_spread([found[part].own_spread for part in kind])
         found |= {part: replace(found[part], kind_spread=spread) for part in kind}
+    return found
+
+
+def _of_kind(
+    kind: dict[Part, IdentifiedPair], alike: Sequence[Relation], limits: Limits, mission: MissionView
+) -> dict[Part, IdentifiedPair]:
+    """Pairs of one kind that have another relation, or more noise, than such have, identified with what is usual."""
+    usual = usual_of_kind([one.own for one in kind.values()])
+    most = most_noise_of_kind([one.model.noise for one in kind.values()])
+    found = {}
+    for (part, one), relation in zip(kind.items(), alike, strict=True):
+        exceeds = usual is not None and one.own.exceeds(usual)
+        louder = most is not None and one.model.noise > most
+        mission.timeline.store.release()
+        if exceeds or louder or relation != one.relation:
+            found[part] = identify(one.pair, limits, usual if exceeds else None, relation, most)
     return found
 
 

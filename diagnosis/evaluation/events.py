@@ -11,6 +11,8 @@ from diagnosis.evaluation.spans import covered, length, within, without
 from diagnosis.results.size_rows import EpsilonRow
 from replay.faults import TOTAL
 
+_SEEN = 0.5  # of a report's time, that the truth says can be judged: what lies mostly behind a dead sensor is not held against it
+
 
 def match_events(group: Compared) -> tuple[tuple[FaultOutcome, ...], tuple[ReportOutcome, ...]]:
     """Match the faults and reports of a group, and say what became of each."""
@@ -78,7 +80,9 @@ def _fault(group: Compared, fault: Fault, j: int | None, overlap: float) -> Faul
 def _report(group: Compared, j: int, outcome: str, truth: float | None) -> ReportOutcome:
     row, start, stop = group.rows[j], float(group.start[j]), float(group.stop[j])
     component, side = str(row["component"]), str(row["side"])
-    if outcome == "surplus" and not without([(start, stop)], group.hidden(component, side)):
+    if outcome == "surplus" and length(without([(start, stop)], group.hidden(component, side))) < _SEEN * (
+        stop - start
+    ):
         outcome = "ignored"
     faulty = length(within(group.faulty[component], start, stop))
     estimate = row.get("epsilon")

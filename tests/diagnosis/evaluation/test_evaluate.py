@@ -238,6 +238,13 @@ def test_masked_time_of_an_actuator_counts_nowhere() -> None:
     assert figures(counts)["events"]["reported"] == 2
 
 
+@pytest.mark.parametrize(("stop", "outcome"), [(8.2, "ignored"), (14.0, "surplus")])
+def test_a_report_mostly_behind_a_dead_sensor_is_not_held_against_it(stop: float, outcome: str) -> None:
+    truth = truth_of(fault("B", SENSOR, "stuck", 4.0, 8.0), masked=(TruthSpan("B", 4.0, 8.0),))
+    report = report_of(row("B", "sensor", "stuck", 4.0, 8.0), row("B", "actuator", "noisy", 5.0, stop, 0.4))
+    assert [r.outcome for r in wheels(report, truth).reports] == ["right", outcome]
+
+
 def test_onset_counts_from_the_first_excited_sample() -> None:
     # The fault begins at 1 s, A drives from 2 s on; at 100 Hz 7.003 s is first seen at 7.01 s.
     truth = truth_of(
