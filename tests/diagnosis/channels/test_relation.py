@@ -130,7 +130,7 @@ def test_what_no_other_valve_has_of_scale_and_delay_is_a_faults() -> None:
     ]
     assert valves_of_kind(slow, DT) == [*slow[:3], slow[3]._replace(gain=0.9995)]
     assert valves_of_kind([lost, plain[0]], DT) == [lost, plain[0]]
-    late = Relation(0.05 / DT)  # a disturbance looks like a delay where the others lag
+    late = Relation(0.06 / DT)  # a disturbance looks like a delay where the others lag
     assert valves_of_kind([*slow[:3], late], DT)[3].lag in (0.026, 0.03, 0.034)
 
 
