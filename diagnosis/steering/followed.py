@@ -38,6 +38,7 @@ _BACK = 0.75  # of that, where it moves again by itself: the command may not hav
 _NEVER = 0.7  # of that, where it never followed
 _SENSOR = 0.05  # that readings which tremble are a sensor's that hangs
 _FOLLOWS = 0.3  # of the commanded range
+_NOTHING = 1e-6  # rad, that a sensor without signal reads
 WHY = Reason(
     "its command and its angle alone show whether it stays where it is, and neither a scaled angle nor a weak {valve} behind a loop",
     Lack.COMMAND,
@@ -191,6 +192,7 @@ def _finding(
     level = float(np.median(own)) if own.size else 0.0
     low, high = float(np.nanmin(one.low[first:last])), float(np.nanmax(one.high[first:last]))
     side = Side.ACTUATOR if lives else Side.SENSOR_OR_ACTUATOR
+    mode = _row(level, (low, high), lives)
     text = (
         f"{names[0]} stays at {amount(level, 'rad')} for {lasting((stop - start) * timeline.dt, 1)} while {names[1]} goes from {amount(low, 'rad')} to "
         f"{amount(high, 'rad')}; for {seconds:.1f} s of driving it was elsewhere for longer than {_ANSWER_S:g} s.",
@@ -200,13 +202,24 @@ def _finding(
     )
     sensor = _SENSOR * p if lives else 0.0
     hypotheses = (
-        Hypothesis(side.value, FaultMode.STUCK.value, p - sensor),
+        Hypothesis(side.value, mode.value, p - sensor),
         Hypothesis(Side.SENSOR.value, FaultMode.STUCK.value, sensor),
         Hypothesis("none", State.HEALTHY.value, 1.0 - p),
     )
     return Finding(
-        start=start, stop=stop, side=side, mode=FaultMode.STUCK, probability=p - sensor,
+        start=start, stop=stop, side=side, mode=mode, probability=p - sensor,
         hypotheses=tuple(h for h in hypotheses if h.p > 0.0),
-        epsilon=Epsilon(1.0, 1.0, 1.0), sat=Sat(level, abs(level), level, level, "rad"),
+        epsilon=Epsilon(1.0, 1.0, 1.0),
+        sat=Sat(level, abs(level), level, level, "rad") if mode is FaultMode.STUCK else None,
         evidence=text, tier=Tier.TRACKING,
     )  # fmt: skip
+
+
+def _row(level: float, told: tuple[float, float], lives: bool) -> FaultMode:
+    """L4 and L8 (7): a valve that is stuck open drives its axle to an end, so that one that stands within its way has no signal.
+
+    A sensor without signal reads nothing; one that hangs reads where it was.
+    """
+    if lives:
+        return FaultMode.NO_SIGNAL if told[0] < level < told[1] else FaultMode.STUCK
+    return FaultMode.NO_SIGNAL if abs(level) < _NOTHING else FaultMode.STUCK

@@ -45,23 +45,31 @@ def test_one_that_answers_is_not_named_however_its_angle_is_scaled_or_shifted(se
     assert found(angle(command) + 0.1, command) is None
 
 
-def test_one_that_stays_has_a_stuck_drive_where_its_readings_tremble() -> None:
+def test_one_that_stays_has_a_drive_without_signal_where_its_readings_tremble() -> None:
     command = asked()
     phi = angle(command)
     part = slice(N // 2, N)
     phi[part] = phi[N // 2] + np.random.default_rng(2).normal(0.0, 0.002, N - N // 2)
     one = found(phi, command)
-    assert (one.side, one.mode) == (Side.ACTUATOR, FaultMode.STUCK)
+    assert (one.side, one.mode) == (Side.ACTUATOR, FaultMode.NO_SIGNAL)
     assert one.probability > 0.85
     assert abs(one.start - N // 2) < 200
     assert one.stop == N
     drive, sensor = (assessed(one, phi, s) for s in (Side.ACTUATOR, Side.SENSOR))
     assert drive.findings
     assert not sensor.findings
-    assert np.all(drive.states[one.start : one.stop] == CODE[State.STUCK])
+    assert np.all(drive.states[one.start : one.stop] == CODE[State.NO_SIGNAL])
     assert not np.any(sensor.states == CODE[State.HEALTHY])
     phi[part] = phi[N // 2]
-    assert found(phi, command).side is Side.SENSOR_OR_ACTUATOR
+    hangs = found(phi, command)
+    assert (hangs.side, hangs.mode) == (Side.SENSOR_OR_ACTUATOR, FaultMode.STUCK)
+
+
+def test_readings_of_nothing_are_no_signal_and_an_axle_at_its_end_is_stuck_there() -> None:
+    command, noise = asked(), np.random.default_rng(2).normal(0.0, 0.002, N)
+    silent, at_end = found(np.zeros(N), command), found(0.4 + noise, command)
+    assert (silent.side, silent.mode) == (Side.SENSOR_OR_ACTUATOR, FaultMode.NO_SIGNAL)
+    assert (at_end.side, at_end.mode) == (Side.ACTUATOR, FaultMode.STUCK)
 
 
 def test_what_moves_again_or_never_moved_is_less_sure() -> None:
