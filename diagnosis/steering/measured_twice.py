@@ -31,9 +31,9 @@ Flags = NDArray[np.bool_]
 
 # lower quarter of what is off, which a fault that grows before it is found leaves alone, and standard deviations per that
 _LOWER, _NORMAL = 0.25, 3.138
-#: Probability that a valve does not answer a command which stays, or answers less: 10 of 13 and 30 of 31 were right on tuning machines, where
+#: Probability that a valve does not answer a command which stays, or answers less: 10 of 13 and 93 of 96 were right on simulated machines, where
 #: few have a constant offset instead.
-_AT_REST, _LESS_AT_REST = 0.6, 0.7
+_AT_REST, _LESS_AT_REST = 0.6, 0.85
 _STEADY, _HARDLY = 0.25, 0.05  # of its mean, and of full opening, by which such a command varies
 # of a valve that moves as it is told: correlation of opening and command, and the least standard deviation of both that is a motion
 _FOLLOWS, _MOTION, _FEW = 0.9, 0.01, 12

@@ -116,7 +116,7 @@ def test_a_valve_that_stands_still_is_called_by_where_it_does(at: float, said: F
 def test_beside_a_command_that_rests_a_share_may_be_a_constant_that_is_missing() -> None:
     after = told(np.full(SIZE, 0.1), FaultMode.INEFFICIENT, np.full(SIZE, 0.2))
     assert {h.mode: h.p for h in after.findings[0].hypotheses} == pytest.approx(
-        {"inefficient": 0.7, "outside_table": 0.3}
+        {"inefficient": 0.85, "outside_table": 0.15}
     )
 
 
