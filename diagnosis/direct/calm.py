@@ -41,3 +41,15 @@ def calm_row(y: Array, x: Array, min_sat: float, zero: float = 0.0) -> int | Non
     if spread <= min(most, left, min_sat, _OF_DEVIATION * float(np.std(x))):
         return STUCK
     return INEFFICIENT if left <= min(most, (1.0 - share) * min_sat) and share >= 0.0 else None
+
+
+def is_one_value(y: Array, x: Array, min_sat: float) -> bool:
+    """Whether a channel keeps to one value beside a reference that hardly moves, by so much elsewhere that what it varies by is nothing.
+
+    `y` and `x` of shape (n,), `min_sat` as of `calm_row`.
+    """
+    if not y.size:
+        return False
+    level = float(np.median(y))
+    varies = float(np.quantile(np.abs(y - level), _USUAL))
+    return varies <= min(_OF_DEVIATION * abs(level - float(np.median(x))), min_sat)

@@ -20,6 +20,7 @@ from diagnosis.estimation.filter_kernel import segment_evidence
 from diagnosis.estimation.samples import Samples
 from diagnosis.estimation.segments import Run, absorb_short, join_noisy, merge_equal, runs_of, trim
 from diagnosis.estimation.viterbi import ModePath
+from replay.arrays.sliding import mean_within
 
 Array = NDArray[np.float64]
 
@@ -32,6 +33,9 @@ _NEAR_MEAN = 0.25  # of its mean: standard deviation of a reference that hardly 
 _ABOUT = 0.05  # of what a gain leaves: as near to it a channel may rest
 _ZERO = 3.0  # times the noise: no reading
 _ELSEWHERE = 8.0  # times the noise of a constant: a reading beside it
+_EVENED_S, _GAP_S = 0.25, 2.0  # time that a deviation is evened over; between pieces of one fault
+_DRIFTS = 2.0  # tolerances that a healthy channel drifts by
+_PIECES, _MINOR = 3, 0.5  # and their share of a run
 _PLAYS = 3.0  # by which a command must move for a valve with a loss of gain to follow
 
 
@@ -79,8 +83,36 @@ def fault_runs(path: ModePath, samples: Samples, model: ModeModel, dt: float, sh
             if kept is None:
                 continue
             run = kept
-        out.append(run)
+        out += _where_it_deviates(run, samples, model) if run.row in VARYING_ROWS else [run]
     return out
+
+
+def _where_it_deviates(run: Run, samples: Samples, model: ModeModel) -> list[Run]:
+    """A noisy run cut to where the channel is off by more than healthy ones are, where that is a minor part in a few pieces.
+
+    What a healthy channel drifts by slowly, noise explains better than no fault does, so that the path stays in that row once something
+    else has brought it there.
+    """
+    part = samples.part(run.start, run.stop)
+    known = (part.status == PAIR) & np.isfinite(part.y) & np.isfinite(part.x)
+    off = np.where(known, part.y - part.x, 0.0)
+    width = max(1, round(_EVENED_S / model.dt))
+    away = np.abs(mean_within(off, width)) > _DRIFTS * model.tolerance * mean_within(known.astype(np.float64), width)
+    away &= known
+    rest = off[known & ~away]
+    if not away.any() or not rest.size or float(np.mean(rest**2)) > model.tolerance**2:
+        return [run]
+    gap = round(_GAP_S / model.dt)
+    ends = np.flatnonzero(np.diff(np.r_[0, away.astype(np.int8), 0]))
+    pieces: list[list[int]] = []
+    for start, stop in ends.reshape(-1, 2).tolist():
+        if pieces and start - pieces[-1][1] <= gap:
+            pieces[-1][1] = stop
+        else:
+            pieces.append([start, stop])
+    if len(pieces) > _PIECES or sum(stop - start for start, stop in pieces) > _MINOR * run.size:
+        return [run]
+    return [Run(run.start + start, run.start + stop, run.row) for start, stop in pieces]
 
 
 def _moving(run: Run, samples: Samples, model: ModeModel) -> Run | None:

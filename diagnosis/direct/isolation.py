@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from diagnosis.channels.sample_status import BLIND, PAIR
 from diagnosis.channels.zero_level import APART, zero_level
 from diagnosis.direct.behind_play import gain_behind_play
-from diagnosis.direct.calm import calm_row
+from diagnosis.direct.calm import calm_row, is_one_value
 from diagnosis.direct.fault_runs import inner, motion_left
 from diagnosis.direct.identification import IdentifiedPair
 from diagnosis.direct.stated_row import not_silent, stated_row, with_lapses
@@ -243,7 +243,10 @@ def _wild(seen: RunSamples, dt: float) -> bool:
 
 
 def _calm_row_of(seen: RunSamples, min_sat: float, zero: float) -> int | None:
-    return None if seen.still else calm_row(seen.y[seen.use], seen.x[seen.use], min_sat, zero)
+    y, x = seen.y[seen.use], seen.x[seen.use]
+    if seen.still:
+        return STUCK if is_one_value(y, x, min_sat) else None
+    return calm_row(y, x, min_sat, zero)
 
 
 def _changes(seen: RunSamples) -> float:

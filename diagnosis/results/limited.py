@@ -8,8 +8,8 @@ from diagnosis.results.assessment import Assessment, Finding
 from diagnosis.results.result import Hypothesis
 from replay.faults import FaultMode, State
 
-#: What a side and row may be claimed with, whatever the models said: of 1455 surest findings on machines of sixteen kinds all but 3 were right once
-#: disturbed valves were told as such, of 2078 older ones, of all machines, all but 13 were on the right part; other users' machines may do worse.
+#: What a side and row may be claimed with, whatever the models said: of 705 surest findings on machines of eighteen kinds 98 of 100 were right (tuning), of
+#: 1193 on the simulator's own and `foreign` 99; what was wrong was nearly always another row of the same part.
 MOST_CLAIMED = 0.98
 
 

@@ -31,6 +31,8 @@ _LEAST = 0.03  # rad, of the commanded range
 _NOISES = 8.0  # of a cell's mean, by which the commanded range exceeds them
 _STAYS, _STAYS_NOISES = 0.05, 4.0  # of the commanded range; times the noise: no motion
 _AWAY, _LEVELS = 0.12, 0.15  # of the commanded range: from the angle; that the command goes through meanwhile
+_AWAY_RAD = 0.02  # from the angle at least: a loop may leave as much within its dead zone
+_TOLD = 0.02  # of full opening, from which on a valve whose command is logged is told to turn the axle
 _LEAST_S, _LONG_S = 8.0, 20.0  # of driving with the command elsewhere
 _TREMBLES = 0.5  # of the usual trembling from sample to sample
 _P, _LONG_P = 0.85, 0.95  # that the axle does not do what it is told
@@ -73,6 +75,9 @@ def stays(timeline: Timeline, machine: Machine, axle: str) -> Finding | None:
         return None
     width = max(1, round(_CELL_S / timeline.dt))
     one = _cells(timeline, machine, (phi, told), width)
+    opening = timeline.get(f"steer.{axle}.u")
+    if opening is not None:
+        one = one._replace(moves=one.moves & ~(_means(np.abs(opening), width) < _TOLD))
     noise = _usual_change(one.y)
     if not one.asked > max(_LEAST, _NOISES * noise):
         return None
@@ -158,7 +163,7 @@ def _told_elsewhere(one: _Axle, part: slice, still: float) -> float:
     """Cells of driving in which the command was elsewhere for longer than an answer takes; 0 where a stop of the steering may hold it."""
     y = one.y[part]
     level = float(np.nanmedian(y)) if np.isfinite(y).any() else np.nan
-    least = max(_AWAY * one.asked, still)
+    least = max(_AWAY * one.asked, _AWAY_RAD, still)
     below, above = one.high[part] < level - least, one.low[part] > level + least
     away = one.moves[part] & (below | above)
     if not away.any():

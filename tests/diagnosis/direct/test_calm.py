@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from diagnosis.direct.calm import calm_row
+from diagnosis.direct.calm import calm_row, is_one_value
 from diagnosis.estimation.fault_models import INEFFICIENT, STUCK
 
 T = np.arange(4000) * 0.01
@@ -29,3 +29,10 @@ def test_the_steady_row_that_leaves_hardly_anything(y: np.ndarray, row: int | No
 
 def test_a_reference_that_is_nothing_tells_nothing() -> None:
     assert calm_row(X, np.zeros_like(X), 0.02) is None
+
+
+@pytest.mark.parametrize(
+    ("y", "one"), [(0.31 + 0.002 * np.cos(40.0 * T), True), (0.27 + 0.02 * X, False), (T[:0], False)]
+)
+def test_one_value_beside_a_reference_that_rests(y: np.ndarray, one: bool) -> None:
+    assert is_one_value(y, np.full(y.size, 0.25), 0.05) is one
