@@ -36,6 +36,8 @@ Array = NDArray[np.float64]
 Estimate = tuple[Epsilon | None, Sat | None, float]
 
 _BURST_S = 0.6  # at which half of the bursts of noise are what a motion leaves out: right were 12 of 48 below 1 s, 8 of 8 up to 3 s
+#: A valve that stands for so short does what its drive's limits, its supply or another fault make it do as probably: right were 0 of 8 below 1.2 s.
+_BRIEF_S, _LEAST_BRIEF = 0.8, 0.55
 _WILD, _WILD_S, _WILD_SAMPLES = 10.0, 0.04, 4.0  # times the noise; motion that a wrong time may be off by
 _RESTLESS, _RESTLESS_P = 0.1, 0.8  # share of changing news from which a channel is not stuck, and how probably so
 _OF_PLAY = 0.3  # of its width per rms opening: standard deviation of the gain that a play leaves in simulated valves
@@ -217,6 +219,10 @@ def isolate(run: Run, found: IdentifiedPair, min_sat: float) -> Isolated | None:
         run = replace(run, row=NO_SIGNAL)
         p[NO_SIGNAL] += p[STUCK] + p[INEFFICIENT]
         p[[STUCK, INEFFICIENT]] = 0.0
+    if run.row in TOTAL_ROWS and found.pair.side is Side.ACTUATOR:
+        lasts = max(_LEAST_BRIEF, seconds**4 / (seconds**4 + _BRIEF_S**4))
+        p[HEALTHY] += p[run.row] * (1.0 - lasts)
+        p[run.row] *= lasts
     if run.row == STUCK and seen.still and restless:
         # nothing moved, but the last digit did: a stuck channel does not do that
         other = estimate_run(replace(run, row=INEFFICIENT), found)

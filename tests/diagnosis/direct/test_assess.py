@@ -369,6 +369,16 @@ def test_spell_of_20_ms_is_found(level: float, seed: int) -> None:
     assert abs(found.stop - START - 20) <= 1
 
 
+@pytest.mark.parametrize(("samples", "low", "high"), [(200, 0.5, 0.6), (2500, 0.9, 1.0)])
+def test_a_valve_that_stands_for_a_moment_is_less_surely_at_fault(samples: int, low: float, high: float) -> None:
+    opening = drive()
+    opening[START : START + samples] = 0.0
+    y, x = measured(drive(), Side.ACTUATOR, np.random.default_rng(1), opening)
+    found = single(assess_pair(pair(Side.ACTUATOR, y, x), LIMITS))
+    assert found.mode is FaultMode.NO_SIGNAL
+    assert low < found.probability < high
+
+
 @pytest.mark.parametrize("seed", [1, 2])
 def test_fault_that_grows_is_one_fault(seed: int) -> None:
     rng = np.random.default_rng(seed)
