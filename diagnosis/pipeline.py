@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from diagnosis.as_one_machine import as_one_machine, is_another
 from diagnosis.assess import ComponentResult, assess_components
 from diagnosis.channels.copied_rows import without_copied_rows
 from diagnosis.channels.doubted_openings import without_openings, without_valves
@@ -17,25 +18,11 @@ from diagnosis.channels.recording_gaps import recording_gaps, without_gaps
 from diagnosis.channels.resting_position import with_zeroed_positions
 from diagnosis.channels.shared_gain import without_shared_gain
 from diagnosis.channels.silence import with_silent_sensors
-from diagnosis.clearing.added_findings import with_findings
-from diagnosis.clearing.backwards import shown_alone, without_claims
-from diagnosis.clearing.beside import (
-    less_sure_beside_dead_sensors,
-    less_sure_beside_dead_valves,
-    less_sure_beside_wrong_angles,
-)
-from diagnosis.clearing.contradicted import without_contradicted
-from diagnosis.clearing.made_by_axles import without_made_by_axles
-from diagnosis.clearing.nothing_moves import supply_gone
-from diagnosis.clearing.one_supply import less_sure_beside_supply
-from diagnosis.clearing.standing_out import what_stands_out, without_explained, without_followers
+from diagnosis.clearing.backwards import shown_alone
 from diagnosis.decision import quality
-from diagnosis.decision.as_a_whole import as_a_whole
 from diagnosis.decision.changing_rows import with_chains_as_one
 from diagnosis.decision.earlier_residuals import with_earlier_residuals
 from diagnosis.decision.episodes import with_episodes
-from diagnosis.decision.late_axles import as_late_axles
-from diagnosis.decision.mirrored import all_mirrored, axles_in_doubt, without_mirrored
 from diagnosis.decision.passing_rows import with_disturbances_as_one
 from diagnosis.decision.second_onsets import with_second_onsets
 from diagnosis.decision.stated_once import without_restated
@@ -195,17 +182,13 @@ def _walk(
     )
     found = found if doubt is None else _without_valves(found, doubt)
     found = found if scale is None else _with_scale(found, scale)
-    if _is_another(mission, machine):
+    if is_another(mission, machine):
         found = replace(found, assessments=shown_alone(found.assessments, timeline.dt))
     if not found.events:  # a machine that does not follow its commands has a report, though no part is judged
         _require_something(found.assessments, mission, machine)
     publish(Progress(Stage.DECIDING))
-    judged = _without_contradicted(
-        _without_backwards(
-            Judged(mission, recorded, machine, replay, found, factor=1.0 if scale is None else scale.first_factor)
-        )
-    )
-    judged = _with_machine_events(_with_what_stands_out(judged))
+    factor = 1.0 if scale is None else scale.first_factor
+    judged = as_one_machine(Judged(mission, recorded, machine, replay, found, factor=factor))
     found = judged.found
     report = report_of_mission(judged, identity)
     timeline.store.end_stage()
@@ -218,11 +201,6 @@ def _walk(
         }
         windows = replace(windows, columns={**windows.columns, **near})
     return MissionResult(report, _columns(judged, report, shown), windows)
-
-
-def _is_another(mission: Mission, machine: Machine) -> bool:
-    """Whether a log is not of the machine that stands in for its own, for it names other wheels."""
-    return bool(mission.signals.other_wheels) and "geometry" in machine.assumed
 
 
 def _without_valves(found: ComponentResult, doubt: OpeningDoubt) -> ComponentResult:
@@ -246,74 +224,6 @@ def _outside_gaps(found: ComponentResult, axles: tuple[str, ...], timeline: Time
     joined = without_restated(joined, timeline.dt)
     joined = with_earlier_residuals(joined, timeline.dt)
     return replace(found, assessments=with_second_onsets(joined, timeline.dt))
-
-
-def _without_backwards(judged: Judged) -> Judged:
-    """The same without what models claim of parts whose channel counts backwards, or is another one's."""
-    found, axles, dt = judged.found, judged.machine.axles, judged.mission.timeline.dt
-    named = {component for (component, _), a in found.assessments.items() if a.findings}
-    wrong = named & {h.component for h in judged.hints if h.backwards}
-    exchanged = named & {component for h in judged.hints for component in h.exchanged}
-    every = "" if axles_in_doubt(judged.places, axles) else all_mirrored(found.assessments, axles)
-    turned = named & ({*axles} if every else axles_in_doubt(judged.places, axles))
-    if not wrong | exchanged | turned:
-        return judged
-    told = without_claims(found.assessments, wrong, exchanged, dt)
-    return Judged(
-        judged.mission,
-        judged.recorded,
-        judged.machine,
-        judged.replay,
-        replace(found, assessments=without_mirrored(told, turned, dt)),
-        factor=judged.factor,
-        mirrored=every,
-    )
-
-
-def _without_contradicted(judged: Judged) -> Judged:
-    """The same without losses of a speed that nothing but a wheel's model shows, and without faults of wheels that drag another one."""
-    told = without_contradicted(judged.found.assessments, judged.cells)
-    told = without_followers(told, judged.checks, judged.cells)
-    told = less_sure_beside_wrong_angles(told, judged.machine.wheels, judged.machine.axles)
-    told = less_sure_beside_dead_valves(told, judged.machine.wheels, judged.found.words)
-    told = less_sure_beside_dead_sensors(told, judged.machine.wheels, judged.found.words)
-    if all(told[part] is a for part, a in judged.found.assessments.items()):
-        return judged
-    return replace(judged, found=replace(judged.found, assessments=told))
-
-
-def _with_what_stands_out(judged: Judged) -> Judged:
-    """The same with parts named that the checks of the all-clear leave no doubt about, unless the whole machine explains them."""
-    found = judged.found
-    if judged.hints or judged.places or _is_another(judged.mission, judged.machine):
-        return judged
-    more = as_late_axles(what_stands_out(judged.checks, judged.cells, found.words), judged.cells, found.words)
-    if not (more := without_explained(more, found.events, judged.machine.axles)):
-        return judged
-    machine, dt = judged.machine, judged.mission.timeline.dt
-    seen = with_findings(found.assessments, more, dt)
-    seen = less_sure_beside_wrong_angles(seen, machine.wheels, machine.axles)
-    seen = less_sure_beside_dead_sensors(seen, machine.wheels, found.words)
-    events = without_made_by_axles(found.events, seen, machine.axles, dt)
-    told = replace(found, assessments=seen, events=events)
-    open_ = tuple(c for c in judged.checks if c.component in more and not c.passed)
-    return replace(judged, found=told, named_by=open_)
-
-
-def _with_machine_events(judged: Judged) -> Judged:
-    """The same with what stopped the whole machine, whose drives were open, or what it does as a whole that no part explains."""
-    stopped = supply_gone(judged.cells)
-    events = [] if stopped is None else [stopped]
-    if not judged.found.events and not judged.hints and not judged.places:
-        events += as_a_whole(judged.cells)
-    if not events:
-        return judged
-    found = judged.found
-    all_events = (*found.events, *(e.worded(found.words) for e in events))
-    told = less_sure_beside_supply(
-        found.assessments, all_events, judged.machine.axles, found.words, judged.mission.timeline.dt
-    )
-    return replace(judged, found=replace(found, assessments=told, events=all_events))
 
 
 def _require_something(assessments: Mapping[tuple[str, str], Assessment], mission: Mission, machine: Machine) -> None:

@@ -31,7 +31,8 @@ _ALONE, _CHANGED_ALONE = 3.0, 2.2
 _LASTING_ALONE = 5.0
 #: Of the loss that counts, in windows, of a change and over the mission, for two driven wheels that are measured twice on both sides, of which
 #: neither tells how far healthy ones deviate: of ten healthy missions of such a truck none changed by more than 0.02 or was off by 0.04, while
-#: motors that had lost 0.4 and 0.5 showed 0.16 to 0.28; in windows healthy ones of another truck were off by 0.12 at most (22 missions), motors that had lost 0.37 by 0.24 to 0.50.
+#: motors that had lost 0.4 and 0.5 showed 0.16 to 0.28; in windows healthy ones of another truck were off by 0.12 at most (22 missions), motors
+#: that had lost 0.37 by 0.24 to 0.50.
 PAIR, _OF_PAIR, _CHANGES_OF_PAIR, _LASTS_OF_PAIR = 2, 0.63, 0.51, 0.7
 _STRICT = 0.3  # loss that counts, from which on a machine file asks for no more than that
 #: Limits of speed per opening below and above the other wheels', in windows and over the mission, as multiples of the loss

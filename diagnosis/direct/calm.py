@@ -46,7 +46,7 @@ def calm_row(y: Array, x: Array, min_sat: float, zero: float = 0.0) -> int | Non
 def is_one_value(y: Array, x: Array, min_sat: float) -> bool:
     """Whether a channel keeps to one value beside a reference that hardly moves, by so much elsewhere that what it varies by is nothing.
 
-    `y` and `x` of shape (n,), `min_sat` as of `calm_row`.
+    `y` and `x` of shape (n,) [unit of y], `min_sat` as of `calm_row`.
     """
     if not y.size:
         return False
