@@ -252,7 +252,7 @@ def main() -> None:
         "--machine",
         nargs="+",
         default=None,
-        help=", ".join(("default, structures, foreign", *OTHERS)),
+        choices=sorted({DEFAULT, FOREIGN, *STRUCTURES, *OTHERS}),
     )
     parser.add_argument("--duration", type=float, default=75.0, help="length of a mission [s]")
     parser.add_argument("--every", type=int, default=1, help="one of so many kinds of trouble")
