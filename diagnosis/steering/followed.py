@@ -41,6 +41,7 @@ _NEVER = 0.7  # of that, where it never followed
 _SENSOR = 0.05  # that readings which tremble are a sensor's that hangs
 _FOLLOWS = 0.3  # of the commanded range
 _NOTHING = 1e-6  # rad, that a sensor without signal reads
+_END = 0.9  # of the largest angle that is asked for: an axle beyond may be at the end of its way
 WHY = Reason(
     "its command and its angle alone show whether it stays where it is, and neither a scaled angle nor a weak {valve} behind a loop",
     Lack.COMMAND,
@@ -226,5 +227,6 @@ def _row(level: float, told: tuple[float, float], lives: bool) -> FaultMode:
     A sensor without signal reads nothing; one that hangs reads where it was.
     """
     if lives:
-        return FaultMode.NO_SIGNAL if told[0] < level < told[1] else FaultMode.STUCK
+        at_end = abs(level) > _END * max(map(abs, told))
+        return FaultMode.STUCK if at_end else FaultMode.NO_SIGNAL
     return FaultMode.NO_SIGNAL if abs(level) < _NOTHING else FaultMode.STUCK

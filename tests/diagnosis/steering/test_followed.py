@@ -70,6 +70,8 @@ def test_readings_of_nothing_are_no_signal_and_an_axle_at_its_end_is_stuck_there
     silent, at_end = found(np.zeros(N), command), found(0.4 + noise, command)
     assert (silent.side, silent.mode) == (Side.SENSOR_OR_ACTUATOR, FaultMode.NO_SIGNAL)
     assert (at_end.side, at_end.mode) == (Side.ACTUATOR, FaultMode.STUCK)
+    straight = found(noise, np.abs(command))
+    assert (straight.side, straight.mode) == (Side.ACTUATOR, FaultMode.NO_SIGNAL)
 
 
 def test_what_moves_again_or_never_moved_is_less_sure() -> None:
