@@ -171,6 +171,13 @@ def test_deviations_that_nothing_explains_give_no_all_clear() -> None:
     assert "FR speed sensor or drive valve" in got.text
 
 
+@pytest.mark.parametrize(("seconds", "status"), [(6.0, "ready"), (12.0, "not_assessed")])
+def test_a_steering_valve_that_is_off_for_long_without_a_fault_gives_no_all_clear(seconds: float, status: str) -> None:
+    parts = machine()
+    parts["front", "actuator"] = replace(parts["FR", "actuator"], unexplained_s=seconds)
+    assert decide((), parts, dict.fromkeys(parts, 20.0), AXLES, Limits(), (), HYDRAULIC).status == status
+
+
 def test_a_fifth_of_the_driving_undecided_gives_no_all_clear() -> None:
     parts = machine()
     driven = dict.fromkeys(parts, 30.0)
