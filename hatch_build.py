@@ -1,7 +1,7 @@
 """Installing or building compiles the numerical kernels, so that the first diagnosis need not.
 
 The checkout installed in place (`pip install -e .`) diagnoses the sample log, and numba keeps what it compiled beside the
-sources, for this machine's processor. A wheel brings the kernels compiled for a common kind of processor, in
+sources, for this machine's processor, where a run finds it whatever `NUMBA_CACHE_DIR` says then. A wheel brings the kernels compiled for a common kind of processor, in
 `replay/compiled`; Python and numba must be those that made them. Nothing here can fail a build: what is not compiled now
 is compiled by the first diagnosis. `MFHCA_KERNELS=0` in the environment compiles nothing.
 """
@@ -106,6 +106,8 @@ class KernelHook(BuildHookInterface[Any]):
         """Run Python at the top of the sources, which it finds there also where pipx asks for a safe path."""
         variables = dict(os.environ if environment is None else environment)
         variables.pop("PYTHONSAFEPATH", None)
+        if environment is None:
+            variables.pop("NUMBA_CACHE_DIR", None)  # beside the sources, where each run looks
         return subprocess.run(
             [sys.executable, *words],
             cwd=self.root,
