@@ -79,12 +79,11 @@ class KernelHook(BuildHookInterface[Any]):
             return
         self.app.display_info("compiling the numerical kernels, about half a minute")
         with TemporaryDirectory() as folder:
-            own = Path(folder, "own.csv")
             lines = [[_diagnosis(log, Path(folder, "sample"), "-m", str(machine))]]
             if (
                 os.cpu_count() or 1
-            ) > 1:  # what a log without second measurements needs beyond that, by another processor
-                lines.append([_simulation(own, "base"), _diagnosis(own, Path(folder, "own"))])
+            ) > 1:  # what logs with fewer second measurements need beyond that, by another processor
+                lines.append([*_made(Path(folder, "own.csv"), "base"), *_made(Path(folder, "spool.csv"), "spool")])
             with ThreadPoolExecutor(len(lines)) as pool:
                 if not all(list(pool.map(self._run, lines))):
                     self.app.display_info("not compiled now; the first diagnosis does it")
@@ -130,3 +129,8 @@ def _simulation(log: Path, evidence: str) -> list[str]:
 
 def _diagnosis(log: Path, folder: Path, *words: str) -> list[str]:
     return ["diagnose", str(log), "-o", str(folder), "--fail-on", "never", *words]
+
+
+def _made(log: Path, evidence: str) -> list[list[str]]:
+    """A mission is simulated and diagnosed beside it."""
+    return [_simulation(log, evidence), _diagnosis(log, log.with_suffix(""))]

@@ -41,7 +41,7 @@ def _finish(module: ModuleType, root: Path, version: str) -> list[str]:
     return told.lines
 
 
-@pytest.mark.parametrize(("processors", "names"), [(2, ["diagnose", "simulate", "diagnose"]), (1, ["diagnose"])])
+@pytest.mark.parametrize(("processors", "names"), [(2, ["diagnose", *["simulate", "diagnose"] * 2]), (1, ["diagnose"])])
 def test_an_editable_installation_runs_the_first_diagnosis(
     hook_module: ModuleType, monkeypatch: pytest.MonkeyPatch, processors: int, names: list[str]
 ) -> None:
@@ -74,7 +74,7 @@ def test_what_an_installation_runs_ends_well(
     monkeypatch.setattr(hook_module, "TemporaryDirectory", lambda: nullcontext(str(tmp_path)))
     _finish(hook_module, ROOT, "editable")
     monkeypatch.undo()
-    assert folders == [None] * 3  # beside the sources, where every run looks
+    assert folders == [None] * 5  # beside the sources, where every run looks
     own = [command for command in runs if str(tmp_path / "own.csv") in command]
     assert len(own) == 2
     assert [run(command[3:]) for command in own] == [0, 0]
