@@ -205,7 +205,7 @@ def test_a_part_hands_on_to_no_kernel_that_it_is_put_into_its_callers() -> None:
     assert [k.overloads[k.signatures[0]].fndesc.inline for k in (called, part)] == [False, True]
 
 
-_SLOW = re.compile(r"\.(max|min)\(\)|np\.(argsort|sort|median|unique)\(")
+_SLOW = re.compile(r"\.(max|min)\(\)| @ |np\.(argsort|sort|median|unique|dot)\(")
 
 
 def test_no_kernel_uses_what_takes_seconds_to_compile() -> None:
