@@ -1,7 +1,7 @@
 """Installing or building compiles the numerical kernels, so that the first diagnosis need not.
 
 The checkout installed in place (`pip install -e .`) diagnoses the sample log, and numba keeps what it compiled beside the
-sources, for this machine's processor. A wheel brings the kernels compiled for a common kind of processor, in
+sources, for this machine's processor, where a run finds it whatever `NUMBA_CACHE_DIR` says then. A wheel brings the kernels compiled for a common kind of processor, in
 `replay/compiled`; Python and numba must be those that made them. Nothing here can fail a build: what is not compiled now
 is compiled by the first diagnosis. `MFHCA_KERNELS=0` in the environment compiles nothing.
 """
@@ -79,12 +79,11 @@ class KernelHook(BuildHookInterface[Any]):
             return
         self.app.display_info("compiling the numerical kernels, about half a minute")
         with TemporaryDirectory() as folder:
-            own = Path(folder, "own.csv")
             lines = [[_diagnosis(log, Path(folder, "sample"), "-m", str(machine))]]
             if (
                 os.cpu_count() or 1
-            ) > 1:  # what a log without second measurements needs beyond that, by another processor
-                lines.append([_simulation(own, "base"), _diagnosis(own, Path(folder, "own"))])
+            ) > 1:  # what logs with fewer second measurements need beyond that, by another processor
+                lines.append([*_made(Path(folder, "own.csv"), "base"), *_made(Path(folder, "spool.csv"), "spool")])
             with ThreadPoolExecutor(len(lines)) as pool:
                 if not all(list(pool.map(self._run, lines))):
                     self.app.display_info("not compiled now; the first diagnosis does it")
@@ -106,6 +105,8 @@ class KernelHook(BuildHookInterface[Any]):
         """Run Python at the top of the sources, which it finds there also where pipx asks for a safe path."""
         variables = dict(os.environ if environment is None else environment)
         variables.pop("PYTHONSAFEPATH", None)
+        if environment is None:
+            variables.pop("NUMBA_CACHE_DIR", None)  # beside the sources, where each run looks
         return subprocess.run(
             [sys.executable, *words],
             cwd=self.root,
@@ -128,3 +129,8 @@ def _simulation(log: Path, evidence: str) -> list[str]:
 
 def _diagnosis(log: Path, folder: Path, *words: str) -> list[str]:
     return ["diagnose", str(log), "-o", str(folder), "--fail-on", "never", *words]
+
+
+def _made(log: Path, evidence: str) -> list[list[str]]:
+    """A mission is simulated and diagnosed beside it."""
+    return [_simulation(log, evidence), _diagnosis(log, log.with_suffix(""))]

@@ -41,7 +41,7 @@ def _finish(module: ModuleType, root: Path, version: str) -> list[str]:
     return told.lines
 
 
-@pytest.mark.parametrize(("processors", "names"), [(2, ["diagnose", "simulate", "diagnose"]), (1, ["diagnose"])])
+@pytest.mark.parametrize(("processors", "names"), [(2, ["diagnose", *["simulate", "diagnose"] * 2]), (1, ["diagnose"])])
 def test_an_editable_installation_runs_the_first_diagnosis(
     hook_module: ModuleType, monkeypatch: pytest.MonkeyPatch, processors: int, names: list[str]
 ) -> None:
@@ -62,11 +62,19 @@ def test_what_an_installation_runs_ends_well(
     hook_module: ModuleType, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     runs: list[list[str]] = []
-    monkeypatch.setattr(subprocess, "run", lambda command, **_: runs.append(command))
+    folders: list[str | None] = []
+
+    def noted(command: list[str], **options: Any) -> None:
+        runs.append(command)
+        folders.append(options["env"].get("NUMBA_CACHE_DIR"))
+
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "cache"))
+    monkeypatch.setattr(subprocess, "run", noted)
     monkeypatch.setattr(hook_module.os, "cpu_count", lambda: 2)
     monkeypatch.setattr(hook_module, "TemporaryDirectory", lambda: nullcontext(str(tmp_path)))
     _finish(hook_module, ROOT, "editable")
     monkeypatch.undo()
+    assert folders == [None] * 5  # beside the sources, where every run looks
     own = [command for command in runs if str(tmp_path / "own.csv") in command]
     assert len(own) == 2
     assert [run(command[3:]) for command in own] == [0, 0]

@@ -54,20 +54,29 @@ class TrackOutput(NamedTuple):
     jumped: NDArray[np.bool_]  # (n,)
 
 
+@njit(cache=True, error_model="numpy", no_cpython_wrapper=True)
+def _predict(x: Array, P: Array, off: float, moved: float, keep: float) -> None:
+    """State and covariance one cell later, in place: x₀ += off·x₁ + moved·x₃, x₁ ·= keep. Products of matrices take seconds to compile."""
+    x[0] += off * x[1] + moved * x[3]
+    x[1] *= keep
+    for j in range(STATES):
+        P[0, j] += off * P[1, j] + moved * P[3, j]
+        P[1, j] *= keep
+    for i in range(STATES):
+        P[i, 0] += off * P[i, 1] + moved * P[i, 3]
+        P[i, 1] *= keep
+
+
 @njit(cache=True, error_model="numpy")
 def filter_track(seen: TrackInput, k: TrackModel, out: TrackOutput) -> float:
     """Run the filter over cells, filling `out`; the log-likelihood of the samples."""
-    x, P = np.zeros(STATES), np.zeros((STATES, STATES))
+    x, P, gain = np.zeros(STATES), np.zeros((STATES, STATES)), np.zeros(STATES)
     P[0, 0], P[1, 1], P[2, 2], P[3, 3] = 1e4, 1.0, k.mount**2, k.scale**2
     keep = np.exp(-seen.dt / k.memory)
-    F = np.zeros((STATES, STATES))
-    F[0, 0], F[1, 1], F[2, 2], F[3, 3] = 1.0, keep, 1.0, 1.0
     likelihood, first = 0.0, True
     for n in range(seen.z.size):
         if n > 0:
-            F[0, 1], F[0, 3] = seen.off[n] * seen.dt, seen.moved[n]
-            x = F @ x
-            P = F @ P @ F.T
+            _predict(x, P, seen.off[n] * seen.dt, seen.moved[n], keep)
             P[0, 0] += k.wander**2 * seen.dt
             P[1, 1] += 1.0 - keep * keep
         known = seen.z[n] == seen.z[n]
@@ -75,8 +84,11 @@ def filter_track(seen: TrackInput, k: TrackModel, out: TrackOutput) -> float:
         out.jumped[n], out.misfit[n] = False, np.nan
         innovation, s = 0.0, 1.0
         if known:
-            innovation = seen.z[n] - h @ x
-            s = h @ P @ h + seen.noise[n] ** 2
+            innovation, s = seen.z[n], seen.noise[n] ** 2
+            for i in range(STATES):
+                innovation -= h[i] * x[i]
+                for j in range(STATES):
+                    s += h[i] * P[i, j] * h[j]
             if innovation * innovation > _JUMP**2 * s and h[0] != 0.0 and not first:
                 out.jumped[n] = True
                 P[0, 0] += innovation * innovation
@@ -85,9 +97,12 @@ def filter_track(seen: TrackInput, k: TrackModel, out: TrackOutput) -> float:
         put_rows(out.before_cov[n], P)
         if known:
             share = innovation * innovation / s
-            gain = (P @ h) / s
-            x = x + gain * innovation
             for i in range(STATES):
+                gain[i] = 0.0
+                for j in range(STATES):
+                    gain[i] += P[i, j] * h[j] / s
+            for i in range(STATES):
+                x[i] += gain[i] * innovation
                 for j in range(STATES):
                     P[i, j] -= gain[i] * gain[j] * s
             if not first:
@@ -113,7 +128,18 @@ def smooth_track(seen: TrackInput, k: TrackModel, out: TrackOutput) -> tuple[Arr
 @njit(cache=True, error_model="numpy")
 def _smooth(gains: Array, out: TrackOutput, mean: Array, cov: Array) -> None:
     """Go back over the cells with their gains, (n − 1, 4, 4), from the last filtered one."""
+    part = np.zeros((STATES, STATES))  # gain · (covariance of the next cell, less what was predicted)
     for n in range(gains.shape[0] - 1, -1, -1):
         gain = gains[n]
-        put(mean[n], out.mean[n] + gain @ (mean[n + 1] - out.before[n + 1]))
-        put_rows(cov[n], out.cov[n] + gain @ (cov[n + 1] - out.before_cov[n + 1]) @ gain.T)
+        for i in range(STATES):
+            mean[n, i] = out.mean[n, i]
+            for j in range(STATES):
+                mean[n, i] += gain[i, j] * (mean[n + 1, j] - out.before[n + 1, j])
+                part[i, j] = 0.0
+                for k in range(STATES):
+                    part[i, j] += gain[i, k] * (cov[n + 1, k, j] - out.before_cov[n + 1, k, j])
+        for i in range(STATES):
+            for j in range(STATES):
+                cov[n, i, j] = out.cov[n, i, j]
+                for k in range(STATES):
+                    cov[n, i, j] += part[i, k] * gain[j, k]

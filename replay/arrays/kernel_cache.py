@@ -1,14 +1,15 @@
 """Compiled kernels on disk: those that the sources beside them no longer stand for are removed.
 
-numba keeps what it compiled beside the source and looks at that one file's time only. A kernel calls others and takes
-named tuples of other modules of its folder; after an update, what was compiled from the former ones would be run, or
-could not be loaded at all.
+numba keeps what it compiled beside the source and looks at that one file only. A kernel calls others, and takes
+named tuples and constants, of other modules of its folder and of those that it imports from; after an update, what was compiled
+from the former ones would be run, or could not be loaded at all.
 """
 
 from __future__ import annotations
 
 import json
 import os
+import re
 from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from functools import cache
@@ -16,10 +17,11 @@ from hashlib import sha256
 from pathlib import Path
 
 _KERNELS = (".nbi", ".nbc")
+_IMPORTED = re.compile(r"^\s*(?:from|import)\s+([\w.]+)", re.MULTILINE)
 
 
 def drop_stale_kernels(packages: Iterable[Path], stamp: Path) -> list[str]:
-    """Remove compiled kernels of folders whose modules have changed since they were compiled.
+    """Remove compiled kernels of folders whose modules, or those that their kernels take something of, have changed since they were compiled.
 
     Parameters
     ----------
@@ -37,14 +39,16 @@ def drop_stale_kernels(packages: Iterable[Path], stamp: Path) -> list[str]:
         known = json.loads(stamp.read_bytes())
     except (OSError, ValueError):
         known = {}
+    packages = list(packages)
     now = {folder: _digest(folder) for package in packages for folder in _folders(str(package))}
     if known == now:
         return []
-    changed = [folder for folder, digest in now.items() if known.get(folder) != digest]
+    changed = {folder for folder, digest in now.items() if known.get(folder) != digest}
+    changed = _and_users(changed, set(now), {Path(package).parent for package in packages})
     with suppress(OSError):
         stamp.parent.mkdir(exist_ok=True)  # Python may be told to write no bytecode
         stamp.write_text(json.dumps(now), "utf-8")  # first: where nothing is remembered, nothing is removed each time
-        return [folder for folder in changed if _removed(folder)]
+        return [folder for folder in now if folder in changed and _removed(folder)]
     return []
 
 
@@ -60,6 +64,28 @@ def _folders(top: str) -> Iterator[str]:
     for entry in os.scandir(top):
         if entry.is_dir() and entry.name != "__pycache__":
             yield from _folders(entry.path)
+
+
+def _and_users(changed: set[str], folders: set[str], tops: set[Path]) -> set[str]:
+    """Changed folders, and those whose kernels import from them or from such a folder."""
+    if not changed or changed == folders:
+        return changed  # nothing, or all of a new installation
+    uses = {folder: _imported(folder, folders, tops) for folder in folders}
+    found = set(changed)
+    while more := {folder for folder, used in uses.items() if folder not in found and used & found}:
+        found |= more
+    return found
+
+
+def _imported(folder: str, folders: set[str], tops: set[Path]) -> set[str]:
+    """Folders that the modules with kernels of a folder import from."""
+    found = set()
+    for path in Path(folder).glob("*.py"):
+        text = path.read_text("utf-8", "replace")
+        for name in _IMPORTED.findall(text) if "njit" in text else []:
+            places = [top.joinpath(*name.split(".")) for top in tops]
+            found |= {str(place if str(place) in folders else place.parent) for place in places}
+    return found & folders
 
 
 def _digest(folder: str) -> str:

@@ -1,14 +1,17 @@
-"""Caches of kernels: a wheel brings them compiled, for any processor of its kind.
+"""Caches of kernels: an installation brings them compiled.
 
-numba keeps what it compiled for one processor, beside the sources or in the user's folder of caches, and finds nothing
-there after an installation: a first diagnosis takes nine times the processor time of the next, nearly all of it
-compiling. A wheel that was built with numba at hand has the kernels of a diagnosis in `replay/compiled`, made for a
+numba keeps what it compiled for one processor, beside the sources, in the user's folder of caches or where `NUMBA_CACHE_DIR`
+says, and looks into one of them alone: a first diagnosis with an empty one takes nine times the processor time of the
+next, nearly all of it compiling. What an installation in place compiled for this processor stands beside the sources, and is
+used from there. A wheel that was built with numba at hand has the kernels of a diagnosis in `replay/compiled`, made for a
 common kind of processor (`shipped_kernels`). They are used where this machine's processor can run them, Python and
-numba are those that made them, and the sources are the same; else they are not there, and numba compiles as always.
+numba are those that made them, and the sources are the same; else they are not there, and numba compiles as always, as it
+does with `MFHCA_KERNELS=0` in the environment.
 """
 
 from __future__ import annotations
 
+import os
 import platform
 from functools import cache
 from pathlib import Path
@@ -24,10 +27,12 @@ from numba.core.caching import (
 )
 from numba.core.runtime import rtsys
 
+from replay.arrays.kernel_cache import drop_own_stale_kernels
 from replay.arrays.lazy_linking import link_lazily
 from replay.progress import compiling_begins
 
-SHIPPED = Path(__file__).parents[1] / "compiled"
+INSTALLED = Path(__file__).parents[2]
+SHIPPED = INSTALLED / "replay" / "compiled"
 
 
 class Kind(NamedTuple):
@@ -47,7 +52,14 @@ KINDS = {
     "aarch64": Kind("generic", frozenset()),
 }
 
+PACKAGES = ("replay", "diagnosis")  # have kernels
+
 _OTHERWISE = ("BOUNDSCHECK", "DEBUG", "DEBUGINFO_DEFAULT", "CPU_NAME", "CPU_FEATURES", "DISABLE_JIT")  # asked of numba
+
+
+def told_otherwise() -> bool:
+    """Whether numba is to compile by other rules than an installation's kernels were compiled by, or to compile in any case."""
+    return os.environ.get("MFHCA_KERNELS") == "0" or any(getattr(config, option, None) for option in _OTHERWISE)
 
 
 @cache
@@ -56,13 +68,13 @@ def kind_of_this_machine() -> Kind | None:
     from llvmlite import binding  # type: ignore[import-untyped]
 
     kind = KINDS.get(platform.machine())
-    if kind is None or any(getattr(config, option, None) for option in _OTHERWISE):
+    if kind is None or told_otherwise():
         return None
     return kind if all(binding.get_host_cpu_features().get(need) for need in kind.needs) else None
 
 
 class ShippedCache(FunctionCache):  # type: ignore[misc]
-    """numba's cache of one kernel, which looks into the wheel's kernels too where there is nothing for this processor."""
+    """numba's cache of one kernel, which looks beside the sources and into the wheel's kernels too where it has nothing."""
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """The kernel, or None, without the tables of all that numba can compile.
@@ -79,11 +91,20 @@ class ShippedCache(FunctionCache):  # type: ignore[misc]
     def _load_overload(self, sig: Any, target_context: Any) -> Any:
         link_lazily(target_context.codegen())
         found = super()._load_overload(sig, target_context)
-        if found is None and self._enabled:
-            found = self._shipped(sig, target_context)
+        if found is None and self._enabled and not told_otherwise():
+            found = self._installed(sig, target_context) or self._shipped(sig, target_context)
         if found is None:
             compiling_begins()
         return found
+
+    def _installed(self, sig: Any, target_context: Any) -> Any:
+        """The kernel that was compiled beside the sources for this processor, or None; others than this project's are not looked for."""
+        package, *inner = self._py_func.__module__.split(".")[:-1] or [""]
+        folder = INSTALLED.joinpath(package, *inner, "__pycache__")
+        if package not in PACKAGES or folder == Path(self.cache_path) or not folder.is_dir():
+            return None  # numba has looked there itself
+        drop_own_stale_kernels()
+        return self._out_of(folder, self._index_key(sig, target_context.codegen()), target_context)
 
     def _shipped(self, sig: Any, target_context: Any) -> Any:
         """The kernel out of the wheel, or None."""
@@ -91,9 +112,13 @@ class ShippedCache(FunctionCache):  # type: ignore[misc]
         kind = kind_of_this_machine() if folder.is_dir() else None
         if kind is None:
             return None
-        file = IndexDataCacheFile(str(folder), self._impl.filename_base, self._impl.locator.get_source_stamp())
         name, (triple, *_), code = self._index_key(sig, target_context.codegen())
-        data = file.load((name, (triple, kind.name, ""), code))
+        return self._out_of(folder, (name, (triple, kind.name, ""), code), target_context)
+
+    def _out_of(self, folder: Path, key: Any, target_context: Any) -> Any:
+        """The kernel of a key in a folder of compiled ones, or None."""
+        file = IndexDataCacheFile(str(folder), self._impl.filename_base, self._impl.locator.get_source_stamp())
+        data = file.load(key)
         return None if data is None else self._impl.rebuild(target_context, data)
 
 

@@ -11,9 +11,7 @@ import shutil
 import sys
 from pathlib import Path
 
-from replay.arrays.shipped_cache import KINDS, shipped_folder
-
-_PACKAGES = ("replay", "diagnosis")
+from replay.arrays.shipped_cache import KINDS, PACKAGES, shipped_folder
 
 
 def environment(cache: Path) -> dict[str, str]:
@@ -49,7 +47,7 @@ def collect(cache: Path, root: Path, folder: Path) -> int:
     from numba.core.caching import UserProvidedCacheLocator
 
     count = 0
-    for package in _PACKAGES:
+    for package in PACKAGES:
         for init in sorted((root / package).rglob("__init__.py")):
             found = cache / UserProvidedCacheLocator.get_suitable_cache_subpath(str(init))
             module = ".".join(init.relative_to(root).with_suffix("").parts)

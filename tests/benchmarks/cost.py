@@ -1,8 +1,8 @@
 """Time, memory and size of `mfhca diagnose`; run as `python tests/benchmarks/cost.py [--runs N] [--duration S] LOG…`.
 
 Without a log a mission of 240 s at 1 kHz is simulated, with `--evidence` base, spool or direct. The cold run has empty caches of compiled
-code; the warm ones find them filled. One unit is the CPU time of a Python loop of ten million additions, taken beside each warm run
-(`hot_paths.py`); with `taskset -c 0` before the command all of it is of one core. Stages are the times between the lines that ``--verbose`` prints.
+code and compiles; the first one has them empty too, and uses what the installation compiled, if it did; the warm ones find them filled. One
+unit is the CPU time of a Python loop of ten million additions, taken beside each warm run (`hot_paths.py`); with `taskset -c 0` before the command all of it is of one core. Stages are the times between the lines that ``--verbose`` prints.
 """
 
 from __future__ import annotations
@@ -32,9 +32,10 @@ class Cost:
     stages: dict[str, float]
 
 
-def measure(arguments: list[str], caches: Path) -> Cost:
+def measure(arguments: list[str], caches: Path, **variables: str) -> Cost:
     """Run the command once in a process of its own."""
     environment = os.environ | {"NUMBA_CACHE_DIR": str(caches / "numba"), "PYTHONPYCACHEPREFIX": str(caches / "pyc")}
+    environment |= variables
     environment.pop("PYTHONDONTWRITEBYTECODE", None)  # else no run would be warm
     begin = time.perf_counter()
     process = subprocess.Popen(
@@ -72,13 +73,15 @@ def report(log: Path, runs: int, folder: Path) -> None:
     """Print the cost of one log."""
     output, caches = folder / "report", folder / "caches"
     arguments = ["-v", "diagnose", str(log.resolve()), "-o", str(output)]
-    cold = measure(arguments, caches)
+    cold = measure(arguments, caches, MFHCA_KERNELS="0")
+    first = measure(arguments, folder / "empty", PYTHONPYCACHEPREFIX=str(caches / "pyc"))
     warm, loops = [], []
     for _ in range(runs):
         loops.append(unit())
         warm.append(measure(arguments, caches))
     print(f"{log.name}: {log.stat().st_size / 1e6:.1f} MB")
-    print(f"  cold  {cold.wall:6.2f} s wall, {cold.cpu:6.2f} s CPU, {cold.peak_mb:6.0f} MB")
+    for name, one in (("cold", cold), ("first", first)):
+        print(f"  {name:5} {one.wall:6.2f} s wall, {one.cpu:6.2f} s CPU, {one.peak_mb:6.0f} MB")
     wall, cpu, peak = (statistics.median(getattr(c, k) for c in warm) for k in ("wall", "cpu", "peak_mb"))
     print(f"  warm  {wall:6.2f} s wall, {cpu:6.2f} s CPU, {peak:6.0f} MB  (medians of {runs})")
     print(f"  warm  {statistics.median(c.cpu / u for c, u in zip(warm, loops, strict=True)):6.2f} units of CPU")

@@ -26,6 +26,7 @@ import numpy as np
 from replay.arrays import shipped_cache
 from replay.progress import tell_of_compiling
 shipped_cache.SHIPPED = Path(sys.argv[1])
+shipped_cache.INSTALLED = Path(sys.argv[1]).parent
 if "read only" in sys.argv:
     from numba.core import caching
     def fails(self):
@@ -68,6 +69,31 @@ def shipped(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_a_fresh_installation_compiles_nothing_that_the_wheel_brings(shipped: Path, tmp_path: Path) -> None:
     assert read(shipped, NUMBA_CACHE_DIR=str(tmp_path)) == [0x0302, 1, 0, 0]
     assert not [f for f in tmp_path.rglob("*") if f.is_file()]
+
+
+@pytest.fixture(scope="module")
+def installed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder `none` of no wheel, beside which this processor's kernel stands as an installation in place leaves it."""
+    folder = tmp_path_factory.mktemp("installed")
+    assert read(folder / "none", NUMBA_CACHE_DIR=str(folder / "cache")) == [0x0302, 0, 1, 1]
+    beside = folder / "replay" / "readers" / "mcap" / "__pycache__"
+    beside.mkdir(parents=True)
+    for file in [f for f in (folder / "cache").rglob("*") if f.is_file()]:
+        file.rename(beside / file.name)
+    return folder / "none"
+
+
+def test_with_an_empty_folder_of_caches_what_the_installation_compiled_is_used(installed: Path, tmp_path: Path) -> None:
+    assert read(installed, NUMBA_CACHE_DIR=str(tmp_path)) == [0x0302, 1, 0, 0]
+    assert not [f for f in tmp_path.rglob("*") if f.is_file()]
+
+
+@pytest.mark.parametrize("variable", ["NUMBA_BOUNDSCHECK", "MFHCA_KERNELS"])
+def test_a_compiler_that_is_told_otherwise_takes_nothing_from_the_installation(
+    installed: Path, tmp_path: Path, variable: str
+) -> None:
+    value = {"NUMBA_BOUNDSCHECK": "1", "MFHCA_KERNELS": "0"}[variable]
+    assert read(installed, NUMBA_CACHE_DIR=str(tmp_path), **{variable: value}) == [0x0302, 0, 1, 1]
 
 
 def test_without_kernels_of_the_wheel_they_are_compiled_and_kept(tmp_path: Path) -> None:
@@ -179,7 +205,7 @@ def test_a_part_hands_on_to_no_kernel_that_it_is_put_into_its_callers() -> None:
     assert [k.overloads[k.signatures[0]].fndesc.inline for k in (called, part)] == [False, True]
 
 
-_SLOW = re.compile(r"\.(max|min)\(\)|np\.(argsort|sort|median|unique)\(")
+_SLOW = re.compile(r"\.(max|min)\(\)| @ |np\.(argsort|sort|median|unique|dot)\(")
 
 
 def test_no_kernel_uses_what_takes_seconds_to_compile() -> None:

@@ -35,6 +35,19 @@ def test_kernels_of_changed_sources_alone_are_removed(package: Path, tmp_path: P
     assert drop_stale_kernels([package], stamp) == []
 
 
+def test_kernels_that_take_something_of_changed_sources_are_removed(package: Path, tmp_path: Path) -> None:
+    beside, far = tmp_path / "a" / "c", tmp_path / "a" / "d"
+    for folder, text in ((beside, "from a.b.models import y\n@njit\n"), (far, "from a.c import kernel\nnjit\n")):
+        (folder / "__pycache__").mkdir(parents=True)
+        (folder / "kernel.py").write_text(text)
+    stamp = tmp_path / "stamp.json"
+    drop_stale_kernels([package], stamp)
+    outer, user, users_user = compiled(package), compiled(beside), compiled(far)
+    (package / "b" / "models.py").write_text("y = 2\n")
+    assert drop_stale_kernels([package], stamp) == [str(beside), str(far)]
+    assert (outer.exists(), user.exists(), users_user.exists()) == (True, False, False)
+
+
 def test_kernels_of_unknown_age_are_removed(package: Path, tmp_path: Path) -> None:
     old = compiled(package)
     stamp = tmp_path / "stamp.json"

@@ -30,3 +30,14 @@ print(part_of("scipy.optimize", "_no_such_module").nnls.__name__)
 """
     done = subprocess.run([sys.executable, "-c", asked], capture_output=True, text=True, check=True)
     assert done.stdout.split() == ["nnls"]
+
+
+def test_a_diagnosis_is_loaded_without_the_large_packages() -> None:
+    packages = "('signal', 'stats', 'optimize', 'ndimage', 'interpolate', 'sparse')"
+    asked = f"""
+import sys
+import diagnosis.output, diagnosis.pipeline
+print([name for name in {packages} if "scipy." + name in sys.modules])
+"""
+    done = subprocess.run([sys.executable, "-c", asked], capture_output=True, text=True, check=True)
+    assert done.stdout == "[]\n"
