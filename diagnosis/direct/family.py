@@ -108,8 +108,8 @@ def _identified(pairs: dict[Part, Pair], limits: Limits, mission: MissionView) -
             relations_of_kind(own, mission.timeline.dt) if side == SENSOR else valves_of_kind(own, mission.timeline.dt)
         )
         found |= _of_kind({part: found[part] for part in kind}, alike, limits, mission)
-        if any(found[part].relation != relation for part, relation in zip(kind, own, strict=True)):
-            # what the others seemed to be off by was their relation's doing, not noise that this one may have
+        if side == ACTUATOR and any(found[part].relation != r for part, r in zip(kind, own, strict=True)):
+            # what the others seemed to be off by was their lags' doing, not noise that this one may have
             found |= _of_kind({part: found[part] for part in kind}, alike, limits, mission)
         spread = usual_spread([found[part].own_spread for part in kind])
         found |= {part: replace(found[part], kind_spread=spread) for part in kind}

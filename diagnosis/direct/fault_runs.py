@@ -33,7 +33,11 @@ _NEAR_MEAN = 0.25  # of its mean: standard deviation of a reference that hardly 
 _ABOUT = 0.05  # of what a gain leaves: as near to it a channel may rest
 _ZERO = 3.0  # times the noise: no reading
 _ELSEWHERE = 8.0  # times the noise of a constant: a reading beside it
-_EVENED_S, _GAP_S = 0.25, 2.0  # time that a deviation is evened over; between pieces of one fault
+_LONG_S, _EVENED_S, _GAP_S = (
+    10.0,
+    0.25,
+    2.0,
+)  # noise that drift may be; time that a deviation is evened over; between pieces of one fault
 _DRIFTS = 2.0  # tolerances that a healthy channel drifts by
 _PIECES, _MINOR = 3, 0.5  # and their share of a run
 _PLAYS = 3.0  # by which a command must move for a valve with a loss of gain to follow
@@ -93,6 +97,8 @@ def _where_it_deviates(run: Run, samples: Samples, model: ModeModel) -> list[Run
     What a healthy channel drifts by slowly, noise explains better than no fault does, so that the path stays in that row once something
     else has brought it there.
     """
+    if run.size * model.dt < _LONG_S:
+        return [run]
     part = samples.part(run.start, run.stop)
     known = (part.status == PAIR) & np.isfinite(part.y) & np.isfinite(part.x)
     off = np.where(known, part.y - part.x, 0.0)
