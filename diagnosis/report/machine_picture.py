@@ -118,7 +118,7 @@ def _rows(wheels: Sequence[str], geometry: Mapping[str, WheelPlace]) -> list[lis
             rows[-1].append(w)
         else:
             rows.append([w])
-    return [sorted(r, key=lambda w: -geometry[w]["y"]) for r in rows]
+    return [sorted(r, key=lambda w: -(geometry[w]["y"] + geometry[w]["offset"])) for r in rows]
 
 
 def _hit(name: str, c: Condition, shapes: Markup) -> Markup:

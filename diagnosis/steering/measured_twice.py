@@ -34,6 +34,8 @@ _LOWER, _NORMAL = 0.25, 3.138
 #: Probability that a valve does not answer a command which stays, or answers less: 10 of 13 and 93 of 96 were right on simulated machines, where
 #: few have a constant offset instead.
 _AT_REST, _LESS_AT_REST = 0.6, 0.85
+#: The same of a valve that does not answer for a moment: four of four such were no fault of it, on a machine of another user, while another part failed.
+_BRIEFLY_S, _BRIEFLY_AT_REST = 1.5, 0.45
 _STEADY, _HARDLY = 0.25, 0.05  # of its mean, and of full opening, by which such a command varies
 # of a valve that moves as it is told: correlation of opening and command, and the least standard deviation of both that is a motion
 _FOLLOWS, _MOTION, _FEW = 0.9, 0.01, 12
@@ -73,7 +75,7 @@ def of_one_cause(side: Side, found: SideFindings, inputs: AxleInputs, min_sat: f
         return _of_sensor(found, inputs, min_sat) if found.findings and inputs.angle_redundant else found
     if inputs.valve_redundant:
         return _of_valve(found, inputs, min_sat)
-    return found._replace(findings=_or_all_off(found.findings, inputs.command))
+    return found._replace(findings=_or_all_off(found.findings, inputs.command, inputs.timeline.dt))
 
 
 def _of_sensor(found: SideFindings, inputs: AxleInputs, min_sat: float) -> SideFindings:
@@ -100,7 +102,7 @@ def _of_valve(found: SideFindings, inputs: AxleInputs, min_sat: float) -> SideFi
     for f in as_late(_explained(found, measured), y, command, use, inputs.timeline.dt):
         stays = f.mode.total and _stands_while_told(f, y, command, use, inputs.timeline.dt)
         (stands if stays else open_).append(f)
-    found = found._replace(findings=_or_all_off(open_, command, losses=True))
+    found = found._replace(findings=_or_all_off(open_, command, inputs.timeline.dt, losses=True))
     told_of = sorted([*found.findings, *stands], key=lambda f: f.start)
     return found._replace(findings=tuple(f for f in told_of if not _hardly_off(f, measured)))
 
@@ -257,18 +259,22 @@ def _by_its_place(finding: Finding, opening: Array) -> Finding:
     return replace(finding, mode=mode, hypotheses=named, evidence=evidence)
 
 
-def _or_all_off(findings: Sequence[Finding], command: Array, *, losses: bool = False) -> tuple[Finding, ...]:
-    """A valve's findings, those beside a command [fraction], shape (n,), that stays where it is as `_or_off` has them; `losses`: also of gain."""
+def _or_all_off(findings: Sequence[Finding], command: Array, dt: float, *, losses: bool = False) -> tuple[Finding, ...]:
+    """A valve's findings, those beside a command [fraction], shape (n,), that stays where it is as `_or_off` has them; `losses`: also of gain.
+
+    `dt` is a step [s].
+    """
 
     def constant(f: Finding) -> bool:
         return (f.mode.total or (losses and f.mode is FaultMode.INEFFICIENT)) and _rests(command[f.start : f.stop])
 
-    return tuple(_or_off(f) if constant(f) else f for f in findings)
+    return tuple(_or_off(f, (f.stop - f.start) * dt) if constant(f) else f for f in findings)
 
 
-def _or_off(finding: Finding) -> Finding:
+def _or_off(finding: Finding, seconds: float) -> Finding:
     """A valve that does not answer a command which stays where it is; it may be off by a constant as well."""
-    most = _LESS_AT_REST if finding.mode is FaultMode.INEFFICIENT else _AT_REST
+    most = _AT_REST if seconds > _BRIEFLY_S else _BRIEFLY_AT_REST
+    most = _LESS_AT_REST if finding.mode is FaultMode.INEFFICIENT else most
     finding = replace(finding, evidence=(*finding.evidence, _CONSTANT))
     if finding.probability <= most:  # as little as that already
         return finding

@@ -15,6 +15,7 @@ from replay.machine.axle_plant import AxlePlant
 from replay.machine.drive_model import DriveModel
 from replay.machine.effort_model import EffortModel
 from replay.machine.geometry import Geometry, four_wheel_geometry
+from replay.machine.own_channels import check_own_channels
 from replay.machine.plant import Coupling as Coupling
 from replay.machine.plant import Plant as Plant
 from replay.machine.plant import WheelPlant as WheelPlant
@@ -253,6 +254,7 @@ class Machine:
         for section, names in (("signals", self.signals), ("noise", self.noise)):
             for name in names:
                 self._check_name(section, name)
+        check_own_channels(self.signals)
 
     def _check_drives(self) -> None:
         for name in self.drives:

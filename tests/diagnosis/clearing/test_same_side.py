@@ -16,7 +16,7 @@ LEFT_RIGHT = {"FR": -1.0, "FL": 1.0, "RR": -1.0, "RL": 1.0}
 
 
 def cells_of(places: dict[str, float]) -> Any:
-    geometry = SimpleNamespace(wheels={wheel: SimpleNamespace(y=y) for wheel, y in places.items()})
+    geometry = SimpleNamespace(wheels={wheel: SimpleNamespace(y=y, offset=0.0) for wheel, y in places.items()})
     return SimpleNamespace(machine=SimpleNamespace(geometry=geometry, wheels=tuple(places)))
 
 

@@ -143,3 +143,12 @@ def test_a_drive_to_stop_at_once_for_comes_before_a_sensor_as_among_the_actions(
 def test_a_path_says_how_many_faults_it_leaves_unnamed() -> None:
     assert unnamed_words([FAULT] * 24) == ""
     assert "24 most severe of 34 faults drawn; the other 10 are" in unnamed_words([FAULT] * 34)
+
+
+def test_wheels_of_turntables_stand_on_their_side() -> None:
+    """All joints are in the middle: the sides are those of the wheels' own distances from them."""
+    places = {"FR": -1.0, "FL": 1.0}
+    geometry = {w: {"x": 1.7, "y": 0.0, "offset": offset, "axle": "front"} for w, offset in places.items()}
+    report = samples.report_with(machine={"wheels": list(places), "geometry": geometry}, intervals=[], coverage=[])
+    picture = machine_picture(report)
+    assert picture.index('data-c="FL"') < picture.index('data-c="FR"')

@@ -131,6 +131,16 @@ def test_what_is_less_probable_already_is_not_more_so_for_a_command_that_rests()
     assert "off by a constant would look the same" in after.evidence[-1]
 
 
+def test_a_valve_that_does_not_answer_for_a_moment_beside_a_command_that_rests_is_hardly_at_fault() -> None:
+    stop = SPAN[0] + round(1.0 / DT)
+    rows = (Hypothesis(Side.ACTUATOR.value, "stuck", 0.98),)
+    before = Finding(SPAN[0], stop, Side.ACTUATOR, FaultMode.STUCK, 0.98, rows, None, None, (), Tier.MODEL)
+    inputs = axle({"u": np.full(SIZE, 0.2), "u_applied": np.full(SIZE, 0.1)}, DT)
+    inputs.valve_redundant = False  # type: ignore[misc]
+    (after,) = of_one_cause(Side.ACTUATOR, SideFindings((before,), ()), inputs, 0.05).findings
+    assert after.probability == pytest.approx(0.45)
+
+
 def test_a_sensor_that_stands_still_says_what_the_second_one_shows_meanwhile() -> None:
     angle = 0.3 * np.sin(np.arange(SIZE) * DT * 3.0)
     stuck = np.where((np.arange(SIZE) >= SPAN[0]) & (np.arange(SIZE) < SPAN[1]), 0.1, angle)
