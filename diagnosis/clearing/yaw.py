@@ -6,7 +6,7 @@ that are held at their references slip instead.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -19,6 +19,7 @@ from diagnosis.results.vocabulary import Kind
 from replay.arrays.quantiles import median_known, median_of
 from replay.faults import Side
 from replay.machine.config import Machine
+from replay.machine.geometry import Geometry
 
 _FIXED, _ENDS = "fixed", 2  # axle of wheels that are not steered; ends of a machine
 _STILL, _STILL_S = 0.01, 1.0  # m/s; at rest for this long, a gyro shows its bias
@@ -220,6 +221,25 @@ def _off_angles(cells: Cells) -> _Off | None:
     return _Off(off, path.turn, np.abs(path.turn) < _STRAIGHT, path.by_wheels)
 
 
+def _of_the_middle(geometry: Geometry, wheels: Sequence[str], speeds: Array) -> Array:
+    """Speed of the machine's middle [m/s], shape (cells,): the median of all wheels, or of both sides' medians where a wheel's is not logged."""
+    filled = _or_nothing(speeds)
+    logged = np.isfinite(speeds).any(axis=0)
+    if logged.all():
+        return median_known(filled, axis=1)
+    across = np.array([geometry.wheels[w].y + geometry.wheels[w].offset for w in wheels])
+    sides = [filled[:, logged & (side * across > _SHORTEST)] for side in (1.0, -1.0)]
+    if any(not side.shape[1] for side in sides):  # of one side alone: in turns its speed is not the machine's
+        return np.zeros(len(speeds))
+    left, right = (median_known(_or_nothing(side), axis=1) for side in sides)
+    return np.asarray(0.5 * (left + right))
+
+
+def _or_nothing(x: Array) -> Array:
+    """Speeds with 0 where none of a row is known, shape (cells, wheels) [m/s]."""
+    return np.where(np.asarray(np.isfinite(x).any(axis=1))[:, np.newaxis], x, 0.0)
+
+
 def _path(cells: Cells, leaf: str = "phi") -> _Path | None:
     """How the machine turns, and where its angles point by one measurement of them; None without yaw rate, or an axle's angle."""
     geometry, axles = cells.machine.geometry, cells.machine.axles
@@ -239,7 +259,7 @@ def _path(cells: Cells, leaf: str = "phi") -> _Path | None:
         return None
     angle = np.column_stack([np.mean([by_name[name] for name in end], axis=0) for end in (one, other)])
     known = np.asarray(np.isfinite(speeds).any(axis=1))
-    speed = median_known(np.where(known[:, np.newaxis], speeds, 0.0), axis=1)
+    speed = _of_the_middle(geometry, cells.machine.wheels, speeds)
     rest = known & (np.abs(speed) < _STILL) & np.isfinite(yaw)
     bias = float(median_of(yaw[rest])) if np.count_nonzero(rest) * cells.dt >= _STILL_S else 0.0
     moving = np.abs(speed) > _MOVING * cells.machine.max_speed

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from types import SimpleNamespace
-from typing import cast
+from typing import Any, cast
 
+import numpy as np
 import pytest
 
-from diagnosis.clearing.yaw import turning_ends
+from diagnosis.clearing.yaw import _of_the_middle, turning_ends
 from replay.machine.config import Machine
 
 
@@ -28,3 +29,17 @@ def test_the_outer_steered_ends_turn_a_machine(axles: dict[str, float], ends: di
     }
     machine = SimpleNamespace(axles=tuple(a for a in axles if a != "fixed"), geometry=SimpleNamespace(wheels=wheels))
     assert turning_ends(cast(Machine, machine)) == ends
+
+
+def test_the_middle_of_a_machine_is_between_its_sides_where_a_wheels_speed_is_not_logged() -> None:
+    """In a turn the median of three wheels is one side's."""
+    wheels = ("FR", "FL", "RR", "RL")
+    geometry: Any = SimpleNamespace(
+        wheels={w: SimpleNamespace(y=0.0, offset=1.0 if w[1] == "L" else -1.0) for w in wheels}
+    )
+    turning = np.tile([1.2, 0.8, 1.2, 0.8], (5, 1))
+    for missing in ([], [0], [1, 3]):
+        speeds = turning.copy()
+        speeds[:, missing] = np.nan
+        expected = 0.0 if len(missing) == 2 else 1.0  # of one side alone nothing is said
+        assert _of_the_middle(geometry, wheels, speeds) == pytest.approx(np.full(5, expected))
