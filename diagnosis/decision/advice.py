@@ -51,7 +51,8 @@ _VALVE: Mapping[FaultMode, str] = {
     _NO_SIGNAL: f"{_PLUG} Measure the coil's resistance with a multimeter: expected the data sheet's value, and within 10 % of the other "
     f"valves'. Measure its current at half command with a clamp meter: expected half of the rated one. {_SWAP_PLUG}",
     _INEFFICIENT: "Measure the pressure at ports A and B with a gauge at half command: expected within 10 % of the other {place}s'. Then "
-    f"check the oil filter, the spool's travel and internal leakage. {_SWAP_PLUG}",
+    "check the oil filter, the spool's travel, and internal leakage; where a position is logged, hold the travel against it, for its sensor may read "
+    f"wrong. {_SWAP_PLUG}",
     _NOISY: "Move the command's cable and plug by hand while watching the valve. Check with an oscilloscope that the command is calm and the "
     f"dither as set, and vent the pilot. {_SWAP_PLUG}",
 }

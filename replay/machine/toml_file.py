@@ -176,6 +176,7 @@ def _geometry(geo: dict[str, Any], wheels: tuple[str, ...], base: Machine) -> Ge
     per_wheel = {k: v for k, v in geo.items() if isinstance(v, dict)}
     if per_wheel:
         unknown = set(geo) - set(per_wheel)
+        _known("geometry", dict.fromkeys(sorted(unknown)), {*_STANDARD, *MACHINE_LEVEL, "wheel_diameter"})
         if unknown:
             raise ConfigError(
                 f"geometry.{sorted(unknown)[0]} does not go with places per wheel ([geometry.{wheels[0]}])"

@@ -292,6 +292,15 @@ def test_what_is_left_out_is_named(folder: Path, text: str, words: str) -> None:
         load_machine(folder / "part.toml")
 
 
+@pytest.mark.parametrize(
+    ("key", "words"),
+    [("max_stear", r"is not a known key; expected .*max_steer"), ("wheelbase", "does not go with places per wheel")],
+)
+def test_a_key_beside_places_per_wheel_is_unknown_or_does_not_go_with_them(folder: Path, key: str, words: str) -> None:
+    with pytest.raises(ConfigError, match=rf"geometry\.{key} {words}"):
+        load(folder, f"[geometry]\n{key} = 0.6\nFR = {{ x = 1.0, y = -0.7 }}\n")
+
+
 def test_the_least_driving_speed_of_fast_machines_is_that_of_a_yard(folder: Path) -> None:
     assert load(folder, "[geometry]\nmax_speed = 3.6\n").limits.driving_speed == pytest.approx(0.5)
     assert load(folder, "[geometry]\nmax_speed = 40\n").limits.driving_speed == 2.0
