@@ -30,9 +30,8 @@ def beside_its_side(cells: Cells, responses: Responses) -> dict[int, tuple[Array
     geometry = cells.machine.geometry
     if geometry is None:
         return {}
-    places = [
-        geometry.wheels[w].y + geometry.wheels[w].offset for w in cells.machine.wheels
-    ]  # turntables have all joints in the middle
+    wheels = [geometry.wheels[w] for w in cells.machine.wheels]
+    places = [w.y + w.offset for w in wheels]  # turntables have all joints in the middle
     sides = [[i for i, y in enumerate(places) if (y > 0.0) is left and y != 0.0] for left in (True, False)]
     if any(len(side) != _PAIR for side in sides):
         return {}

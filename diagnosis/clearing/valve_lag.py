@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from itertools import accumulate
-
 import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.clearing.cells import Array
+from diagnosis.estimation.lag import low_passed
 
 Flags = NDArray[np.bool_]
 
@@ -70,18 +69,7 @@ def misfit(rate: Array, opening: Array, use: Flags) -> float:
 def _delayed(x: Array, dt: float, delay_s: float, lag_s: float) -> Array:
     """`x` of shape (cells, axles) later, between cells by shares of two of them; what was before is as the first cell."""
     if lag_s > 0.0:
-        kept = float(np.exp(-dt / lag_s))
-        x = _lagged(x, kept)
+        x = np.column_stack([low_passed(np.append(axle, 0.0), lag_s, dt)[1:] for axle in x.T])
     whole, share = divmod(delay_s / dt, 1.0)
     early = [np.concatenate([np.repeat(x[:1], k, axis=0), x])[: len(x)] for k in (int(whole), int(whole) + 1)]
     return np.asarray((1.0 - share) * early[0] + share * early[1])
-
-
-def _lagged(x: Array, kept: float) -> Array:
-    """`x` of shape (cells, axles) behind a first-order lag that keeps a share of each cell, at rest before the first one.
-
-    As `scipy.signal.lfilter` does it, whose package takes longer to load than a mission of four minutes takes here.
-    """
-    axles = zip(x[0].tolist(), ((1.0 - kept) * x).T.tolist(), strict=True)
-    late = (accumulate(new, lambda y, more: more + kept * y, initial=rest) for rest, new in axles)
-    return np.ascontiguousarray(np.array([list(axle) for axle in late]).T[1:])

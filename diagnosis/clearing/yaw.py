@@ -222,14 +222,20 @@ def _off_angles(cells: Cells) -> _Off | None:
 
 
 def _of_the_middle(geometry: Geometry, wheels: Sequence[str], speeds: Array) -> Array:
-    """Speed of the machine's middle [m/s], shape (cells,): the median of all wheels, or of both sides' medians where a wheel's is not logged."""
+    """Speed of the machine's middle [m/s], shape (cells,): the median of all wheels; where a wheel's is not logged, that of those in the middle, or of both sides.
+
+    0 where there are neither: in turns the speed of one side is not the machine's.
+    """
     filled = _or_nothing(speeds)
     logged = np.isfinite(speeds).any(axis=0)
     if logged.all():
         return median_known(filled, axis=1)
     across = np.array([geometry.wheels[w].y + geometry.wheels[w].offset for w in wheels])
-    sides = [filled[:, logged & (side * across > _SHORTEST)] for side in (1.0, -1.0)]
-    if any(not side.shape[1] for side in sides):  # of one side alone: in turns its speed is not the machine's
+    middle = logged & (np.abs(across) <= _SHORTEST)
+    if middle.any():  # such as the drive of a tricycle, whose other wheels only roll
+        return median_known(_or_nothing(speeds[:, middle]), axis=1)
+    sides = [filled[:, logged & (side * across > 0.0)] for side in (1.0, -1.0)]
+    if any(not side.shape[1] for side in sides):
         return np.zeros(len(speeds))
     left, right = (median_known(_or_nothing(side), axis=1) for side in sides)
     return np.asarray(0.5 * (left + right))

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from replay.errors import ConfigError
 from replay.log.source_options import SignalSource
 
+_OF_PARTS = ("wheel.", "steer.")
 _MEASURED = {"v", "v_true", "phi", "phi_true"}
 _COMMAND_AND_POSITION = {"u", "u_applied"}
 
@@ -22,12 +23,9 @@ def check_own_channels(signals: Mapping[str, SignalSource]) -> None:
     seen: dict[tuple[object, ...], str] = {}
     for name, source in signals.items():
         part, _, leaf = name.rpartition(".")
-        if leaf in _MEASURED:
-            kind = "measured"
-        elif leaf in _COMMAND_AND_POSITION and part:
-            kind = part
-        else:
+        if not part.startswith(_OF_PARTS) or leaf not in _MEASURED | _COMMAND_AND_POSITION:
             continue
+        kind = "measured" if leaf in _MEASURED else part
         place = (kind, source.topic, source.field, source.symbol, source.column, source.source, source.derivative)
         if place in seen:
             raise ConfigError(

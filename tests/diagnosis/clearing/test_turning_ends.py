@@ -43,3 +43,10 @@ def test_the_middle_of_a_machine_is_between_its_sides_where_a_wheels_speed_is_no
         speeds[:, missing] = np.nan
         expected = 0.0 if len(missing) == 2 else 1.0  # of one side alone nothing is said
         assert _of_the_middle(geometry, wheels, speeds) == pytest.approx(np.full(5, expected))
+
+
+def test_the_middle_of_a_tricycle_is_its_drive() -> None:
+    places = {"drive": 0.0, "L": 0.5, "R": -0.5}
+    geometry: Any = SimpleNamespace(wheels={w: SimpleNamespace(y=y, offset=0.0) for w, y in places.items()})
+    speeds = np.column_stack([np.full(5, 0.7), np.full((5, 2), np.nan)])
+    assert _of_the_middle(geometry, tuple(places), speeds) == pytest.approx(np.full(5, 0.7))

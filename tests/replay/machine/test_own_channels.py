@@ -28,3 +28,4 @@ def test_commands_and_positions_of_several_parts_may_be_one_channel() -> None:
     check_own_channels({"wheel.FR.v_ref": shared, "wheel.FL.v_ref": shared, "wheel.FR.v": other})
     check_own_channels({"wheel.FR.u_applied": shared, "wheel.FL.u_applied": shared, "wheel.FR.u": other})
     check_own_channels({"wheel.FR.v": SignalSource(column="a", derivative=True), "wheel.FL.v": shared})
+    check_own_channels({"cmd.v": shared, "wheel.FR.v": shared})  # a machine of one drive
