@@ -69,7 +69,8 @@ def misfit(rate: Array, opening: Array, use: Flags) -> float:
 def _delayed(x: Array, dt: float, delay_s: float, lag_s: float) -> Array:
     """`x` of shape (cells, axles) later, between cells by shares of two of them; what was before is as the first cell."""
     if lag_s > 0.0:
-        x = np.column_stack([low_passed(np.append(axle, 0.0), lag_s, dt)[1:] for axle in x.T])
+        late = [low_passed(np.append(axle, 0.0), lag_s, dt)[1:] for axle in x.T]
+        x = np.array(late).reshape(x.shape[::-1]).T  # also of no axle
     whole, share = divmod(delay_s / dt, 1.0)
     early = [np.concatenate([np.repeat(x[:1], k, axis=0), x])[: len(x)] for k in (int(whole), int(whole) + 1)]
     return np.asarray((1.0 - share) * early[0] + share * early[1])
