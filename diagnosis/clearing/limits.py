@@ -25,8 +25,8 @@ _ABREAST_M = 0.05  # along the machine
 #: times as large as the next, of none that is as large as this.
 _LEAST_LONG = 0.06
 _LEAST_LASTING = 0.13  # the same over the mission, of what is measured twice on either side
-#: A deviation counts from so many times the largest of the other wheels' on, a change likewise.
-_ALONE, _CHANGED_ALONE = 3.0, 2.2
+#: A deviation counts from so many times the largest of the other wheels' on, in windows, over more, and a change likewise.
+_IN_WINDOWS, _ALONE, _CHANGED_ALONE = 3.5, 3.0, 2.2
 #: The same over the mission of what is measured once: of 112 healthy logs (14 machines, tuning) one wheel was above it, of a machine not cleared.
 _LASTING_ALONE = 5.0
 #: Of the loss that counts, in windows, of a change and over the mission, for two driven wheels that are measured twice on both sides, of which
@@ -121,7 +121,7 @@ def _beside_axles(below: Sequence[float], i: int, limit: float, least: float, ah
         return limit
     others = [x for j, x in enumerate(below) if j == i or abs(ahead[j] - ahead[i]) > _ABREAST_M]
     place = sum(abs(ahead[j] - ahead[i]) > _ABREAST_M for j in range(i))
-    return alone(others, place, limit, least, _ALONE)
+    return alone(others, place, limit, least, _IN_WINDOWS)
 
 
 def _seen(clear_at: float, carried: float) -> float:
@@ -156,8 +156,11 @@ def _beside_others(
                 lasting_below=min(limit.lasting_below, _LASTS_OF_PAIR * share),
             )
         if not all(both):  # else what is left lies behind the drive, which shows longer
-            beside = alone(most[0], i, limit.below, seen, _ALONE), _beside_axles(most[0], i, limit.below, seen, ahead)
-            limit = limit._replace(below=min(beside), above=alone(most[1], i, limit.above, seen, _ALONE))
+            beside = (
+                alone(most[0], i, limit.below, seen, _IN_WINDOWS),
+                _beside_axles(most[0], i, limit.below, seen, ahead),
+            )
+            limit = limit._replace(below=min(beside), above=alone(most[1], i, limit.above, seen, _IN_WINDOWS))
         least, times = (_LEAST_LASTING, _ALONE) if any(both) else (_LEAST_SEEN, _LASTING_ALONE)
         if any(both) or clear_at <= _STRICT:
             limit = limit._replace(lasting_below=alone(below, i, limit.lasting_below, least, times))

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from diagnosis.decision.advice import check_of_all
+from diagnosis.decision.company import in_company
 from diagnosis.decision.lengths import with_lengths_told
 from diagnosis.decision.severity import severity_of
 from diagnosis.decision.size_notes import size_note
@@ -37,7 +38,7 @@ def intervals_of(
         for own in assessment.findings:
             f = replace(own, epsilon=_bounded(own, kind))
             seconds = (f.stop - f.start) * step_ns * 1e-9
-            told = (*with_lengths_told(f.evidence, seconds), *_left_to_health(f), *f.course)
+            told = (*with_lengths_told(f.evidence, seconds), *f.course)
             told = tuple(mapped(text, with_minus_signs) for text in told)
             severity, advice = severity_of(f, seconds, machine.limits, words, kind)
             found[component, f.side, f.start, f.stop] = FaultInterval(
@@ -64,18 +65,21 @@ def intervals_of(
                 detected_s=None if f.detected is None else f.detected * step_ns * 1e-9,
             )
     ordered = sorted(found.values(), key=lambda x: (-x.severity.rank, x.start_s, x.component, x.side))
-    return tuple(replace(f, id=f"F{i + 1}") for i, f in enumerate(ordered))
+    numbered = [replace(f, id=f"F{i + 1}") for i, f in enumerate(ordered)]
+    return tuple(map(_with_what_is_left, in_company(numbered)))
 
 
-def _left_to_health(f: Finding) -> tuple[str, ...]:
-    """Why a healthy part is left so much, although the readings are so much more probable with the fault; nothing where it is not."""
+def _with_what_is_left(f: FaultInterval) -> FaultInterval:
+    """The same saying why a healthy part is left so much, although the readings are so much more probable with the fault, where that is so."""
     health = sum(h.p for h in f.hypotheses if h.mode == State.HEALTHY.value)
     if health < _WORTH or not any(is_about(text, About.TIMES) for text in f.evidence):
-        return ()
-    return (
+        return f
+    evidence = (
+        *f.evidence,
         f"How many times as probable it is speaks of the readings alone; what else is said here of such findings leaves {100 * health:.1f} % "
         "for a healthy part.",
     )
+    return replace(f, evidence=evidence, about=tuple(about_of(evidence)))
 
 
 def _bounded(f: Finding, kind: Kind) -> Epsilon | None:

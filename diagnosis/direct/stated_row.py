@@ -63,7 +63,7 @@ def with_lapses(p: Array, row: int, side: Side, seconds: float | None) -> Array:
     """
     kept = 1.0 - _LAPSE
     if seconds is not None:
-        kept *= seconds**4 / (seconds**4 + _COARSE_S**4)
+        kept *= seconds**6 / (seconds**6 + _COARSE_S**6)
     out = p.copy()
     others = [r for r in codes_of(side) if r not in (HEALTHY, row)]
     share = 1.0 / len(others)

@@ -57,3 +57,25 @@ def test_a_second_sensor_another_time_or_a_loss_leave_it(sensor: Finding, valve:
 def test_a_reading_that_stays_to_the_last_digit_is_as_sure_as_ever(rms: float, p: float) -> None:
     dead = replace(fault(1000, 1500, mode=FaultMode.NO_SIGNAL), sat=Sat(0.0, rms, -rms, rms, "m/s"))
     assert beside(dead, DEAD).probability == pytest.approx(p)
+
+
+@pytest.mark.parametrize(
+    ("found", "p"),
+    [
+        (fault(1000, 1500, Side.ACTUATOR), 0.55),
+        (fault(1000, 1500, Side.SENSOR_OR_ACTUATOR), 0.55),
+        (fault(1000, 1500, Side.ACTUATOR, tier=Tier.DIRECT), SURE),
+        (fault(1000, 1500, Side.ACTUATOR, FaultMode.STUCK), SURE),
+        (fault(1000, 1500, Side.SENSOR), SURE),
+    ],
+)
+def test_what_a_dead_valve_makes_of_another_wheel_is_not_worth_a_check(found: Finding, p: float) -> None:
+    states = np.zeros(3000, dtype=np.int8)
+    before = {
+        ("RR", "actuator"): Assessment(states, findings=(DEAD,)),
+        ("FR", "sensor"): Assessment(states, findings=(found,)),
+        ("FR", "actuator"): Assessment(states, findings=(found,)),
+    }
+    after = less_sure_beside_dead_valves(before, ("RR", "FR"), HYDRAULIC)
+    assert after["RR", "actuator"] is before["RR", "actuator"]
+    assert after["FR", "actuator"].findings[0].probability == pytest.approx(p, abs=0.02)
