@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from diagnosis.results.result import FaultInterval, Hypothesis
 from diagnosis.results.sentence import about_of
 from diagnosis.results.vocabulary import Severity, Tier
-from replay.faults import FaultMode
+from replay.faults import FaultMode, State
 
 _WEIGHTS = (-0.19, 0.87, -0.78, 2.95, -1.24, 0.94)  # constant, logit of the stated probability, and of `features_of`
 _SURELY, _MOST = (
@@ -109,11 +109,12 @@ def _raised(f: FaultInterval, p: float, features: NDArray[np.float64]) -> FaultI
 
 
 def _lowered(f: FaultInterval, p: float, features: NDArray[np.float64]) -> FaultInterval:
-    """The same in favour of faults that are in no row, which become no more probable than the row itself."""
+    """The same in favour of faults that are in no row; they and health become no more probable than the row itself."""
     own, none = _rows(f), (f.side.value, FaultMode.OUTSIDE_TABLE.value)
     had = sum(h.p for h in f.hypotheses if (h.side, h.mode) in own)
     outside = sum(h.p for h in f.hypotheses if (h.side, h.mode) == none)
-    p = max(p, 0.5 * (had + outside))
+    healthy = sum(h.p for h in f.hypotheses if h.mode == State.HEALTHY.value)
+    p = max(p, 0.5 * (had + outside), min(healthy, had))
     if f.mode is FaultMode.OUTSIDE_TABLE or not 0.0 < p < had:
         return f
     kept = [replace(h, p=h.p * p / had) if (h.side, h.mode) in own else h for h in f.hypotheses]

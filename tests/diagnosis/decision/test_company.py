@@ -66,6 +66,8 @@ def test_what_is_lost_makes_no_other_row_the_more_probable_one() -> None:
     [brief] = told(loss(1000, 1400, p=0.62), other=[finding(Side.SENSOR, FaultMode.NOISY, 500, 9000, epsilon=0.3)])
     assert brief.probability == pytest.approx(0.31)
     assert brief.hypotheses[0].p == pytest.approx(0.31)
+    [healthier] = told(loss(1000, 1400, p=0.55), other=[finding(Side.SENSOR, FaultMode.NOISY, 500, 9000, epsilon=0.3)])
+    assert healthier.probability == p_of(healthier, "none", "healthy") == pytest.approx(0.36)
 
 
 @pytest.mark.parametrize("unlike", [{"p": 0.95}, {"tier": Tier.RESPONSE}, {"tier": Tier.SIGNAL}])
