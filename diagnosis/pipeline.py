@@ -23,6 +23,7 @@ from diagnosis.decision import quality
 from diagnosis.decision.changing_rows import with_chains_as_one
 from diagnosis.decision.earlier_residuals import with_earlier_residuals
 from diagnosis.decision.episodes import with_episodes
+from diagnosis.decision.hardly_told import with_hardly_told
 from diagnosis.decision.passing_rows import with_disturbances_as_one
 from diagnosis.decision.second_onsets import with_second_onsets
 from diagnosis.decision.stated_once import without_restated
@@ -220,6 +221,7 @@ def _outside_gaps(found: ComponentResult, axles: tuple[str, ...], timeline: Time
     told = with_silent_sensors(found.assessments, timeline)
     seen = {key: without_gaps(a, gaps, timeline) for key, a in told.items()}
     joined = with_doubted_noise(with_episodes(seen, timeline.dt), axles, timeline.dt)
+    joined = with_hardly_told(joined, axles, timeline.dt)
     joined = with_disturbances_as_one(with_chains_as_one(joined, timeline.dt), timeline.dt)
     joined = without_restated(joined, timeline.dt)
     joined = with_earlier_residuals(joined, timeline.dt)

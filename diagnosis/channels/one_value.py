@@ -18,6 +18,7 @@ _FREEZES, _PARTED = 12, 4.0  # other runs that may be a frozen sensor's, too; ti
 _AGAIN = 2  # values at which it stays more than once
 _FEW, _SECOND = 5, 6.0 * 0.455  # readings; median of the square of a second difference of unit noise
 _OF_MOST = 0.97  # of its own largest: an end of its range
+_BEFORE, _SMALLER = 400, 8  # steps before a run, and changes among them, of which each is smaller than the one before
 
 
 class Frozen(NamedTuple):
@@ -52,8 +53,8 @@ def frozen_of(y: Array, span: float, dt: float) -> list[Frozen]:
     out = []
     for k in np.flatnonzero(turns & (length >= max(_LEAST_S, _READINGS * usual))):
         beside = max(_largest(y[: starts[k]]), _largest(y[stops[k] :]))
-        if np.abs(value[k]) >= _OF_MOST * beside >= 0.0:
-            continue  # the end of its range
+        if np.abs(value[k]) >= _OF_MOST * beside >= 0.0 or _settles(y[max(0, starts[k] - _BEFORE) : starts[k] + 1]):
+            continue  # the end of its range, or of a filter's way to what it is given
         other = turns & (value != value[k])
         longest = _habit(length[other], float(length[k]), usual, steps=_in_steps(value[other], length[other]))
         if longest is not None:
@@ -106,6 +107,13 @@ def gaps_in(ranked: Array, times: float, least: float) -> NDArray[np.intp]:
     Shape (gaps,), increasing.
     """
     return np.flatnonzero(ranked[:-1] >= np.maximum(times * ranked[1:], least))
+
+
+def _settles(before: Array) -> bool:
+    """Whether readings come nearer to the last one by ever smaller changes, shape (n,): those of a filter whose counts do not change."""
+    change = np.abs(np.diff(before))
+    last = change[change > 0.0][-_SMALLER:]
+    return last.size == _SMALLER and last[0] > 2.0 * last[-1] and bool(np.all(np.diff(last) <= 0.0))
 
 
 def _usual(starts: NDArray[np.intp], stops: NDArray[np.intp], steps: int) -> float:

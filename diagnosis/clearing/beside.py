@@ -11,10 +11,10 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 
 from diagnosis.results.assessment import Assessment, Finding
-from diagnosis.results.limited import limited
+from diagnosis.results.limited import limited, not_worth_a_check
 from diagnosis.results.machine_words import MachineWords
 from diagnosis.results.vocabulary import Tier
-from replay.faults import FaultMode, Side, State
+from replay.faults import FaultMode, Side
 
 #: A component and its side.
 Part = tuple[str, str]
@@ -22,8 +22,6 @@ Part = tuple[str, str]
 _SURE = 0.9  # of a valve's fault
 #: Of what lies beside another fault. Beside wrong angles partial faults were right as often as that; else set by hand.
 _MOST = 0.65
-#: Of any fault that only a model shows beside a sensor or valve that surely is dead or stuck: less than is worth a check, for that fault makes it up.
-_MADE_UP = 0.55
 _INSIDE = 0.5  # of its time
 _SAME = 1e-9  # m/s
 _ANGLE = "Meanwhile a steering sensor fails, or may, from whose angle follows what this part should do, which makes the fault less probable."
@@ -92,7 +90,7 @@ def less_sure_beside_dead_valves(
         return _partial_by_model(f) and f.side is not Side.SENSOR
 
     own = _less_sure(assessments, [(w, Side.SENSOR.value) for w in wheels], dead, doubtful, words.fill(_VALVE))
-    return _less_sure(own, _sides(wheels), others, dragged, words.fill(_OTHER_VALVE), _MADE_UP)
+    return _less_sure(own, _sides(wheels), others, dragged, words.fill(_OTHER_VALVE), made_up=True)
 
 
 def less_sure_beside_dead_sensors(
@@ -121,7 +119,7 @@ def less_sure_beside_dead_sensors(
     def sure(part: Part) -> list[Finding]:
         return [f for f in others(part) if f.probability >= _SURE]
 
-    return _less_sure(told, _sides(wheels), sure, _partial_by_model, why, _MADE_UP)
+    return _less_sure(told, _sides(wheels), sure, _partial_by_model, why, made_up=True)
 
 
 def _less_sure(
@@ -130,11 +128,12 @@ def _less_sure(
     causes: Callable[[Part], Sequence[Finding]],
     doubtful: Callable[[Finding], bool],
     why: str,
-    any_fault: float | None = None,
+    *,
+    made_up: bool = False,
 ) -> dict[Part, Assessment]:
     """Assessments in which doubtful findings of parts are limited where they lie for the most part within one of its causes.
 
-    `any_fault`: what any fault may be claimed with, instead of the row alone.
+    `made_up`: any fault is, rather than the row alone.
     """
     out = dict(assessments)
     for part in parts:
@@ -142,17 +141,15 @@ def _less_sure(
         found = _findings(assessments, part)
         less = [doubtful(f) and _within(f, by) for f in found]
         if any(less):
-            told = tuple(_limited(f, why, any_fault) if x else f for f, x in zip(found, less, strict=True))
+            told = tuple(_limited(f, why, made_up=made_up) if x else f for f, x in zip(found, less, strict=True))
             out[part] = replace(assessments[part], findings=told)
     return out
 
 
-def _limited(f: Finding, why: str, any_fault: float | None) -> Finding:
-    if any_fault is None:
+def _limited(f: Finding, why: str, *, made_up: bool) -> Finding:
+    if not made_up:
         return limited(f, _MOST, why)
-    faulty = sum(h.p for h in f.hypotheses if h.mode != State.HEALTHY.value)
-    fewer = replace(f, evidence=tuple(text for text in f.evidence if text != why))
-    return limited(fewer, f.probability * min(1.0, any_fault / faulty), why) if faulty > any_fault else f
+    return not_worth_a_check(replace(f, evidence=tuple(text for text in f.evidence if text != why)), why)
 
 
 def _partial_by_model(f: Finding) -> bool:

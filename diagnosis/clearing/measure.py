@@ -19,6 +19,7 @@ _EVEN_S = 0.2  # over which a channel and its reference are evened: two healthy 
 _LAGS_S = (0.0, 0.03, 0.06, 0.1, 0.15, 0.2)  # of healthy valves, motors and their loops
 _FOLLOWED = 0.8  # quantile of the windows: lag shows where a command is quick
 _AS_ALIKE = 0.97  # of the largest correlation
+_FOLLOWS = 0.65  # least correlation of a speed's changes with its command's: what hardly follows them tells no delay
 _EARLIEST_S, _LATEST_S = 0.3, 1.0
 _SURE = 0.95
 _LOSSES = (
@@ -174,7 +175,7 @@ def late(speed: Array, reference: Array, dt: float) -> list[float | None]:
         changes, commanded = np.diff(v), np.diff(c)
         alike.append([_alike(changes, commanded, int(k)) for k in steps])
         best = int(np.argmax(alike[-1]))
-        found.append(float((steps[best] + _top(alike[-1], best)) * dt) if alike[-1][best] > 0.3 else None)
+        found.append(float((steps[best] + _top(alike[-1], best)) * dt) if alike[-1][best] > _FOLLOWS else None)
     known = sorted(x for x in found if x is not None)
     middle = known[(len(known) - 1) // 2] if known else 0.0
     there = int(np.argmin(np.abs(steps * dt - middle)))

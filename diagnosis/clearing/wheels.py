@@ -49,7 +49,7 @@ LATE_S = 0.17  # 0.2 s are told as 0.18 to 0.22
 #: How much more of a partial loss the speed per opening shows than a carried wheel's speed alone, because its controller asks for more, and the
 #: least that is told from what healthy ones do [ln]. A loss of 0.3 showed 1.4 times as much on a machine whose controller asked for little.
 _ASKED_MORE, _LEAST_TOLD = 1.3, 0.06
-_TRACKING, _TRACKING_ALONE = 0.45, 0.12  # at most, and at least where the other wheels follow much better
+_TRACKING, _TRACKING_ALONE = 0.5, 0.12  # at most, and at least where the other wheels follow much better
 _SLOWER = 3.0  # times the deviation of the others' speeds
 #: Of full opening, by which a wheel may differ from the others at one speed, and times what the next one does. Healthy wheels of 14 machines
 #: (28 tuning missions) had 0.07 where no other had 0.032, and else 1.6 times the next.

@@ -7,12 +7,15 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
+from diagnosis.channels.habit import identify_habit
 from diagnosis.clearing.cells import Array, Cells
 from diagnosis.clearing.leaps import heights
 from replay.arrays.blocks import release
 from replay.arrays.quantiles import median_of
+from replay.signals.resolution import rounding_step
 
 _NOISES, _OF_TOP = 8.0, 0.1  # times the usual noise, and share of the top speed, from which on a reading is wild
+_STEPS = 2.5  # of the reading: one more or less is how it is rounded
 _TURNING = 20  # readings that tell its noise while it turns
 _FEW = 3  # in a window: fewer are a recorder's
 
@@ -60,7 +63,12 @@ def _wild(cells: Cells, name: str) -> tuple[NDArray[np.intp], Array]:
     release(y)
     before, after = v[1:-1] - v[:-2], v[1:-1] - v[2:]
     alone = heights(before, after)
-    wild = alone > max(_NOISES * _usual(v, cells.machine.limits.driving_speed), _OF_TOP * cells.machine.max_speed)
+    least = max(_NOISES * _usual(v, cells.machine.limits.driving_speed), _OF_TOP * cells.machine.max_speed)
+    wild = alone > least
+    if wild.any():
+        tick = identify_habit(y, cells.timeline.fresh[name], cells.timeline.dt).tick
+        beside = np.maximum(np.abs(v[:-2]), np.abs(v[2:]))
+        wild &= alone > _STEPS * np.maximum(rounding_step(v), tick * beside**2)
     return at[1:-1][wild], np.asarray(alone[wild], dtype=np.float64)
 
 

@@ -11,13 +11,13 @@ from collections.abc import Collection, Mapping
 from dataclasses import replace
 
 from diagnosis.results.assessment import Assessment, Finding
-from diagnosis.results.limited import limited
+from diagnosis.results.limited import limited, not_worth_a_check
 from diagnosis.results.result import Hypothesis
 from replay.faults import FaultMode, Side
 
 _TOUCHES_S = 0.7  # from one finding to the next
 _BRIEF_S, _BRIEF_STEERING_S = 2.5, 4.0  # of noise: of steering valves none of 3 was right (tuning)
-_HALF, _MOST_BRIEF = 0.5, 0.6  # of what is claimed of it; set by hand
+_HALF, _MOST_STEERING = 0.5, 0.6  # of what is claimed of it; set by hand
 _PASSES = "It passes into another fault of this part with hardly a moment between: a fault that no row of the tables describes looks so, too."
 _OVER = "Noise that is over as soon as this has rarely been a fault of such a part, which makes it less probable."
 Part = tuple[str, str]
@@ -38,23 +38,26 @@ def with_doubted_noise(
         Step [s].
     """
     return {
-        part: _doubted(a, dt, _BRIEF_STEERING_S if part[0] in axles else _BRIEF_S) if part[1] == Side.ACTUATOR else a
+        part: _doubted(a, dt, steering=part[0] in axles) if part[1] == Side.ACTUATOR else a
         for part, a in assessments.items()
     }
 
 
-def _doubted(a: Assessment, dt: float, brief_s: float) -> Assessment:
-    told = tuple(_told(f, [g for g in a.findings if g is not f], dt, brief_s) for f in a.findings)
+def _doubted(a: Assessment, dt: float, *, steering: bool) -> Assessment:
+    told = tuple(_told(f, [g for g in a.findings if g is not f], dt, steering=steering) for f in a.findings)
     same = all(f is g for f, g in zip(told, a.findings, strict=True))
     return a if same else replace(a, findings=told)
 
 
-def _told(f: Finding, others: list[Finding], dt: float, brief_s: float) -> Finding:
-    if (f.side, f.mode) != (Side.ACTUATOR, FaultMode.NOISY) or f.probability <= _MOST_BRIEF:
+def _told(f: Finding, others: list[Finding], dt: float, *, steering: bool) -> Finding:
+    if (f.side, f.mode) != (Side.ACTUATOR, FaultMode.NOISY):
         return f
-    if any(g.mode is not f.mode and _gap(f, g) * dt < _TOUCHES_S for g in others):
+    if f.probability > _MOST_STEERING and any(g.mode is not f.mode and _gap(f, g) * dt < _TOUCHES_S for g in others):
         return _or_in_no_row(f)
-    return limited(f, _MOST_BRIEF, _OVER) if (f.stop - f.start) * dt < brief_s else f
+    seconds = (f.stop - f.start) * dt
+    if steering:
+        return limited(f, _MOST_STEERING, _OVER) if seconds < _BRIEF_STEERING_S else f
+    return not_worth_a_check(f, _OVER) if seconds < _BRIEF_S else f
 
 
 def _gap(a: Finding, b: Finding) -> int:

@@ -85,7 +85,7 @@ class DirectEvidence:
             store.release()
         valves = {wheel: found for (wheel, side), found in identified.items() if side == ACTUATOR}
         own = {wheel: parts[wheel, ACTUATOR] for wheel in valves}
-        for of_valves in (without_small_deviations, without_stays, without_switching):
+        for of_valves in (without_small_deviations, without_stays, without_switching, with_frozen_readings):
             own = of_valves(valves, own)
             store.release()
         parts |= {(wheel, SENSOR): a for wheel, a in told.items()} | {(wheel, ACTUATOR): a for wheel, a in own.items()}

@@ -1,6 +1,7 @@
-"""A speed sensor that repeats one value while its wheel turns, where the others tremble, or its second one goes on: it is stuck, however near both are.
+"""A reading that repeats one value while its wheel drives, where the others tremble, or its second one goes on: it is stuck, however near both are.
 
-What is compared with a second measurement alone is hardly off while the machine goes on at one speed, or comes back to it.
+What is compared with a second measurement alone is hardly off while the machine goes on at one speed, or comes back to it. Of a valve's position
+nothing says whether the valve is stuck or its position's sensor.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from diagnosis.results.assessment import CODE, Assessment, Finding
 from diagnosis.results.plain_numbers import plain
 from diagnosis.results.result import Epsilon, Hypothesis, Sat
 from diagnosis.results.sentence import lasting
+from diagnosis.results.sizes import amount
 from diagnosis.results.vocabulary import Tier
 from replay.faults import FaultMode, Side, State
 from replay.signals.resolution import rounding_step
@@ -30,20 +32,24 @@ _STEPS = 1.0  # of the reading, by which all of them tremble: by less one value 
 _INSIDE = 0.5  # of its time: said already
 #: Of the value, and steps of the reading, by which the second sensor leaves it, for a part of its time, and goes on
 _LEAVES, _LEAVES_STEPS, _MUCH = 0.05, 10.0, 0.3
-_OTHERS_TREMBLE = "the other speed sensors go on trembling"
+_OTHERS_TREMBLE = {
+    Side.SENSOR: "the other speed sensors go on trembling",
+    Side.ACTUATOR: "the other {position}s go on trembling; it may be its sensor alone",
+}
 _P = 0.96  # as of frozen speeds that have no second one
+_VALVE = 0.7  # of a position, that the valve is stuck rather than its position's sensor; set by hand
 _OPEN = (CODE[State.HEALTHY], CODE[State.NOT_ASSESSED], CODE[State.NOT_EXCITED])
 
 
 def with_frozen_readings(
     found: Mapping[str, IdentifiedPair], assessments: Mapping[str, Assessment]
 ) -> dict[str, Assessment]:
-    """Assessments of speed sensors with those told as stuck that repeat one value while the others tremble, or their second one goes on.
+    """Assessments of speed sensors, or of valves, with those told as stuck that repeat one value while the others tremble, or their second one goes on.
 
     Parameters
     ----------
     found : Mapping[str, IdentifiedPair]
-        Sensors beside their references, by wheel.
+        Sensors beside their references, or positions beside their commands, by wheel.
     assessments : Mapping[str, Assessment]
         What was found of them.
     """
@@ -54,7 +60,7 @@ def with_frozen_readings(
         for r in held[wheel]:
             if (r.stop - r.start) * dt < max(_LEAST_S, _FAR * r.usual_s) or _most_hold(held, wheel, r):
                 continue
-            why = _goes_on(one, r) or (_OTHERS_TREMBLE if _stands_out(found, held, wheel, r) else None)
+            why = _goes_on(one, r) or (_OTHERS_TREMBLE[one.pair.side] if _stands_out(found, held, wheel, r) else None)
             if why is not None:
                 out[wheel] = _with(out[wheel], one, r, why)
     return out
@@ -62,6 +68,8 @@ def with_frozen_readings(
 
 def _goes_on(one: IdentifiedPair, r: Frozen) -> str | None:
     """That the second sensor leaves such a value far behind meanwhile; None where it does not."""
+    if one.pair.side is Side.ACTUATOR:
+        return None  # a command that goes on is what its rows are told by
     x = one.samples.x[r.start : r.stop]
     x = x[np.isfinite(x)]
     least = max(_LEAVES * abs(r.value), _LEAVES_STEPS * rounding_step(one.pair.y[one.pair.fresh]))
@@ -122,19 +130,21 @@ def _with(a: Assessment, one: IdentifiedPair, r: Frozen, why: str) -> Assessment
 
 
 def _told(one: IdentifiedPair, r: Frozen, why: str) -> Finding:
-    length = (r.stop - r.start) * one.pair.dt
-    stuck = Hypothesis(Side.SENSOR.value, FaultMode.STUCK.value, _P)
+    length, pair = (r.stop - r.start) * one.pair.dt, one.pair
+    p = _VALVE if pair.side is Side.ACTUATOR else _P
+    stuck = Hypothesis(pair.side.value, FaultMode.STUCK.value, p)
+    beside = [Hypothesis(pair.side.value, FaultMode.OUTSIDE_TABLE.value, _P - p)] if p < _P else []
     return Finding(
         start=r.start,
         stop=r.stop,
-        side=Side.SENSOR,
+        side=pair.side,
         mode=FaultMode.STUCK,
-        probability=_P,
-        hypotheses=(stuck, Hypothesis("none", State.HEALTHY.value, 1.0 - _P)),
+        probability=p,
+        hypotheses=(stuck, *beside, Hypothesis("none", State.HEALTHY.value, 1.0 - _P)),
         epsilon=Epsilon(1.0, 1.0, 1.0),
-        sat=Sat(r.value, abs(r.value), r.value, r.value, "m/s"),
+        sat=Sat(r.value, abs(r.value), r.value, r.value, pair.unit),
         evidence=(
-            f"{one.pair.y_name} stays at {plain(r.value)} {{speed_unit}} to the last digit for {lasting(length, 2)}; the longest that it stays at "
+            f"{pair.y_name} stays at {amount(r.value, pair.unit)} to the last digit for {lasting(length, 2)}; the longest that it stays at "
             f"another value is {r.usual_s:.2f} s, and {why}.",
         ),
         tier=Tier.DIRECT,

@@ -11,6 +11,8 @@ from replay.faults import FaultMode, State
 #: What a side and row may be claimed with, whatever the models said: of 705 surest findings on machines of eighteen kinds 98 of 100 were right (tuning), of
 #: 1193 on the simulator's own and `foreign` 99; what was wrong was nearly always another row of the same part.
 MOST_CLAIMED = 0.98
+#: Any fault at most, where something else made it up, or none explains it as well: less than is worth a check; set by hand.
+MADE_UP = 0.55
 
 
 def limited(finding: Finding, most: float, why: str) -> Finding:
@@ -23,6 +25,12 @@ def limited(finding: Finding, most: float, why: str) -> Finding:
     none = Hypothesis("none", State.HEALTHY.value, 1.0 - sum(h.p for h in faults))
     hypotheses = tuple(sorted([*faults, none], key=lambda h: -h.p))
     return replace(finding, probability=most, hypotheses=hypotheses, evidence=(*finding.evidence, why))
+
+
+def not_worth_a_check(finding: Finding, why: str) -> Finding:
+    """A finding of which any fault is less probable than what is worth a check, with a sentence that says why."""
+    faulty = sum(h.p for h in finding.hypotheses if h.mode != State.HEALTHY.value)
+    return limited(finding, finding.probability * MADE_UP / faulty, why) if faulty > MADE_UP else finding
 
 
 def believed(found: Assessment) -> Assessment:

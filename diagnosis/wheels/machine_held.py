@@ -12,17 +12,22 @@ from dataclasses import replace
 import numpy as np
 
 from diagnosis.results.assessment import Finding
-from diagnosis.results.limited import limited
+from diagnosis.results.limited import not_worth_a_check
 from diagnosis.wheels.findings import WheelFindings
 from diagnosis.wheels.inputs import WheelsData
-from replay.faults import State
 
 _BEHIND = 0.5  # of its command: a wheel that makes less is held, or starts
-_PART = 0.25  # of a finding's time in which most of the other wheels are
+_PART, _WITH_NEAR = (
+    0.25,
+    0.5,
+)  # of a finding's time, in which most of the other wheels are, and as much in it and beside it
+_NEAR, _NEAR_S = (
+    0.5,
+    5.0,
+)  # of its length, and at most [s], before and after: wheels that one supply drives stand and spin in turn
 _DRIVES = 0.1  # of the span: a command to drive
 _RESTS = 0.1  # of the span: the finding's own wheel hardly moves, half of the time
 _OTHERS = 2  # wheels beside this one
-_MOST = 0.55  # of any fault; set by hand: less than one that is worth a check by itself
 _HELD = (
     "The other {wheel}s fell far behind their commands at the same time: what holds the machine, such as a heap before it or an engine that stalls, "
     "may hold this {wheel} as well. The {position}, or a second speed, would tell."
@@ -61,25 +66,28 @@ def _sound(found: Mapping[int, WheelFindings], i: int, f: Finding) -> list[int]:
 def _less_sure(data: WheelsData, i: int, f: Finding, sound: Sequence[int]) -> Finding:
     if not f.mode.total or not _held(data, i, f, sound):
         return f
-    faulty = sum(h.p for h in f.hypotheses if h.mode != State.HEALTHY.value)
-    return limited(f, f.probability * _MOST / faulty, _HELD) if faulty > _MOST else f
+    return not_worth_a_check(f, _HELD)
 
 
 def _held(data: WheelsData, i: int, f: Finding, sound: Sequence[int]) -> bool:
-    """Whether wheel `i` stands through most of a finding while most `sound` wheels make little of what they are told for part of it."""
+    """Whether wheel `i` stands through most of a finding while most `sound` wheels make little of what they are told for part of it, or just before or after."""
     if len(sound) < _OTHERS:
         return False
-    speed, asked = np.abs(data.y[f.start : f.stop]), np.abs(data.reference[f.start : f.stop])
-    own = speed[:, i][np.isfinite(speed[:, i])]
+    own = np.abs(data.y[f.start : f.stop, i])
+    own = own[np.isfinite(own)]
     if not own.size or float(np.median(own)) > _RESTS * data.span:
         return False
+    near = min(round(_NEAR_S / data.dt), round(_NEAR * (f.stop - f.start)))
+    part = slice(max(0, f.start - near), f.stop + near)
+    speed, asked = np.abs(data.y[part]), np.abs(data.reference[part])
     others = np.isin(np.arange(speed.shape[1]), sound)
     with np.errstate(invalid="ignore"):
         told = (asked > _DRIVES * data.span) & np.isfinite(speed)
         behind = told & (speed < _BEHIND * asked)
     count = told[:, others].sum(axis=1)
     known = count >= _OTHERS
-    if not known.any():
-        return False
-    most = behind[:, others].sum(axis=1)[known] > 0.5 * count[known]
-    return bool(np.mean(most) >= _PART)
+    most = known & (behind[:, others].sum(axis=1) > 0.5 * count)
+    inside = slice(f.start - part.start, f.stop - part.start)
+    if np.count_nonzero(most[inside]) >= _PART * max(1, np.count_nonzero(known[inside])):
+        return True
+    return bool(np.count_nonzero(most) >= _WITH_NEAR * (f.stop - f.start))

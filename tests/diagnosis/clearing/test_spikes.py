@@ -61,3 +61,14 @@ def test_a_wheel_that_mostly_stands_is_held_to_its_noise_while_it_turns(noise: f
     speed = 0.6 + noise * rng.normal(size=size) + np.where(rng.random(size) < leaps, 1.0, 0.0)
     mission = replace(MISSION, columns={**MISSION.columns, "wheel.FL.v": np.where(turns, speed, 0.0)})
     assert (_found(mission) is not None) == told
+
+
+@pytest.mark.parametrize(("leaps", "told"), [(0.0, False), (0.02, True)])
+def test_a_reading_that_is_one_tick_off_those_beside_it_is_how_it_is_counted(leaps: float, told: bool) -> None:
+    """Times between teeth in ticks: a step of the speed grows with its square, and is a tenth of the top speed there."""
+    rng, size, tick = np.random.default_rng(4), MISSION.stamps.size, 0.3
+    top = in_cells(MISSION, base=True).machine.max_speed
+    true = top * (0.6 + 0.3 * np.sin(np.arange(size) * 0.01))
+    counted = np.rint(1.0 / (tick / top * true)) + np.where(rng.random(size) < 0.01, 1.0, 0.0)
+    speed = top / (tick * counted) + np.where(rng.random(size) < leaps, 2.0 * top, 0.0)
+    assert (_found(replace(MISSION, columns={**MISSION.columns, "wheel.FL.v": speed})) is not None) == told

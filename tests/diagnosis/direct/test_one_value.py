@@ -18,6 +18,7 @@ from replay.faults import FaultMode, Side, State
 Array = NDArray[np.float64]
 DT, SIZE, STEP = 0.05, 1_500, 0.002
 WHEELS = ("FR", "FL", "RR", "RL")
+CHANNEL = {Side.SENSOR: ("v", "m/s"), Side.ACTUATOR: ("u_applied", "of full opening")}
 TRUE = np.where(np.arange(SIZE) < 1_000, -0.88, 1.3)
 
 
@@ -26,11 +27,21 @@ def speeds(noise: float = 0.005, step: float = STEP) -> dict[str, Array]:
     return {w: np.asarray(np.round((TRUE + noise * rng.standard_normal(SIZE)) / step) * step) for w in WHEELS}
 
 
-def told(y: dict[str, Array], *findings: Finding, second: Array = TRUE) -> dict[str, Assessment]:
+def told(
+    y: dict[str, Array], *findings: Finding, second: Array = TRUE, side: Side = Side.SENSOR
+) -> dict[str, Assessment]:
     fresh = np.ones(SIZE, np.bool_)
     pairs = {
         w: SimpleNamespace(
-            pair=SimpleNamespace(y=v, fresh=fresh, dt=DT, span=5.0, y_name=f"wheel.{w}.v"),
+            pair=SimpleNamespace(
+                y=v,
+                fresh=fresh,
+                dt=DT,
+                span=5.0,
+                side=side,
+                y_name=f"wheel.{w}.{CHANNEL[side][0]}",
+                unit=CHANNEL[side][1],
+            ),
             samples=SimpleNamespace(x=second),
         )
         for w, v in y.items()
@@ -54,6 +65,17 @@ def test_one_value_among_trembling_ones_is_stuck() -> None:
     assert f.stop == pytest.approx(640, abs=1)
     assert np.count_nonzero(after["RR"].states == CODE[State.STUCK]) == f.stop - f.start
     assert all(not after[w].findings for w in ("FR", "FL", "RL"))
+
+
+def test_a_valve_position_of_one_value_is_a_stuck_valve_or_its_sensor() -> None:
+    (f,) = told(held(speeds()), side=Side.ACTUATOR)["RR"].findings
+    assert (f.side, f.mode, f.probability) == (Side.ACTUATOR, FaultMode.STUCK, 0.7)
+    assert [(h.mode, h.p) for h in f.hypotheses[1:]] == [
+        ("outside_table", pytest.approx(0.26)),
+        ("healthy", pytest.approx(0.04)),
+    ]
+    assert "its sensor alone" in f.evidence[0]
+    assert not told(held(speeds()), second=0.0 * TRUE, side=Side.ACTUATOR)["RR"].findings
 
 
 def test_where_readings_are_coarse_one_value_is_how_they_look_at_one_speed() -> None:

@@ -129,6 +129,15 @@ def test_a_sensor_that_is_frozen_for_the_whole_mission() -> None:
     assert found(y)[0].stop == N
 
 
+def test_a_filter_that_comes_to_rest_at_counts_that_do_not_change_is_not_frozen() -> None:
+    """Its changes become smaller and smaller; a sensor that freezes stops anywhere."""
+    y = 1.0 + 0.01 * np.random.default_rng(4).standard_normal(N)
+    y[2000:2400] = 0.94 + 0.05 * 0.5 ** np.minimum(np.arange(400), 30)
+    assert frozen_of(y, SPAN, DT) == []
+    y[1960:2400] = np.where(np.arange(440) < 30, y[1960:2400], 0.94)
+    assert [(r.start, r.stop) for r in frozen_of(y, SPAN, DT)] == [(1990, 2400)]
+
+
 def test_gaps_and_nothing() -> None:
     assert frozen_of(np.full(N, np.nan), SPAN, DT) == []
     assert frozen_of(np.zeros(0), SPAN, DT) == []

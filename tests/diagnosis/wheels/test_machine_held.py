@@ -35,12 +35,13 @@ def judged(
     measured: bool = False,
     mode: FaultMode = FaultMode.NO_SIGNAL,
     failed: tuple[int, ...] = (),
+    after: float = 0.0,
 ) -> Finding:
     """The claim of wheel 0 whose others make a share of their commands for the last seconds of it."""
     y = np.full((SIZE, 4), 1.0)
     y[START:STOP, 0] = own
-    y[STOP - round(seconds / DT) : STOP, 1:] = others
-    data = SimpleNamespace(y=y, reference=np.ones((SIZE, 4)), measured=[measured] * 4, span=2.2)
+    y[STOP - round(seconds / DT) : STOP + round(after / DT), 1:] = others
+    data = SimpleNamespace(y=y, reference=np.ones((SIZE, 4)), measured=[measured] * 4, span=2.2, dt=DT)
     found = {0: WheelFindings([claim(mode)])} | {j: WheelFindings([claim()] if j in failed else []) for j in (1, 2, 3)}
     return or_machine_held(cast(WheelsData, data), found)[0].findings[0]
 
@@ -49,6 +50,11 @@ def test_a_wheel_that_is_held_with_the_machine_is_hardly_faulty() -> None:
     f = judged(0.1, 1.5, failed=(3,))
     assert sum(h.p for h in f.hypotheses if h.mode != "healthy") == pytest.approx(0.55)
     assert any("what holds the machine" in e for e in f.evidence)
+
+
+def test_wheels_that_stand_in_turn_are_held() -> None:
+    assert judged(0.1, 0.5, after=1.6).probability < 0.7
+    assert judged(0.1, 0.5, after=1.0).probability == 0.7
 
 
 @pytest.mark.parametrize(
