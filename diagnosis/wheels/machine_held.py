@@ -88,6 +88,5 @@ def _held(data: WheelsData, i: int, f: Finding, sound: Sequence[int]) -> bool:
     known = count >= _OTHERS
     most = known & (behind[:, others].sum(axis=1) > 0.5 * count)
     inside = slice(f.start - part.start, f.stop - part.start)
-    if np.count_nonzero(most[inside]) >= _PART * max(1, np.count_nonzero(known[inside])):
-        return True
-    return bool(np.count_nonzero(most) >= _WITH_NEAR * (f.stop - f.start))
+    meanwhile, driven = int(most[inside].sum()), int(known[inside].sum())
+    return meanwhile >= _PART * max(1, driven) or int(most.sum()) >= _WITH_NEAR * (f.stop - f.start)
