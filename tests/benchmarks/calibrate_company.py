@@ -42,7 +42,7 @@ def run_alone(task: Task) -> list[Outcome]:
 def rows(outcome: Outcome) -> Iterator[tuple[float, Array, bool]]:
     """Stated probability, features, and whether it is right, of each row of one report that counts."""
     found = [m for m in map(_FINDING.fullmatch, outcome.findings) if m]
-    told = [Told(m[1], m[2], float(m[4]) - float(m[3])) for m in found]
+    told = [Told(m[1], m[2], float(m[3]), float(m[4])) for m in found]
     for (p, right), own in zip(outcome.claims, told, strict=False):
         if p < _SURELY:
             yield p, features_of(own, told), right
