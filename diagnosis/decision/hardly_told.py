@@ -1,7 +1,7 @@
 """Findings of wheels that hardly tell a fault from none: too brief for their row, or of a size that may be nothing.
 
 Noise of a speed sensor that was over within 2 s was right 0 of 9 times on simulated machines of twenty kinds, whatever showed it; from 2.5 s on 397 of
-403 times. None of 294 losses that second measurements rightly showed had bounds that reach down to hardly any.
+403 times. A healthy valve that lagged for 2.5 s had lost 0.12 (95 %: none to 0.29).
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from diagnosis.results.vocabulary import Tier
 from replay.faults import FaultMode, Side
 
 _BRIEF_S = 2.0
-_NOTHING = 0.05  # a loss, or gain, that is none
+_NOTHING, _SMALL = 0.05, 0.2  # a loss, or gain, that is none; a loss that is none to act on
 _OVER = (
     "Noise of a speed that is over as soon as this has rarely been its sensor's fault, which makes it less probable."
 )
@@ -56,5 +56,5 @@ def _less(f: Finding, seconds: float) -> Finding:
     if f.tier is not Tier.DIRECT or e is None or e.low >= _NOTHING or e.high <= -_NOTHING:
         return f
     if f.mode is FaultMode.INEFFICIENT:
-        return not_worth_a_check(f, _MAY_BE_NONE)
+        return not_worth_a_check(f, _MAY_BE_NONE) if e.value < _SMALL else f
     return not_worth_a_check(f, _GAIN) if brief and f.mode is FaultMode.OUTSIDE_TABLE else f

@@ -40,6 +40,7 @@ def test_it_is_less_than_is_worth_a_check(f: Finding) -> None:
         replace(NOISE, tier=Tier.SIGNAL),
         replace(LOSS, tier=Tier.MODEL),
         replace(LOSS, epsilon=Epsilon(0.2, 0.06, 0.34)),
+        replace(LOSS, epsilon=Epsilon(0.35, 0.0, 1.0)),
         replace(LOSS, epsilon=None),
         replace(GAIN, stop=3100),
         replace(GAIN, epsilon=Epsilon(-0.2, -0.3, -0.1)),
