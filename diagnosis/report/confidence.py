@@ -19,7 +19,7 @@ from replay.faults import SCALED, Side, State
 _WORDS = ((0.99, "Practically certain"), (0.9, "Very likely"), (0.7, "Likely"))
 _OPEN, _TIE = 0.9, 1e-3
 _SPREAD = 0.05  # of the probabilities of spells that is worth a word
-_AT_MOST = f"{100 * MOST_CLAIMED:.0f} %, the most that any one kind of fault is given"
+_AT_MOST = f"{100 * MOST_CLAIMED:.0f} %, the highest that is ever stated"
 _NOTHING, _MOSTLY = 0.005, 0.5  # of the driving: judged for so little that it is none, and for most of it
 _SHORT = (Standing.NOT_LONG_ENOUGH, Standing.NOT_JUDGED, Standing.NOT_STEERED)
 _BESIDE = "what the {wheels} and the channels of one show beside each other"  # without any command

@@ -62,7 +62,7 @@ def test_what_the_position_of_a_joint_shows_is_no_want_of_a_second_measurement()
 
 def test_phrase_of_a_fault() -> None:
     report = samples.report_with(coverage=[row("actuator", 91.0), row("sensor", 100.0)])
-    assert "Very likely (98 %, the most that any one kind of fault is given), measured" in sure_of(fault(0.98), report)
+    assert "Very likely (98 %, the highest that is ever stated), measured" in sure_of(fault(0.98), report)
     nothing = samples.report_with(coverage=[])
     assert sure_of(fault(0.995), report) == (
         "Practically certain (99.5 %), measured against the valve position; 91 % of its driving was judged"
