@@ -37,7 +37,7 @@ class WheelEvidence:
         if fit is None:
             return Contribution({})
         mission.progress(Progress(Stage.JUDGING_WHEELS))
-        slip = slip_of(timeline, replay, machine, channels.v, mission.angle, mission.doubtful)
+        slip = slip_of(timeline, replay, machine, channels.v, mission.angle, motion, mission.doubtful)
         data = wheels_data(
             timeline, replay, machine, channels, fit, mission.alive, motion, mission.doubtful, slip, body
         )

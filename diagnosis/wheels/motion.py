@@ -75,18 +75,24 @@ def against_command(y: Array, reference: Array) -> float:
 
 
 def slip_of(
-    timeline: Timeline, replay: Replay, machine: Machine, v: Array, angle: Array, doubtful: NDArray[np.bool_]
+    timeline: Timeline,
+    replay: Replay,
+    machine: Machine,
+    v: Array,
+    angle: Array,
+    motion: Motion,
+    doubtful: NDArray[np.bool_],
 ) -> NDArray[np.bool_]:
     """Where a wheel breaks the parity of the body; nowhere without geometry, or where an axle's angle is in doubt.
 
-    Shape (n, wheels); `v` likewise in m/s, `angle` of shape (n, axles) in rad, `doubtful` of shape (n, axles).
+    Shape (n, wheels); `v` likewise in m/s, `angle` of shape (n, axles) in rad, from which `motion` is; `doubtful` of shape (n, axles).
     """
     geometry = machine.geometry
     if geometry is None or v.shape[1] < 4 or not any_finite(v).all() or not any_finite(angle).all():
         return np.zeros(v.shape, dtype=np.bool_)
     least = 2.5 * machine.limits.min_sat
     turned = timeline.map(lambda a: wheel_angles(a, geometry), angle)
-    slip = slipping(v, angle, replay.phi_ref, turned, geometry, timeline.dt, least, timeline.store)
+    slip = slipping(v, angle, replay.phi_ref, motion.ratio, turned, geometry, timeline.dt, least, timeline.store)
     return timeline.map(lambda s, d: s & ~d.any(axis=1)[:, None], slip, doubtful)
 
 
