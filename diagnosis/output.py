@@ -13,7 +13,6 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
-from diagnosis.comparison.previous import with_previous
 from diagnosis.own_files import check_replaced
 from diagnosis.report.page import build_page
 from diagnosis.report.plot_data import axis_of
@@ -201,6 +200,8 @@ def rebuild(
     saved = load_result(source)
     report, columns, windows = saved.report, saved.columns, saved.windows
     if previous is not None:
+        from diagnosis.comparison.previous import with_previous
+
         report = with_previous(report, previous[1], str(previous[0]))
     if change is not None:
         report = change(report)

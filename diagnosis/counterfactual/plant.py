@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from diagnosis.assess import ComponentResult
 from diagnosis.results.wheel_model import WheelModelFit
+from diagnosis.wheels.motion import in_motion
 from diagnosis.wheels.wheel_channels import wheel_channels
 from diagnosis.wheels.wheel_fit import wheel_fit
 from replay.control.loop import Replay, any_finite, stack
@@ -68,11 +69,14 @@ def _map(plant: WheelPlant, u_max: float, *, beyond: bool) -> tuple[Array, Array
 
 def wheel_fits(timeline: Timeline, replay: Replay, machine: Machine, found: ComponentResult) -> list[WheelModelFit]:
     """Models of the driven wheels that come into question: the diagnosis's, and where those were found in the mission, ones without the body."""
-    channels, angle = wheel_channels(timeline, machine), measured_angle(timeline, machine)
-    fits = [found.wheel_model or wheel_fit(channels, replay, timeline, machine, angle)]
+    channels, motion = (
+        wheel_channels(timeline, machine),
+        in_motion(measured_angle(timeline, machine), machine, timeline),
+    )
+    fits = [found.wheel_model or wheel_fit(channels, replay, timeline, machine, motion)]
     if fits[0] is not None and fits[0].identified and machine.plant.coupling != "free":
         free = replace(machine, plant=replace(machine.plant, coupling="free"))
-        own = wheel_fit(channels, replay, timeline, free, angle)
+        own = wheel_fit(channels, replay, timeline, free, motion)
         fits.append(own)
         if own is not None:
             fits.append(replace(own, plants=tuple(None if p is None else replace(p, grip=None) for p in own.plants)))

@@ -112,7 +112,7 @@ def _identified(pairs: dict[Part, Pair], limits: Limits, mission: MissionView) -
             # what the others seemed to be off by was their lags' doing, not noise that this one may have
             found |= _of_kind({part: found[part] for part in kind}, alike, limits, mission)
         spread = usual_spread([found[part].own_spread for part in kind])
-        found |= {part: replace(found[part], kind_spread=spread) for part in kind}
+        found |= {part: found[part].with_kind_spread(spread) for part in kind}
     return found
 
 

@@ -146,6 +146,12 @@ class IdentifiedPair:
         use = np.isin(status, (PAIR, BLIND)) & np.isfinite(y) & np.isfinite(x)
         return float(quantile_of(np.abs(y - x)[use], _NEARLY_ALL)) if use.any() else np.inf
 
+    def with_kind_spread(self, spread: GainSpread) -> IdentifiedPair:
+        """The same pair with how much the gain of such channels usually varies."""
+        same = replace(self, kind_spread=spread)
+        same.__dict__["_gains"] = self._gains  # a cached property, of which nothing changes
+        return same
+
     @cached_property
     def _gains(self) -> GainWindows:
         return gain_windows(self.samples, self.pair.dt)

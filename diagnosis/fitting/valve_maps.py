@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from diagnosis.wheels.motion import in_motion
 from diagnosis.wheels.plant_constants import PlantFit
 from diagnosis.wheels.plant_identification import identify_plants
 from diagnosis.wheels.wheel_channels import wheel_channels
@@ -38,7 +39,7 @@ def fit_maps(
         if machine.axles:
             measured, true = (stack(timeline, [f"steer.{a}.{x}" for a in machine.axles]) for x in ("phi", "phi_true"))
             angle = np.where(np.isfinite(true), true, measured)
-        drive = wheel_drive(channels, replayed, timeline, machine, angle)
+        drive = wheel_drive(channels, replayed, timeline, machine, in_motion(angle, machine, timeline))
         usable = np.array([not s for s in spoiled])
         drives.append(replace(drive, moving=drive.moving & usable))
     found = identify_plants(drives, machine.max_speed, _HEALTHY_SHARE, machine.plant.coupling) if drives else None

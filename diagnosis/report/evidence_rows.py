@@ -152,8 +152,9 @@ def side_rows(
 
 def _lowest(epsilon: NDArray[np.floating] | None) -> float:
     """Where the axis of ε̂ ends: low enough for every loss that is stated; a part that gives more than it should has a negative one [1]."""
-    known = np.empty(0) if epsilon is None else epsilon[np.isfinite(epsilon)]
-    return min(-1.0, 1.1 * float(known.min(initial=0.0)))
+    known = np.empty(0) if epsilon is None else epsilon
+    least = float(np.fmin.reduce(known, initial=0.0))  # NaN is passed over
+    return min(-1.0, 1.1 * (least if np.isfinite(least) else float(known[np.isfinite(known)].min(initial=0.0))))
 
 
 def _mode_row(fault: IntervalRow, side: Side, base: str, of: str, columns: Columns, words: MachineWords) -> list[Row]:

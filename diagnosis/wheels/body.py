@@ -11,7 +11,7 @@ from diagnosis.body.rolling import Rolling
 from diagnosis.body.sources import body_sensors
 from diagnosis.body.speed import BodySpeed, body_speed
 from diagnosis.wheels.blocks import WheelBlocks, block_width
-from diagnosis.wheels.motion import in_motion
+from diagnosis.wheels.motion import Motion
 from replay.arrays.blocks import block_means, release
 from replay.control.kinematics import low_pass, rotation
 from replay.control.loop import any_finite
@@ -23,7 +23,9 @@ Array = NDArray[np.float64]
 _COMMAND_HZ = 0.5  # how a machine follows its command, about
 
 
-def measured_body(timeline: Timeline, machine: Machine, y: Array, v_ref: Array, angle: Array) -> MeasuredBody | None:
+def measured_body(
+    timeline: Timeline, machine: Machine, y: Array, v_ref: Array, angle: Array, motion: Motion
+) -> MeasuredBody | None:
     """Speed of the body by its own sensors; None where the log has none, or nothing tells how wheels and body move together.
 
     Parameters
@@ -34,6 +36,8 @@ def measured_body(timeline: Timeline, machine: Machine, y: Array, v_ref: Array, 
         Measured and commanded speeds [m/s].
     angle : Array, shape (n, axles)
         Best estimate of the axles' angles [rad].
+    motion : Motion
+        From `in_motion` by it.
     """
     if machine.geometry is None or not angle.shape[1] or not any_finite(angle).all():
         return None
@@ -41,8 +45,7 @@ def measured_body(timeline: Timeline, machine: Machine, y: Array, v_ref: Array, 
     sensors = body_sensors(timeline, width)
     if not sensors.any:
         return None
-    ratio, turn = in_motion(angle, machine, timeline)
-    found = body_speed(sensors, _rolling(timeline, machine, y, v_ref, ratio, turn, angle, width))
+    found = body_speed(sensors, _rolling(timeline, machine, y, v_ref, *motion, angle, width))
     return MeasuredBody(found, np.array([abs(w.y) + abs(w.offset) for w in machine.geometry.wheels.values()]))
 
 

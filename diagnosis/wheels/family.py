@@ -10,7 +10,7 @@ from diagnosis.results.vocabulary import Tier
 from diagnosis.wheels.assess import assess_wheels
 from diagnosis.wheels.body import measured_body
 from diagnosis.wheels.inputs import wheels_data
-from diagnosis.wheels.motion import MOST_AGAINST, against_command, slip_of
+from diagnosis.wheels.motion import MOST_AGAINST, against_command, in_motion, slip_of
 from diagnosis.wheels.wheel_channels import WheelChannels, wheel_channels
 from diagnosis.wheels.wheel_fit import wheel_fit
 from replay.progress import Progress, Stage
@@ -31,14 +31,15 @@ class WheelEvidence:
         mission.progress(Progress(Stage.IDENTIFYING_WHEELS))
         if mission.angle is None or mission.doubtful is None:
             return Contribution({})
-        body = measured_body(timeline, machine, channels.speed, replay.v_ref, mission.angle)
-        fit = wheel_fit(channels, replay, timeline, machine, mission.angle, body)
+        motion = in_motion(mission.angle, machine, timeline)
+        body = measured_body(timeline, machine, channels.speed, replay.v_ref, mission.angle, motion)
+        fit = wheel_fit(channels, replay, timeline, machine, motion, body)
         if fit is None:
             return Contribution({})
         mission.progress(Progress(Stage.JUDGING_WHEELS))
-        slip = slip_of(timeline, replay, machine, channels.v, mission.angle, mission.doubtful)
+        slip = slip_of(timeline, replay, machine, channels.v, mission.angle, motion, mission.doubtful)
         data = wheels_data(
-            timeline, replay, machine, channels, fit, mission.alive, mission.angle, mission.doubtful, slip, body
+            timeline, replay, machine, channels, fit, mission.alive, motion, mission.doubtful, slip, body
         )
         parts: dict[Part, Assessment] = {}
         judged = assess_wheels(data, machine.limits, gains=fit.reliable)

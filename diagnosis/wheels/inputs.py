@@ -17,7 +17,7 @@ from diagnosis.estimation.valve_map import effective
 from diagnosis.results.wheel_model import WheelModelFit
 from diagnosis.wheels.body import MeasuredBody
 from diagnosis.wheels.identification import demand
-from diagnosis.wheels.motion import MOST_AGAINST, against_command, in_motion
+from diagnosis.wheels.motion import MOST_AGAINST, Motion, against_command
 from diagnosis.wheels.readings import SpeedNoise, habits_of, news, speed_noises
 from diagnosis.wheels.wheel_channels import WheelChannels
 from replay.arrays.column_store import ColumnStore
@@ -117,7 +117,7 @@ def wheels_data(
     channels: WheelChannels,
     fit: WheelModelFit,
     counts: dict[str, NDArray[np.int16]],
-    angle: Array,
+    motion: Motion,
     doubtful: NDArray[np.bool_],
     slip: NDArray[np.bool_],
     body: MeasuredBody | None = None,
@@ -132,10 +132,10 @@ def wheels_data(
         Speeds and openings of all wheels, and their models.
     counts : dict[str, NDArray[np.int16]]
         From `diagnosis.channels.liveness.alive_sources`.
-    angle : Array, shape (n, axles)
-        Best estimate of the axles' angles [rad].
+    motion : Motion
+        How wheels and body move together, by the best estimate of the axles' angles.
     doubtful : NDArray[np.bool_], shape (n, axles)
-        Where it rests on a model or on a sensor in doubt.
+        Where that rests on a model or on a sensor in doubt.
     slip : NDArray[np.bool_], shape (n, wheels)
         Where a wheel breaks the parity of the body.
     body : MeasuredBody or None
@@ -160,7 +160,6 @@ def wheels_data(
     fresh = [timeline.fresh.get(speed, np.zeros(timeline.size, dtype=np.bool_)) for speed, _ in names]
     habits = habits_of(y, fresh, dt)
     status = news(status, y, habits, dt)
-    ratio, turn = in_motion(angle, machine, timeline)
     return WheelsData(
         y=y,
         u=u,
@@ -169,8 +168,8 @@ def wheels_data(
         status=status,
         quiet=quiet,
         slip=slip,
-        ratio=ratio,
-        turn=turn,
+        ratio=motion.ratio,
+        turn=motion.turn,
         measured=[bool(x) for x in channels.has_applied],
         plants=plants,
         noise=[machine.noise.get(speed, Noise()) for speed, _ in names],

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -19,6 +21,21 @@ MOST_AGAINST = 0.12
 _STEER_HZ = 3.0
 _MOVES = 0.1  # of the usual speed, from which a wheel's direction is clear
 _MOST_ROWS = 20_000
+
+
+class Motion(NamedTuple):
+    """How the wheels move with the body, each of shape (n, wheels).
+
+    Attributes
+    ----------
+    ratio : Array
+        Wheel speed per speed of the body [1].
+    turn : Array
+        What each wheel rolls less because it steers [m/s].
+    """
+
+    ratio: Array
+    turn: Array
 
 
 def body_speeds(y: Array, ratio: Array, turn: Array) -> Array:
@@ -58,30 +75,33 @@ def against_command(y: Array, reference: Array) -> float:
 
 
 def slip_of(
-    timeline: Timeline, replay: Replay, machine: Machine, v: Array, angle: Array, doubtful: NDArray[np.bool_]
+    timeline: Timeline,
+    replay: Replay,
+    machine: Machine,
+    v: Array,
+    angle: Array,
+    motion: Motion,
+    doubtful: NDArray[np.bool_],
 ) -> NDArray[np.bool_]:
     """Where a wheel breaks the parity of the body; nowhere without geometry, or where an axle's angle is in doubt.
 
-    Shape (n, wheels); `v` likewise in m/s, `angle` of shape (n, axles) in rad, `doubtful` of shape (n, axles).
+    Shape (n, wheels); `v` likewise in m/s, `angle` of shape (n, axles) in rad, from which `motion` is; `doubtful` of shape (n, axles).
     """
     geometry = machine.geometry
     if geometry is None or v.shape[1] < 4 or not any_finite(v).all() or not any_finite(angle).all():
         return np.zeros(v.shape, dtype=np.bool_)
     least = 2.5 * machine.limits.min_sat
     turned = timeline.map(lambda a: wheel_angles(a, geometry), angle)
-    slip = slipping(v, angle, replay.phi_ref, turned, geometry, timeline.dt, least, timeline.store)
+    slip = slipping(v, angle, replay.phi_ref, motion.ratio, turned, geometry, timeline.dt, least, timeline.store)
     return timeline.map(lambda s, d: s & ~d.any(axis=1)[:, None], slip, doubtful)
 
 
-def in_motion(angle: Array, machine: Machine, timeline: Timeline) -> tuple[Array, Array]:
-    """Wheel speed per speed of the body [1], and what each wheel rolls less because it steers [m/s].
-
-    Both of shape (n, wheels); `angle` of shape (n, axles) in rad.
-    """
+def in_motion(angle: Array, machine: Machine, timeline: Timeline) -> Motion:
+    """How the wheels move with the body; NaN and 0 where no geometry tells. `angle` of shape (n, axles) in rad."""
     wheels = len(machine.wheels)
     geometry = machine.geometry
     if geometry is None or not any_finite(angle).all():
-        return np.broadcast_to(np.nan, (timeline.size, wheels)), np.broadcast_to(0.0, (timeline.size, wheels))
+        return Motion(*(np.broadcast_to(x, (timeline.size, wheels)) for x in (np.nan, 0.0)))
     offset, dt = np.array([w.offset for w in geometry.wheels.values()]), timeline.dt
 
     def turning(state: tuple[Array, list[float]], angle: Array) -> tuple[tuple[Array], tuple[Array, list[float]]]:
@@ -93,4 +113,4 @@ def in_motion(angle: Array, machine: Machine, timeline: Timeline) -> tuple[Array
         return (smooth * offset,), (turned[-1:], [float(x) for x in smooth[-1]])
 
     (turn,), _ = timeline.scan(turning, (wheel_angles(angle[:1], geometry), [np.nan] * wheels), angle)
-    return timeline.map(lambda a: speed_ratios(a, geometry), angle), turn
+    return Motion(timeline.map(lambda a: speed_ratios(a, geometry), angle), turn)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from replay.arrays.blocks import release
 from replay.arrays.column_store import ColumnStore
 from replay.arrays.numeric import without_nan
-from replay.control.kinematics import low_pass, speed_ratios
+from replay.control.kinematics import low_pass
 from replay.machine.geometry import Geometry
 
 Array = NDArray[np.float64]
@@ -35,7 +35,7 @@ class ParityState:
 
 def parity_residuals(
     v: Array,
-    axle_angle: Array,
+    ratios: Array,
     wheel_angle: Array,
     geometry: Geometry,
     dt: float,
@@ -47,8 +47,10 @@ def parity_residuals(
     ----------
     v : Array, shape (n, wheels)
         Measured speeds [m/s].
-    axle_angle, wheel_angle : Array, shape (n, axles) and (n, wheels)
-        Measured steering angles [rad].
+    ratios : Array, shape (n, wheels)
+        Wheel speed per speed of the body [1], by the measured steering angles.
+    wheel_angle : Array, shape (n, wheels)
+        Measured wheel angles [rad].
     geometry : Geometry
         Places of the wheels.
     dt : float
@@ -61,7 +63,6 @@ def parity_residuals(
     Array, shape (n, wheels)
         Residuals [m/s], smoothed; NaN where a speed or an angle is missing.
     """
-    ratios = speed_ratios(axle_angle, geometry)
     if state is None:
         unknown = [np.nan] * v.shape[1]
         state = ParityState(list(unknown), [float(a) for a in wheel_angle[0]], list(unknown))
@@ -92,6 +93,7 @@ def slipping(
     v: Array,
     axle_angle: Array,
     axle_command: Array,
+    ratios: Array,
     wheel_angle: Array,
     geometry: Geometry,
     dt: float,
@@ -106,6 +108,8 @@ def slipping(
         Measured speeds [m/s] and wheel angles [rad].
     axle_angle, axle_command : Array, shape (n, axles)
         Measured and commanded angles [rad]; an angle that is further than 0.15 rad from its command is in doubt.
+    ratios : Array, shape (n, wheels)
+        Wheel speed per speed of the body [1], by the measured angles.
     geometry : Geometry
         Places of the wheels.
     dt : float
@@ -126,10 +130,10 @@ def slipping(
     out = store.column(np.bool_, v.shape[1:])
     for part in store.blocks(len(v)):
         angle = axle_angle[part]
-        residual = parity_residuals(v[part], angle, wheel_angle[part], geometry, dt, state)
+        residual = parity_residuals(v[part], ratios[part], wheel_angle[part], geometry, dt, state)
         limit = np.maximum(least, _SHARE * np.abs(without_nan(v[part])))
         doubtful = np.asarray((np.abs(angle - axle_command[part]) > _DOUBTFUL_ANGLE).any(axis=1))
         with np.errstate(invalid="ignore"):
             out.append((np.abs(residual) > limit) & ~doubtful[:, None])
-        release(v, axle_angle, axle_command, wheel_angle)
+        release(v, axle_angle, axle_command, ratios, wheel_angle)
     return out.finish()

@@ -13,7 +13,7 @@ from diagnosis.results.wheel_model import WheelModelFit
 from diagnosis.wheels.blocks import block_width
 from diagnosis.wheels.body import MeasuredBody, rolling_speeds
 from diagnosis.wheels.identification import identified, identify
-from diagnosis.wheels.motion import body_speeds, in_motion
+from diagnosis.wheels.motion import Motion, body_speeds
 from diagnosis.wheels.plant_windows import Drive
 from diagnosis.wheels.wheel_channels import WheelChannels
 from replay.arrays.blocks import block_means, release
@@ -32,7 +32,7 @@ def wheel_fit(
     replay: Replay,
     timeline: Timeline,
     machine: Machine,
-    angle: Array,
+    motion: Motion,
     body: MeasuredBody | None = None,
 ) -> WheelModelFit | None:
     """Wheel models of the machine file, or identified in this mission; None where nothing allows it.
@@ -41,8 +41,8 @@ def wheel_fit(
     ----------
     channels, replay, timeline, machine
         The mission.
-    angle : Array, shape (n, axles)
-        Best estimate of the axles' angles [rad].
+    motion : Motion
+        How wheels and body move together, by the best estimate of the axles' angles.
     body : MeasuredBody or None
         The body by its own sensors.
     """
@@ -50,7 +50,7 @@ def wheel_fit(
         return None
     given = {i: p for i, w in enumerate(machine.wheels) if (p := machine.plant.wheels.get(w)) is not None}
     if len(given) < len(machine.driven):
-        found = identified(wheel_drive(channels, replay, timeline, machine, angle, body), machine, given)
+        found = identified(wheel_drive(channels, replay, timeline, machine, motion, body), machine, given)
         if found is not None:
             return found
     width = min(block_width(timeline.dt), timeline.size)
@@ -72,19 +72,15 @@ def wheel_drive(
     replay: Replay,
     timeline: Timeline,
     machine: Machine,
-    angle: Array,
+    motion: Motion,
     body: MeasuredBody | None = None,
 ) -> Drive:
-    """Block means of all wheels for `diagnosis.wheels.plant_identification`; parameters as in `wheel_fit`.
-
-    `angle` of shape (n, axles) in rad.
-    """
+    """Block means of all wheels for `diagnosis.wheels.plant_identification`; parameters as in `wheel_fit`."""
     width = min(block_width(timeline.dt), timeline.size)
     means = partial(_means, timeline, width)
-    ratio, turn = in_motion(angle, machine, timeline)
     moving = _driving(channels, replay, timeline, width, machine.limits.driving_speed)
     y = means(np.asarray, channels.speed)
-    ratios, turns = means(np.asarray, ratio), means(np.asarray, turn)
+    ratios, turns = means(np.asarray, motion.ratio), means(np.asarray, motion.turn)
     rolls = body_speeds(y, ratios, turns)
     if body is not None and body.body.known:
         sensed, std = rolling_speeds(body, ratios, turns)

@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 
 
 def without_nan(x: NDArray[np.float64]) -> NDArray[np.float64]:
-    """NaN as 0; four times as fast as `numpy.nan_to_num`, which looks for infinities too. Both of one shape (n,)."""
-    return np.asarray(np.where(np.isnan(x), 0.0, x))
+    """NaN as 0, for reading: where there is none it is the same array, if compiled code takes it as it is. Both of one shape (n,)."""
+    missing = np.isnan(x)
+    return np.asarray(np.where(missing, 0.0, x)) if missing.any() or not x.flags.carray else x
 
 
 @intrinsic

@@ -135,17 +135,26 @@ def median_period(stamps: NDArray[np.int64]) -> int:
 
 
 class _Periods:
-    """Median periods, found once for signals that share their stamps."""
+    """Median periods, found once for signals that share their stamps or have the same ones."""
 
     def __init__(self) -> None:
         self._known: dict[tuple[int, int], int] = {}
+        self._seen: list[tuple[NDArray[np.int64], int]] = []
 
     def of(self, stamps: NDArray[np.int64]) -> int:
         key = (stamps.__array_interface__["data"][0], stamps.size)
         if key not in self._known:
-            self._known[key] = median_period(stamps)
+            period = next((period for other, period in self._seen if _same(stamps, other)), None)
+            if period is None:
+                period = median_period(stamps)
+                self._seen.append((stamps, period))
+            self._known[key] = period
             release(stamps)
         return self._known[key]
+
+
+def _same(a: NDArray[np.int64], b: NDArray[np.int64]) -> bool:
+    return a.size == b.size and all(np.array_equal(a[part], b[part]) for part in blocks(a.size))
 
 
 def align(signals: Signals, start_s: float | None = None, stop_s: float | None = None) -> Timeline:

@@ -8,7 +8,11 @@ from numpy.typing import NDArray
 
 from diagnosis.channels.sample_status import PAIR
 from diagnosis.direct.gain_spread import GainSpread, gain_windows, usual_spread
+from diagnosis.direct.identification import identify
 from diagnosis.estimation.samples import Samples
+from replay.faults import Side
+from replay.machine.config import Limits
+from tests.diagnosis.direct.test_assess import pair
 
 DT = 0.01
 
@@ -56,3 +60,15 @@ def test_what_one_channel_cannot_show_its_kind_does() -> None:
     share, size = usual_spread([steady, loose, faulty, None])
     assert (share, size) == (pytest.approx(1.6 * 0.02), 0.3)
     assert usual_spread([None, None]).share == 0.005
+
+
+def test_what_is_usual_of_a_kind_leaves_the_windows_of_a_pair_as_they_were() -> None:
+    rng = np.random.default_rng(3)
+    x = np.repeat(rng.uniform(-1.0, 1.0, 100), 100)
+    found = identify(pair(Side.ACTUATOR, x + rng.normal(0.0, 0.003, x.size), x), Limits())
+    own, usual = found.own_spread, GainSpread(0.05, 0.4)
+    told = found.with_kind_spread(usual)
+    assert told.kind_spread == usual
+    assert told._gains is found._gains
+    assert own is not None
+    assert told.own_spread == own

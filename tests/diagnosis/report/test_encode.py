@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from diagnosis.report.budget import Encodable, encode, spans_of
-from diagnosis.report.encode import Channel, Segment, levels_of, step_of
+from diagnosis.report.encode import Channel, Segment, _extremes, levels_of, step_of
 from diagnosis.results.result import Closeups
 
 
@@ -51,6 +51,16 @@ def test_column_without_any_sample() -> None:
 
 def test_values_off_the_stated_grid_use_half_of_it() -> None:
     assert step_of(np.array([0.0, 0.4, 0.9, 1.3]), 1.0) == 0.5
+
+
+@pytest.mark.parametrize("rows", [1, 6, 64])
+@pytest.mark.parametrize("size", [1, 63, 64, 65, 200, 1001])
+def test_extremes_are_those_of_every_block(size: int, rows: int) -> None:
+    values = np.random.default_rng(size).normal(size=size).astype(np.float32)
+    values[::3], values[-2:] = np.nan, [np.nan, 7.0][-min(size, 2) :]
+    cut = [values[i : i + rows] for i in range(0, size, rows)]
+    low, high = ([np.nan if np.isnan(x).all() else f(x) for x in cut] for f in (np.nanmin, np.nanmax))
+    np.testing.assert_array_equal(_extremes(values, rows), np.array([*low, *high], np.float32))
 
 
 def test_outlier_coarsens_the_step_instead_of_overflowing() -> None:

@@ -1,9 +1,10 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from diagnosis.report.compared_channels import pair_of
-from diagnosis.report.evidence_rows import small_stretches, untold_stretches
+from diagnosis.report.evidence_rows import _lowest, small_stretches, untold_stretches
 from diagnosis.report.plot_rows import course_rows, fault_rows, loop_groups
 from diagnosis.report.rows import derived
 from diagnosis.results.machine_words import HYDRAULIC
@@ -121,3 +122,10 @@ def test_what_is_most_probably_stuck_is_never_tinted_as_too_little_for_a_fault()
     columns |= {f"{base}p_stuck": stuck, f"{base}p_inefficient": 1.0 - stuck}
     assert untold_stretches(base, columns) == ((0.0, 2.0),)
     assert small_stretches(base, columns) == ((2.0, 4.0),)
+
+
+def test_the_axis_of_a_loss_ends_below_every_finite_one() -> None:
+    for least, end in ((0.2, -1.0), (-2.0, -2.2)):
+        losses = np.array([np.nan, least, 0.5])
+        assert _lowest(losses) == _lowest(np.append(losses, -np.inf)) == pytest.approx(end)
+    assert _lowest(None) == _lowest(np.full(3, np.nan)) == -1.0

@@ -58,9 +58,9 @@ def test_wheels_roll_as_the_simulated_body_makes_them() -> None:
     machine, timeline = haulotte(), align(signals(body=True))
     speeds, commands = (stack(timeline, [f"wheel.{w}.{x}" for w in machine.wheels]) for x in ("v", "v_ref"))
     angle = stack(timeline, [f"steer.{a}.phi" for a in machine.axles])
-    found = measured_body(timeline, machine, speeds, commands, angle)
+    motion = ratio, turn = in_motion(angle, machine, timeline)  # at 100 Hz a block is a sample
+    found = measured_body(timeline, machine, speeds, commands, angle, motion)
     assert found is not None
-    ratio, turn = in_motion(angle, machine, timeline)  # at 100 Hz a block is a sample
     rolls, std = rolling_speeds(found, ratio, turn)
     error = rolls - (mission().actual["body.v"][:, None] * ratio - turn)
     assert np.sqrt(np.mean(error**2)) < 0.04
@@ -74,8 +74,10 @@ def test_log_without_sensors_of_the_body_or_geometry_gives_none() -> None:
     machine, timeline = haulotte(), align(signals(body=False))
     speeds, commands = (stack(timeline, [f"wheel.{w}.{x}" for w in machine.wheels]) for x in ("v", "v_ref"))
     angle = stack(timeline, [f"steer.{a}.phi" for a in machine.axles])
-    assert measured_body(timeline, machine, speeds, commands, angle) is None
-    assert measured_body(align(signals(body=True)), replace(machine, geometry=None), speeds, commands, angle) is None
+    motion = in_motion(angle, machine, timeline)
+    assert measured_body(timeline, machine, speeds, commands, angle, motion) is None
+    other, timeline = replace(machine, geometry=None), align(signals(body=True))
+    assert measured_body(timeline, other, speeds, commands, angle, in_motion(angle, other, timeline)) is None
 
 
 def test_report_says_once_which_sensors_of_the_body_were_used() -> None:

@@ -222,3 +222,18 @@ def test_names_that_no_log_holds_are_said_where_no_wheel_is_found() -> None:
         LogError, match=r"wheel\.FR\.v: the machine file names 'velocity\[fr\]'.*similar.*correct its \[signals\]"
     ):
         align(Signals({}, missing))
+
+
+def test_signals_of_the_same_stamps_have_their_period_found_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each topic of a recording brings stamps of its own, though one computer sampled them all."""
+    found: list[np.ndarray] = []
+
+    def counted(stamps: np.ndarray) -> int:
+        found.append(stamps)
+        return median_period(stamps)
+
+    monkeypatch.setattr("replay.signals.timeline.median_period", counted)
+    names = ("wheel.FR.v", "wheel.FL.v", "wheel.FR.u")
+    got = align(signals(*(signal(name, every(1, 50)) for name in names), signal("cmd.v", every(2, 25))))
+    assert [s.size for s in found] == [50, 25]
+    assert got.periods_ns == {**dict.fromkeys(names, MS), "cmd.v": 2 * MS}
