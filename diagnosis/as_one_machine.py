@@ -12,6 +12,7 @@ from diagnosis.clearing.beside import (
     less_sure_beside_wrong_angles,
 )
 from diagnosis.clearing.contradicted import without_contradicted
+from diagnosis.clearing.dragged import less_sure_beside_backwards
 from diagnosis.clearing.made_by_axles import without_made_by_axles
 from diagnosis.clearing.nothing_moves import supply_gone
 from diagnosis.clearing.one_supply import less_sure_beside_supply
@@ -63,6 +64,7 @@ def _without_contradicted(judged: Judged) -> Judged:
     told = less_sure_beside_wrong_angles(told, judged.machine.wheels, judged.machine.axles)
     told = less_sure_beside_dead_valves(told, judged.machine.wheels, judged.found.words)
     told = less_sure_beside_dead_sensors(told, judged.machine.wheels, judged.found.words)
+    told = less_sure_beside_backwards(told, judged.cells, judged.found.words)
     if all(told[part] is a for part, a in judged.found.assessments.items()):
         return judged
     return replace(judged, found=replace(judged.found, assessments=told))
