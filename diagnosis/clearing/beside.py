@@ -149,7 +149,9 @@ def _less_sure(
 def _limited(f: Finding, why: str, *, made_up: bool) -> Finding:
     if not made_up:
         return limited(f, _MOST, why)
-    return not_worth_a_check(replace(f, evidence=tuple(text for text in f.evidence if text != why)), why)
+    fewer = replace(f, evidence=tuple(text for text in f.evidence if text != why))
+    less = not_worth_a_check(fewer, why)
+    return f if less is fewer else less
 
 
 def _partial_by_model(f: Finding) -> bool:
