@@ -113,7 +113,7 @@ def _settles(before: Array) -> bool:
     """Whether readings come nearer to the last one by ever smaller changes, shape (n,): those of a filter whose counts do not change."""
     change = np.abs(np.diff(before))
     last = change[change > 0.0][-_SMALLER:]
-    return last.size == _SMALLER and last[0] > 2.0 * last[-1] and bool(np.all(np.diff(last) <= 0.0))
+    return last.size == _SMALLER and bool(np.all(np.diff(last) < 0.0))
 
 
 def _usual(starts: NDArray[np.intp], stops: NDArray[np.intp], steps: int) -> float:

@@ -114,7 +114,9 @@ def less_sure_all_along(
 def not_starved(
     found: Mapping[str, Mapping[Side, SideFindings]], axles: Mapping[str, AxleFilter]
 ) -> dict[str, dict[Side, SideFindings]]:
-    """Findings by axle and side without losses of a sensor while another axle turns less than its valve gives, too: a want of oil.
+    """Findings by axle and side without losses of a sensor that another axle's has at the same time, or while another axle turns less than its valve gives.
+
+    That is a want of oil, or a motion that the model does not have.
 
     Parameters
     ----------
@@ -127,7 +129,11 @@ def not_starved(
     for name, sides in found.items():
         sensor, length = sides[Side.SENSOR], axles[name].blocks.length
         lost = [f for f in sensor.findings if f.mode is FaultMode.INEFFICIENT]
-        starved = [f for f in lost if _starved(name, span_of(f, length), axles)]
+        others = [f for k, of in found.items() if k != name for f in of[Side.SENSOR].findings]
+        dt = axles[name].blocks.dt / length
+        starved = [
+            f for f in lost if any(_together(f, g, dt) for g in others) or _starved(name, span_of(f, length), axles)
+        ]
         out[name] = {**sides, Side.SENSOR: sensor.left_open(starved, length)}
     return out
 

@@ -110,3 +110,16 @@ def test_a_loss_of_a_sensor_while_the_other_axle_lacks_motion_too_is_a_want_of_o
     sensor = out["rear"][Side.SENSOR]
     assert bool(sensor.findings) is kept
     assert sensor.unexplained == (() if kept else ((500, 800),))
+
+
+@pytest.mark.parametrize(("start", "kept"), [(1000, False), (1400, True)])
+def test_losses_of_two_sensors_at_once_are_no_fault_of_either_though_hardly_any_motion_is_asked_for(
+    start: int, *, kept: bool
+) -> None:
+    """Where nothing is asked of an axle, what it lacks is not known."""
+    one = sides(FaultMode.INEFFICIENT, 1000, 1600)[Side.ACTUATOR]
+    other = sides(FaultMode.INEFFICIENT, start, 1600 + 2 * (start - 1000))[Side.ACTUATOR]
+    found = {"front": {Side.SENSOR: one}, "rear": {Side.SENSOR: other}}
+    still = {name: axle(0.0, 0) for name in found}
+    out = not_starved(found, still)
+    assert [bool(out[name][Side.SENSOR].findings) for name in found] == [kept, kept]
