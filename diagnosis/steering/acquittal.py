@@ -133,7 +133,7 @@ def acquitted(
     kept, open_, refuted = [], list(found.unexplained), list(found.refuted)
     for f, (a, b) in zip(found.findings, spans, strict=True):
         shown = _shown(f, apart[a:b], by[a:b], limit[a:b], blocks.dt, believed=believed)
-        if shown or _frozen(f, found, inputs) or _shaken(f, found, blocks):
+        if shown or _frozen(f, found, inputs) or _shaken(f, found, inputs, blocks):
             kept.append(f)
         elif side is Side.ACTUATOR and _followed(f, apart[a:b], by[a:b], limit[a:b]):
             refuted.append((a, b))
@@ -214,11 +214,14 @@ def _frozen(finding: Finding, found: SideFindings, inputs: AxleInputs) -> bool:
     return restless >= _RESTLESS and float(np.mean(np.diff(inputs.angle[at]) != 0.0)) <= _FROZEN
 
 
-def _shaken(finding: Finding, found: SideFindings, blocks: SteeringBlocks) -> bool:
-    """Whether a sensor's readings change from one to the next far more than elsewhere in the mission: no axle moves like that."""
+def _shaken(finding: Finding, found: SideFindings, inputs: AxleInputs, blocks: SteeringBlocks) -> bool:
+    """Whether a sensor's readings change from one to the next far more than elsewhere in the mission: no axle moves like that.
+
+    Where they do so all through the mission, far more than a healthy sensor's may.
+    """
     if finding.side is not Side.SENSOR or finding.mode is not FaultMode.NOISY:
         return False
-    usual = usual_power(found, blocks)
+    usual = usual_power(found, blocks) or inputs.noise.white
     span = span_of(finding, blocks.length)
     known = bool((blocks.count[slice(*span)] > 0).any())
     return known and 0.0 < _FAR_MORE * usual < shaken_power(blocks, *span)

@@ -40,6 +40,7 @@ from diagnosis.steering.side_findings import SideFindings
 from diagnosis.steering.states import reasons_of, states_of
 from diagnosis.steering.together import less_sure_all_along, not_shaken_together, not_starved, not_together
 from diagnosis.steering.unexplained_size import size_words
+from diagnosis.steering.usual_noise import with_usual_noises
 from replay.arrays.processors import each
 from replay.control.loop import Replay
 from replay.faults import Side, State
@@ -113,6 +114,7 @@ def assess_steering(
     """
     timeline = with_news(timeline, machine)
     axles = _evened([axle_inputs(timeline, replay, machine, j, counts) for j in range(len(machine.axles))])
+    axles = with_usual_noises(axles, machine)
     axles, plants = _identified(axles, body_speed(timeline, machine, replay.v_ref), machine, progress)
     scatters = [
         scatter_of(a.blocks, plant) for a in axles if a.blocks is not None and (plant := plants.get(a.name)) is not None

@@ -273,16 +273,35 @@ def sensor_noise(blocks: SteeringBlocks, values: Array, known: Noise, stop: floa
     """
     lsb = known.lsb if known.lsb is not None else rounding_step(values)
     step = lsb * lsb / 12
+    found = noise_of(*noise_windows(blocks), step, lsb, stop)
+    return found if known.std is None else replace(found, white=max(known.std**2 + step, (1e-6 * stop) ** 2))
+
+
+def noise_of(powers: Array, samples: float, step: float, lsb: float, stop: float) -> SensorNoise:
+    """Noise of a sensor by its median window.
+
+    Parameters
+    ----------
+    powers, samples
+        As of `noise_windows`.
+    step, lsb : float
+        As of `SensorNoise`.
+    stop : float
+        Angle of the end stops [rad]; a millionth of it is the least noise.
+    """
+    white, spread = 0.0, 1.0
+    if powers.size >= 4:
+        low, middle, high = quantile_of(np.log(powers), (0.3, 0.5, 0.7))
+        white = float(np.exp(middle))
+        spread = (min(middle - low, high - middle) / 0.524) ** 2 - 2.0 / max(WHITE_DOF * samples, 1.0)
+    return SensorNoise(max(white, step, (1e-6 * stop) ** 2), float(max(spread, 0.003)), step, lsb)
+
+
+def noise_windows(blocks: SteeringBlocks) -> tuple[Array, float]:
+    """Power of the white part in windows that have some [rad²], shape (k,), and the samples of a usual window."""
     length = max(2, round(_WINDOW_S / blocks.dt))
     counts = window_means(blocks.count, length)
     powers = window_means(blocks.power * blocks.count, length) / np.maximum(counts, 1e-9)
     powers = powers[(powers > 0) & (counts > 0)]
-    white, spread = 0.0, 1.0
-    if powers.size >= 4:
-        low, middle, high = quantile_of(np.log(powers), (0.3, 0.5, 0.7))
-        samples = float(median_of(blocks.count[blocks.count > 0])) * length
-        white = float(np.exp(middle))
-        spread = (min(middle - low, high - middle) / 0.524) ** 2 - 2.0 / max(WHITE_DOF * samples, 1.0)
-    if known.std is not None:
-        white = known.std**2 + step
-    return SensorNoise(max(white, step, (1e-6 * stop) ** 2), float(max(spread, 0.003)), step, lsb)
+    samples = float(median_of(blocks.count[blocks.count > 0])) * length if powers.size else 0.0
+    return powers, samples

@@ -27,6 +27,10 @@ _LONG_S = 6.0  # from here on a finding gains nothing by being longer
 _NEAR_S = 1.0
 _OVERLAP = 0.2
 _ASKED, _PEAK = 0.01, 0.98  # of full opening: a command below this, but for its peaks, asks for nothing
+_KNOWN, _OBEYED = (
+    0.9,
+    0.02,
+)  # share of blocks with an opening, and how far from its command one lies that obeys, of full opening
 _MOVED_S = 0.3  # for which a command must move its axle
 _LEAST_TRAVEL = 0.03  # rad that a command must ask for: less is lost in a healthy dead band
 _LEAST = 0.6  # probability from which a finding is stated
@@ -75,6 +79,8 @@ def features_of(
 def commanded(valve: SideFindings, command: NDArray[np.float64], axle: AxleFilter) -> SideFindings:
     """The valve's findings without those of a valve that is said to give too little while hardly anything is asked of it.
 
+    An opening that is measured, and lies where its command is, refutes them; else they stay unexplained.
+
     Parameters
     ----------
     valve : SideFindings
@@ -86,7 +92,7 @@ def commanded(valve: SideFindings, command: NDArray[np.float64], axle: AxleFilte
         the command's jitter.
     """
     length, share = axle.blocks.length, axle.blocks.redundancy.share
-    kept, open_ = [], list(valve.unexplained)
+    kept, open_, refuted = [], list(valve.unexplained), list(valve.refuted)
     for f in valve.findings:
         asked = np.abs(command[f.start : f.stop])
         asked = asked[np.isfinite(asked)]
@@ -95,10 +101,18 @@ def commanded(valve: SideFindings, command: NDArray[np.float64], axle: AxleFilte
         jitter_tells = bool(np.isfinite(share[slice(*blocks)]).any())
         moved = jitter_tells or (moving(axle, *blocks)[2] >= _MOVED_S and _travel(axle, *blocks) >= _LEAST_TRAVEL)
         if lacks and not (asked.size and float(np.quantile(asked, _PEAK)) >= _ASKED and moved):
-            open_.append(blocks)
+            (refuted if _obeyed(axle, *blocks) else open_).append(blocks)
         else:
             kept.append(f)
-    return SideFindings(tuple(kept), tuple(open_))
+    return SideFindings(tuple(kept), tuple(open_), tuple(refuted))
+
+
+def _obeyed(axle: AxleFilter, start: int, stop: int) -> bool:
+    """Whether a valve's opening is measured all through blocks [start, stop), and but for its peaks lies where its command is."""
+    twice = axle.blocks.redundancy
+    apart = np.abs(twice.opening[start:stop] - twice.command[start:stop])
+    known = np.isfinite(apart)
+    return float(np.mean(known)) >= _KNOWN and float(np.quantile(apart[known], _PEAK)) <= _OBEYED
 
 
 def _travel(axle: AxleFilter, start: int, stop: int) -> float:
@@ -170,7 +184,7 @@ def paired(found: Mapping[Side, SideFindings]) -> dict[Side, SideFindings]:
             _as_usual(f, _PAIRED, _BESIDE) if not f.mode.total and _shared((f.start, f.stop), others) else f
             for f in one.findings
         )
-        out[side] = SideFindings(kept, one.unexplained)
+        out[side] = one._replace(findings=kept)
     return out
 
 

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -12,6 +15,7 @@ from diagnosis.wheels.body import with_body
 from diagnosis.wheels.filter import forward
 from diagnosis.wheels.inputs import WheelsData
 from diagnosis.wheels.models import JointModel, WheelFilterModel
+from replay.arrays.quantiles import median_of
 
 Array = NDArray[np.float64]
 
@@ -22,6 +26,10 @@ _TYRES = (0.027, 0.057, 0.114)  # slip at which a tyre transmits its largest loa
 _GRIP = 2.2  # where neither machine file nor mission shows it
 _DRIFT = 0.0101  # least process noise of the speed, of the span per √s
 _TRIAL_S = 60.0
+_SMALL_NOISE, _OTHERS = (
+    0.01,
+    5.0,
+)  # of the span, and times the usual noise of the other sensors: up to there it is a sensor's own
 
 
 def joint_model(data: WheelsData, blocks: WheelBlocks) -> tuple[JointModel, WheelBlocks]:
@@ -31,8 +39,9 @@ def joint_model(data: WheelsData, blocks: WheelBlocks) -> tuple[JointModel, Whee
     which they were seen.
     """
     blocks = with_body(blocks, data.body)
+    wheels = [None if p is None else filter_model(data, i) for i, p in enumerate(data.plants)]
     model = JointModel(
-        wheels=tuple(None if p is None else filter_model(data, i) for i, p in enumerate(data.plants)),
+        wheels=of_usual_noise(wheels, data),
         flow=data.flow,
         switch_cost=float(np.log(_MEAN_HEALTHY_S / blocks.dt * 12)),
     )
@@ -79,6 +88,29 @@ def filter_model(data: WheelsData, i: int) -> WheelFilterModel:
         grip=_GRIP if plant.grip is None else plant.grip,
         drift=max(_DRIFT * data.span, plant.wander or 0.0),
     )
+
+
+def of_usual_noise(wheels: Sequence[WheelFilterModel | None], data: WheelsData) -> tuple[WheelFilterModel | None, ...]:
+    """Wheels whose sensors have no more noise than a few times what is usual of the others; what is stated of them stays.
+
+    A sensor's noise is found over the whole mission, and so a fault that lasts as long would become it.
+
+    Parameters
+    ----------
+    wheels : Sequence[WheelFilterModel or None]
+        None where a wheel has no plant.
+    data : WheelsData
+        Of the mission: its span [m/s] and what the machine file states.
+    """
+    out = list(wheels)
+    for i, wheel in enumerate(wheels):
+        others = [w.noise for j, w in enumerate(wheels) if w is not None and j != i]
+        if wheel is None or not others or data.noise[i].std:
+            continue
+        most = max(_SMALL_NOISE * data.span, _OTHERS * float(median_of(others)))
+        if wheel.noise > most:
+            out[i] = replace(wheel, noise=most, constant_noise=min(wheel.constant_noise, most))
+    return tuple(out)
 
 
 def _coupled(blocks: WheelBlocks, model: JointModel, data: WheelsData) -> tuple[JointModel, WheelBlocks]:

@@ -196,6 +196,17 @@ def test_a_sensor_that_shakes_far_more_than_elsewhere_is_noisy_whatever_the_mode
     assert bool(found.findings) is named
 
 
+@pytest.mark.parametrize(("usual", "named"), [(0.01, True), (0.05, False)])
+def test_a_sensor_that_shakes_all_through_is_noisy_beyond_what_it_may_in_health(usual: float, named: bool) -> None:
+    u, angle = moved(0.0)
+    reading = angle + np.random.default_rng(8).normal(0.0, 0.1, SIZE)
+    noise = SimpleNamespace(white=usual**2)
+    inputs: Any = SimpleNamespace(angle_redundant=False, angle=reading, fresh=ALWAYS, noise=noise)
+    noisy = SideFindings((finding(Side.SENSOR, FaultMode.NOISY, 0, SIZE),), ())
+    found = acquitted(Side.SENSOR, noisy, inputs, blocks(u, reading), believed=False)
+    assert bool(found.findings) is named
+
+
 def test_an_opening_at_the_mean_of_a_command_that_switches_to_and_fro_is_not_stuck() -> None:
     """Slower than its command, a valve stands between the two; one that sticks elsewhere does not."""
     at = np.arange(SIZE) * DT

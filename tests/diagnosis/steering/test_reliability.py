@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,7 +13,7 @@ from numpy.testing import assert_allclose
 from diagnosis.results.assessment import Finding
 from diagnosis.results.result import Epsilon, Hypothesis
 from diagnosis.results.vocabulary import Tier
-from diagnosis.steering.reliability import features_of, lost_by_model, paired, told_from_none, weighed
+from diagnosis.steering.reliability import commanded, features_of, lost_by_model, paired, told_from_none, weighed
 from diagnosis.steering.side_findings import SideFindings
 from replay.faults import FaultMode, Side
 
@@ -129,3 +131,22 @@ def test_a_loss_that_its_own_bounds_do_not_tell_from_none_is_not_sure(low: float
     assert [f.probability for f in told.findings] == [probability, 0.98]
     assert told.unexplained == ((0, 3),)
     assert told_from_none({Side.ACTUATOR: SideFindings((finding(1.0, 2.0, FaultMode.INEFFICIENT),), ())})
+
+
+@pytest.mark.parametrize(
+    ("opening", "refuted"), [(0.004, True), (0.3, False), (np.nan, False)], ids=["obeys", "elsewhere", "unknown"]
+)
+def test_an_opening_where_its_command_is_refutes_a_dead_valve_of_which_nothing_is_asked(
+    opening: float, refuted: bool
+) -> None:
+    blocks, size = 400, 2000
+    twice = SimpleNamespace(opening=np.full(blocks, opening), command=np.zeros(blocks), share=np.full(blocks, np.nan))
+    noise = SimpleNamespace(white=1e-8, lsb=0.0)
+    axle: Any = SimpleNamespace(
+        blocks=SimpleNamespace(length=LENGTH, dt=DT * LENGTH, redundancy=twice, count=np.ones(blocks)),
+        driven=SimpleNamespace(command=np.zeros(blocks)),
+        model=SimpleNamespace(noise=noise, rate_error=1e-4, stop=0.5),
+    )
+    dead = SideFindings((finding(5.0, 15.0, FaultMode.NO_SIGNAL),), ())
+    found = commanded(dead, np.zeros(size), axle)
+    assert found == SideFindings((), () if refuted else ((100, 300),), ((100, 300),) if refuted else ())
