@@ -25,6 +25,7 @@ from diagnosis.wheels.findings import Weighed, WheelFindings, WheelPath, finding
 from diagnosis.wheels.following import Following, follow
 from diagnosis.wheels.frames.features import mission_features
 from diagnosis.wheels.frozen import with_frozen
+from diagnosis.wheels.goes_along import off_by_a_constant
 from diagnosis.wheels.inputs import WheelsData
 from diagnosis.wheels.looks import second_look
 from diagnosis.wheels.machine_held import or_machine_held
@@ -89,8 +90,9 @@ def assess_wheels(data: WheelsData, limits: Limits, *, gains: bool) -> WheelsJud
     told = or_machine_held(data, told)
     out = {}
     for i, path in paths.items():
-        claimed = as_claimed(told[i], limits.clear_at, measured=measured[i], swings=bool(swings.spans))
         expected: Array = np.asarray(per_sample(path.expected, path.width, path.y.size), dtype=np.float64)
+        shifted = off_by_a_constant(told[i], path.y, expected, data.dt, path.model.span, path.model.noise)
+        claimed = as_claimed(shifted, limits.clear_at, measured=measured[i], swings=bool(swings.spans))
         claimed = or_off(claimed, path.y, expected)
         sensor, actuator = _assessments(data, i, path, claimed, gains=gains)
         out[i] = sensor, actuator if measured[i] else replace(actuator, loss=losses[i])
