@@ -84,22 +84,26 @@ def assess_wheels(data: WheelsData, limits: Limits, *, gains: bool) -> WheelsJud
     }
     found = {i: with_open_side(path, findings_of(path, limits)) for i, path in paths.items()}
     swings = without_shared(paths, with_shaken(paths, found))
-    doubted = without_many_weak(with_frozen(data, swings.found))
+    shifted = {i: or_off(one, paths[i].y, _expected(paths[i])) for i, one in swings.found.items()}
+    doubted = without_many_weak(with_frozen(data, shifted))
     measured = {i: bool(data.measured[i]) for i in paths}
     told = or_standing(doubted.found, {i: path.y for i, path in paths.items()}, measured, data.dt)
     told = or_machine_held(data, told)
     out = {}
     for i, path in paths.items():
-        expected: Array = np.asarray(per_sample(path.expected, path.width, path.y.size), dtype=np.float64)
-        shifted = off_by_a_constant(told[i], path.y, expected, data.dt, path.model.span, path.model.noise)
-        claimed = as_claimed(shifted, limits.clear_at, measured=measured[i], swings=bool(swings.spans))
-        claimed = or_off(claimed, path.y, expected)
+        follows = off_by_a_constant(told[i], path.y, _expected(path), data.dt, path.model.span, path.model.noise)
+        claimed = as_claimed(follows, limits.clear_at, measured=measured[i], swings=bool(swings.spans))
         sensor, actuator = _assessments(data, i, path, claimed, gains=gains)
         out[i] = sensor, actuator if measured[i] else replace(actuator, loss=losses[i])
     events = ((Said(swings.sentence, swings.spans).event(swinging),) if swings.spans else ()) + (
         (foreign(doubted.sentence),) if doubted.wheels else ()
     )
     return WheelsJudged(out, events)
+
+
+def _expected(path: WheelPath) -> Array:
+    """What a healthy wheel would do [m/s], shape (n,)."""
+    return np.asarray(per_sample(path.expected, path.width, path.y.size), dtype=np.float64)
 
 
 def _losses(data: WheelsData, limits: Limits) -> list[Loss | None]:

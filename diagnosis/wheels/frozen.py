@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from diagnosis.channels.one_value import TURNS, Frozen, frozen_of, trembling
+from diagnosis.results.alike import SHIFTED_SENTENCE
 from diagnosis.results.assessment import Finding
 from diagnosis.results.plain_numbers import plain
 from diagnosis.results.result import Epsilon, Hypothesis, Sat
@@ -124,7 +125,8 @@ def _says_so(f: Finding, r: Frozen) -> bool:
 def _surer(f: Finding, frozen: Finding) -> Finding:
     """A finding with what its readings say; no less probable than that."""
     sure = f.probability >= frozen.probability
-    evidence = (*f.evidence, *frozen.evidence)
+    # off by a constant, it would go on to show its noise
+    evidence = (*(e for e in f.evidence if sure or e != SHIFTED_SENTENCE), *frozen.evidence)
     return replace(f if sure else replace(frozen, start=f.start, stop=f.stop, sat=f.sat), evidence=evidence)
 
 

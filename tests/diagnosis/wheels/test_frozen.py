@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from diagnosis.channels.one_value import frozen_of
+from diagnosis.results.alike import SHIFTED_SENTENCE
 from diagnosis.results.assessment import Finding
 from diagnosis.results.result import Hypothesis
 from diagnosis.results.vocabulary import Tier
@@ -77,6 +78,18 @@ def test_hardly_longer_than_its_habit_is_no_claim(others: tuple[int, ...], count
         y[3100 + 500 * k : 3100 + 500 * k + other, 0] = 0.9 + 0.05 * k
     told = found(y)
     assert sum(f.probability > 0.9 for f in told) == count
+
+
+def test_a_frozen_sensor_is_not_off_by_a_constant_instead() -> None:
+    y = speeds()
+    y[2_000:2_300, 0] = y[2_000, 0]
+    rows = tuple(Hypothesis("sensor", mode, p) for mode, p in ((FaultMode.STUCK, 0.58), (FaultMode.OUTSIDE_TABLE, 0.4)))
+    said = (SHIFTED_SENTENCE, "It is seen.")
+    halved = Finding(2_000, 2_300, Side.SENSOR, FaultMode.STUCK, 0.58, rows, None, None, said, Tier.SIGNAL)
+    (one,) = found(y, halved)
+    assert one.probability == pytest.approx(0.96)
+    assert SHIFTED_SENTENCE not in one.evidence
+    assert "It is seen." in one.evidence
 
 
 def test_coarse_readings_at_a_steady_speed_are_a_habit() -> None:
