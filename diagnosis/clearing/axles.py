@@ -21,6 +21,7 @@ from diagnosis.clearing.still import (
     still_frame,
 )
 from diagnosis.clearing.turned_as_read import turned_as_read
+from diagnosis.clearing.unsteered import unsteered
 from diagnosis.clearing.valves import valve_checks
 from diagnosis.results.clearing import Check, Checked
 from diagnosis.results.vocabulary import Kind
@@ -83,6 +84,7 @@ def axle_checks(cells: Cells, clear_at: float) -> Iterator[Checked]:
             yield Checked(*about, Side.SENSOR, Check.ANGLE_SCALE, None, clear_at)
         if (asked := commanded_angle(cells, j)).worst is not None:
             yield asked
+        yield unsteered(cells, j)
         if np.isfinite(command[:, j]).any():
             yield _still(cells, j, limit)
             twice = both[j]

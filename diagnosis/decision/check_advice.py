@@ -35,6 +35,8 @@ def act_of(check: Checked, twice: Collection[str]) -> str:
         )
     if check.check is Check.COMMANDED_ANGLE:
         return f"steer to both stops and straight ahead, and compare steer.{check.component}.phi in the log with what the loop reads and with a protractor"
+    if check.check is Check.UNSTEERED:
+        return "record a mission in which it is steered to both sides until shortly before the end"
     if check.check is Check.PLANT_RATE and check.worst is None:
         return (
             "run `mfhca fit` on healthy missions, and diagnose with the file that it writes (-m), or log "

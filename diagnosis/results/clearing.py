@@ -41,6 +41,7 @@ class Check(StrEnum):
     JUMP = "jump"
     ANGLE_SCALE = "angle_scale"
     COMMANDED_ANGLE = "commanded_angle"
+    UNSTEERED = "unsteered"
 
 
 #: What a check compares, and what is said where it is beyond its limit; ``{part}`` and ``{value}`` are filled in, and the
@@ -141,6 +142,10 @@ CHECK_WORDS: dict[Check, tuple[str, str]] = {
     Check.COMMANDED_ANGLE: (
         "angle against its command while the {valve} rests",
         "the angle of the {part} axle is {value} off its command while its {valve} is told to rest",
+    ),
+    Check.UNSTEERED: (
+        "share of the mission, up to its end, in which the axle is not steered",
+        "the {part} axle was not steered in the last {value} of the mission, so that a fault of its sensor or {valve} that began there would not show",
     ),
     Check.JUMP: (
         "jumps of the angle",
