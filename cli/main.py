@@ -181,6 +181,8 @@ def main() -> None:
     """Entry of the installed command."""
     # Products of two or three columns gain nothing from threads of the linear algebra, which spin while they wait.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    # Looking for plugins of pydantic reads what every installed package says of itself.
+    os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
     collect_little()
     for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
         if getattr(sys, name) is None:  # closed by the caller

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Sequence
-from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -22,6 +21,8 @@ _STDOUT = Path("-")
 
 def starter() -> str:
     """Commented machine file with every key, its unit and default."""
+    from importlib import resources
+
     return resources.files("cli.commands").joinpath("starter.toml").read_text(encoding="utf-8")
 
 

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
-from diagnosis.drives.assess import assess_drive
-from diagnosis.drives.inputs import DriveData, drive_data
 from diagnosis.evidence import ACTUATOR, SENSOR, Contribution, MissionView, Part
 from diagnosis.results.assessment import Assessment, Lack, unassessed
 from diagnosis.results.vocabulary import Tier
 from replay.faults import State
+
+if TYPE_CHECKING:
+    from diagnosis.drives.inputs import DriveData
 
 
 class DriveEvidence:
@@ -29,6 +32,8 @@ class DriveEvidence:
                 why = "no model of the {wheels} could be found in this mission"
                 both = (unassessed(mission.timeline.size, State.NOT_ASSESSED, why, Lack.ANSWER),) * 2
             else:
+                from diagnosis.drives.assess import assess_drive  # not loaded where nothing is left to judge
+
                 both = assess_drive(drive, mission.machine.limits)
             parts[wheel, SENSOR], parts[wheel, ACTUATOR] = both
         return Contribution(parts)
@@ -47,4 +52,6 @@ def _alone(mission: MissionView) -> list[str]:
 
 
 def _drive(mission: MissionView, wheel: str) -> DriveData | None:
+    from diagnosis.drives.inputs import drive_data
+
     return drive_data(mission.timeline, mission.command(wheel), mission.machine, wheel, mission.alive)

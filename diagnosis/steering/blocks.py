@@ -283,7 +283,7 @@ def noise_of(powers: Array, samples: float, step: float, lsb: float, stop: float
     Parameters
     ----------
     powers, samples
-        As of `noise_windows`.
+        As of `noise_windows`: powers in rad², shape (k,).
     step, lsb : float
         As of `SensorNoise`.
     stop : float

@@ -7,12 +7,7 @@ from dataclasses import replace
 from diagnosis.evidence import ACTUATOR, SENSOR, Contribution, MissionView, Part
 from diagnosis.results.assessment import Assessment
 from diagnosis.results.vocabulary import Tier
-from diagnosis.wheels.assess import assess_wheels
-from diagnosis.wheels.body import measured_body
-from diagnosis.wheels.inputs import wheels_data
-from diagnosis.wheels.motion import MOST_AGAINST, against_command, in_motion, slip_of
 from diagnosis.wheels.wheel_channels import WheelChannels, wheel_channels
-from diagnosis.wheels.wheel_fit import wheel_fit
 from replay.progress import Progress, Stage
 
 
@@ -31,6 +26,13 @@ class WheelEvidence:
         mission.progress(Progress(Stage.IDENTIFYING_WHEELS))
         if mission.angle is None or mission.doubtful is None:
             return Contribution({})
+        # a wheel model is not loaded for missions in which all is measured twice
+        from diagnosis.wheels.assess import assess_wheels
+        from diagnosis.wheels.body import measured_body
+        from diagnosis.wheels.inputs import wheels_data
+        from diagnosis.wheels.motion import MOST_AGAINST, against_command, in_motion, slip_of
+        from diagnosis.wheels.wheel_fit import wheel_fit
+
         motion = in_motion(mission.angle, machine, timeline)
         body = measured_body(timeline, machine, channels.speed, replay.v_ref, mission.angle, motion)
         fit = wheel_fit(channels, replay, timeline, machine, motion, body)

@@ -6,7 +6,6 @@ import re
 from datetime import UTC, datetime, timedelta, timezone, tzinfo
 from functools import lru_cache
 from typing import TYPE_CHECKING
-from zoneinfo import ZoneInfo, ZoneInfoNotFoundError
 
 from replay.errors import ConfigError
 
@@ -39,6 +38,8 @@ def zone_called(name: str) -> tzinfo:
     if found := _OFFSET.fullmatch(name):
         ahead = timedelta(hours=int(found[2]), minutes=int(found[3]))
         return timezone(ahead if found[1] == "+" else -ahead)
+    from zoneinfo import ZoneInfo, ZoneInfoNotFoundError  # hardly a log is in such a zone
+
     try:
         return ZoneInfo(name)
     except (ZoneInfoNotFoundError, ValueError, OSError) as error:

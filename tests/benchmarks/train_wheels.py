@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 from structures import Task, options_of
 from variation import recorded_signals, varied_options
 
-import diagnosis.wheels.family as wheel_family
+import diagnosis.wheels.assess as wheel_assess
 from diagnosis.pipeline import diagnose_mission
 from diagnosis.wheels.blocks import blocks_of
 from diagnosis.wheels.filter_identification import joint_model
@@ -140,14 +140,14 @@ def features_of(kind: str, seed: int, options: SimulationOptions, evidence: str)
     signals = (signals_of if kind == "own" else recorded_signals)(mission, evidence)
     machine = haulotte()
     machine = replace(machine, control=replace(machine.control, law="none"))  # which is of no use here, and takes time
-    judge, wheel_family.assess_wheels = wheel_family.assess_wheels, _capture
+    judge, wheel_assess.assess_wheels = wheel_assess.assess_wheels, _capture
     try:
         diagnose_mission(Mission(files=(), signals=signals, timeline=align(signals)), machine)
         raise MfhcaError("no wheel has a model")
     except _Captured as captured:
         found = captured
     finally:
-        wheel_family.assess_wheels = judge
+        wheel_assess.assess_wheels = judge
     data, rng = found.data, np.random.default_rng([seed, 5])
     if kind != "own" and rng.random() < _WITHOUT_REFERENCE:
         data = replace(data, reference=np.full_like(data.reference, np.nan))

@@ -163,7 +163,7 @@ def test_version(capsys: pytest.CaptureFixture[str]) -> None:
 
 
 def test_heavy_libraries_are_not_imported_for_help() -> None:
-    heavy = "{'numpy', 'pandas', 'pyarrow', 'numba', 'plotly', 'scipy', 'mcap', 'rosbags'}"
+    heavy = "{'numpy', 'pandas', 'pyarrow', 'numba', 'plotly', 'scipy', 'mcap', 'rosbags', 'zoneinfo'}"
     code = f"import cli.main, sys; sys.exit(' '.join({heavy} & set(sys.modules)) or 0)"
     done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stderr) == (0, "")

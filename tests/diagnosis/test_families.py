@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from types import SimpleNamespace
 from typing import Any, cast
 
@@ -35,3 +37,10 @@ def test_what_is_asked_first(changes: dict[str, Any], first: Tier) -> None:
             cast(MissionView, SimpleNamespace(machine=SimpleNamespace(drive="auto", axles=(), wheels=()), command=None))
         )
     }
+
+
+def test_models_that_may_have_nothing_to_judge_are_not_loaded_with_the_tables() -> None:
+    models = "{'diagnosis.wheels.assess', 'diagnosis.wheels.wheel_fit', 'diagnosis.drives.assess'}"
+    code = f"import diagnosis.families, sys; sys.exit(' '.join({models} & set(sys.modules)) or 0)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
