@@ -66,6 +66,8 @@ class Reservations:
         Whether no command of any wheel is in the log.
     twice : frozenset[Part]
         Parts of which a second measurement is in the log.
+    rarely_sent : tuple[str, str]
+        Commands that may be published on change alone, and what to do then; empty where none is.
     """
 
     short: tuple[Part, ...] = ()
@@ -83,6 +85,7 @@ class Reservations:
     open_state: Mapping[Part, State] = field(default_factory=dict)
     uncommanded: bool = False
     twice: frozenset[Part] = frozenset()
+    rarely_sent: tuple[str, str] = ("", "")
 
 
 def smallest_loads(assessments: Mapping[Part, Assessment], words: MachineWords) -> tuple[str, ...]:

@@ -82,6 +82,7 @@ def decide(
     shown: Sequence[Detectable] = (),
     end_s: float | None = None,
     commanded: bool = True,
+    rarely_sent: tuple[str, str] = ("", ""),
 ) -> Decision:
     """Give the verdict.
 
@@ -129,6 +130,8 @@ def decide(
         End of the log [s]; None: not known.
     commanded : bool
         Whether any command of the wheels is in the log.
+    rarely_sent : tuple[str, str]
+        Commands that may be published on change alone, and what to do then.
     """
     driven = driving_s or {}
     against = _reservations(assessments, decided_s, driven, axles, limits, damage, model)
@@ -145,6 +148,7 @@ def decide(
         open_state=open_state or {},
         uncommanded=not commanded,
         twice=frozenset(twice),
+        rarely_sent=rarely_sent,
     )
     open_points = to_clear(against, assessments, decided_s, driven, axles, limits, intervals)
     found = _with_faults(intervals, against, endings_of(intervals, assessments, end_s)) or _without_faults(

@@ -61,6 +61,9 @@ def to_clear(
                 "in the machine file if they were recorded under another name",
             )
         )
+    if against.rarely_sent[0] and (against.short or any(cut.kind is CutKind.DATA for cut in against.scope)):
+        said, act = against.rarely_sent
+        out.append(ToClear(f"{said}.", f"{act}, and diagnose again; else record them all the time"))
     cut = [cut.text for cut in against.scope if cut.kind in (CutKind.LOG, CutKind.WHEELS)]
     if cut:
         out.append(
