@@ -29,6 +29,7 @@ from replay.setup.preset import Preset
 from replay.setup.read import options_of
 from replay.setup.robot_description import RobotDescription, parse_description
 from replay.setup.structure import (
+    IN_ROWS,
     ONE,
     Structure,
     described_structure,
@@ -109,6 +110,12 @@ def draft_machine(logs: Sequence[RawLog], preset: Preset | None = None) -> Draft
     draft.say("machine", f"{many}, from {structure.how}.")
     for doubt in doubts:
         draft.ask("geometry", doubt)
+    if structure.how.endswith(IN_ROWS):
+        draft.ask(
+            "geometry",
+            f"is the axle of {structure.wheels[0]} in front, and is each name a wheel of its own? Numbers tell an order alone; else turn the "
+            "signs of x, and front and rear.",
+        )
     if preset is Preset.HAULOTTE:
         return _haulotte_draft(draft, logs)
     empty = unfilled(channels)
