@@ -341,6 +341,9 @@ def _healthy(assessments: Mapping[Part, Assessment], axles: Sequence[str], least
     """What was judged healthy, a sentence with words of the machine in braces: wheels without a drive have a sensor alone."""
     wheels = list(dict.fromkeys(c for c, _ in assessments if c not in axles))
     free = [w for w in wheels if (w, Side.ACTUATOR.value) not in assessments]
+    if len(wheels) == 1:
+        both = "The {wheel.sensor}" if free else "The {wheel.sensor} and the {wheel.actuator}"
+        return f"{both} {'was' if free else 'were'} judged healthy over at least {least_s:.0f} s of {{moving}}."
     both = "The {wheel.sensor} and the {wheel.actuator} of every {wheel}"
     if free:
         has = "has" if len(free) == 1 else "have"

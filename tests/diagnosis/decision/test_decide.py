@@ -47,6 +47,21 @@ def test_healthy_machine_is_ready() -> None:
 
 
 @pytest.mark.parametrize(
+    ("sides", "said"),
+    [
+        (
+            ("sensor", "actuator"),
+            "The speed sensor and the drive valve were judged healthy over at least 20 s of driving.",
+        ),
+        (("sensor",), "The speed sensor was judged healthy over at least 20 s of driving."),
+    ],
+)
+def test_one_wheel_is_not_every_wheel(sides: tuple[str, ...], said: str) -> None:
+    one = {part: a for part, a in machine().items() if part[0] == "FR" and part[1] in sides}
+    assert verdict(one).text.startswith(said)
+
+
+@pytest.mark.parametrize(
     ("part", "expected"),
     [
         (finding(Side.ACTUATOR, FaultMode.STUCK), "stop"),
