@@ -40,6 +40,7 @@ from replay.machine.unpowered import is_contradicted
 from replay.mission import Mission
 from replay.setup.places import place_doubts
 from replay.signals.like_wheels import WHICH
+from replay.signals.publishing import on_change_hint_in
 from replay.signals.unit_conflicts import unit_conflict
 from replay.version import __version__
 
@@ -240,6 +241,7 @@ def _decision(
         shown=judged.detectable.rows,
         end_s=judged.mission.timeline.size * judged.mission.timeline.dt,
         commanded=is_commanded(judged.mission.signals.items, judged.machine.wheels),
+        rarely_sent=on_change_hint_in(judged.mission.signals.notes),
     )
 
 

@@ -22,7 +22,8 @@ Gap = tuple[int, int]
 
 def recording_gaps(timeline: Timeline) -> list[Gap]:
     """Steps [start, stop) between two samples of any signal that are too far apart to be its rhythm."""
-    slow = [p for n, p in timeline.periods_ns.items() if n.startswith(("wheel.", "steer.")) and p > 0]
+    regular = {n: p for n, p in timeline.periods_ns.items() if n not in timeline.stands}
+    slow = [p for n, p in regular.items() if n.startswith(("wheel.", "steer.")) and p > 0]
     least = max(round(_LEAST_S / timeline.dt), _PERIODS * max(slow, default=0) // timeline.step_ns, 2)
     fresh = list(timeline.fresh.values())
     if not fresh:

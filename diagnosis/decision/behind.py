@@ -54,6 +54,8 @@ def behind_drives(
     seen = {w: x for w, x in shows.items() if x < _MOST}
     behind = "gear, brake" if words.drive == "motor" else "motor, gear, brake"
     part = f"Behind {words.drive}s that do as they are told ({behind})"
+    if not seen and len(wheels) == 1:
+        return (f"Behind a {words.drive} that does as it is told ({behind}) a loss may not show in the speed.",)
     if not seen:
         return (words.fill(f"{part} a loss may not show in the speeds, least of all one that all {{wheels}} share."),)
     least = f"{part} a loss of one {{wheel}} over the whole mission shows from {100 * max(seen.values()):.0f} % on"

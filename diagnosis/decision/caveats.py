@@ -66,6 +66,8 @@ class Reservations:
         Whether no command of any wheel is in the log.
     twice : frozenset[Part]
         Parts of which a second measurement is in the log.
+    rarely_sent : tuple[str, str]
+        Commands that may be published on change alone, and what to do then; empty where none is.
     """
 
     short: tuple[Part, ...] = ()
@@ -83,6 +85,7 @@ class Reservations:
     open_state: Mapping[Part, State] = field(default_factory=dict)
     uncommanded: bool = False
     twice: frozenset[Part] = frozenset()
+    rarely_sent: tuple[str, str] = ("", "")
 
 
 def smallest_loads(assessments: Mapping[Part, Assessment], words: MachineWords) -> tuple[str, ...]:
@@ -161,10 +164,11 @@ def doubt_of(watch: Sequence[FaultInterval], against: Reservations) -> str:
     out = list(dict.fromkeys(doubt for _, doubt in by_part.values()))
     if against.damage:
         out.append("part of the log was left out" if is_left_out(against.damage[0]) else "the log is damaged")
-    silent = len(against.silent)
-    for n, how in ((silent, "not judged"), (len(against.short) - silent, "not judged long enough")):
+    short = short_beside(watch, against)
+    silent = sum(part in against.silent for part in short)
+    for n, how in ((silent, "not judged"), (len(short) - silent, "not judged long enough")):
         if n:
-            out.append(f"{count_words(n, 'part')} {'was' if n == 1 else 'were'} {how}")
+            out.append(f"{count_words(n, f'{against.words.part} part')} {'was' if n == 1 else 'were'} {how}")
     if against.unexplained:
         out.append("a residual is not explained by any fault")
     if against.not_compared:
@@ -183,6 +187,15 @@ def doubt_of(watch: Sequence[FaultInterval], against: Reservations) -> str:
         others = join_words(list(dict.fromkeys(c.component for c in against.open)))
         out.append(f"beside a fault nothing shows whether {others} {'are' if ' and ' in others else 'is'} healthy")
     return join_words(out[:_REASONS]) + (MORE if len(out) > _REASONS else "")
+
+
+def short_beside(faults: Sequence[FaultInterval], against: Reservations) -> tuple[Part, ...]:
+    """Parts of wheels that were not judged long enough, without those that are faulty: of these the fault is what is to be checked.
+
+    All of them where only faulty ones were judged too briefly.
+    """
+    blamed = {(f.component, s.value) for f in faults if f.severity is not Severity.INFO for s in f.side.sides}
+    return tuple(p for p in against.short if p not in blamed) or against.short
 
 
 def _most(fault: FaultInterval) -> float:

@@ -82,6 +82,7 @@ def decide(
     shown: Sequence[Detectable] = (),
     end_s: float | None = None,
     commanded: bool = True,
+    rarely_sent: tuple[str, str] = ("", ""),
 ) -> Decision:
     """Give the verdict.
 
@@ -129,6 +130,8 @@ def decide(
         End of the log [s]; None: not known.
     commanded : bool
         Whether any command of the wheels is in the log.
+    rarely_sent : tuple[str, str]
+        Commands that may be published on change alone, and what to do then.
     """
     driven = driving_s or {}
     against = _reservations(assessments, decided_s, driven, axles, limits, damage, model)
@@ -145,6 +148,7 @@ def decide(
         open_state=open_state or {},
         uncommanded=not commanded,
         twice=frozenset(twice),
+        rarely_sent=rarely_sent,
     )
     open_points = to_clear(against, assessments, decided_s, driven, axles, limits, intervals)
     found = _with_faults(intervals, against, endings_of(intervals, assessments, end_s)) or _without_faults(
@@ -337,6 +341,9 @@ def _healthy(assessments: Mapping[Part, Assessment], axles: Sequence[str], least
     """What was judged healthy, a sentence with words of the machine in braces: wheels without a drive have a sensor alone."""
     wheels = list(dict.fromkeys(c for c, _ in assessments if c not in axles))
     free = [w for w in wheels if (w, Side.ACTUATOR.value) not in assessments]
+    if len(wheels) == 1:
+        both = "The {wheel.sensor}" if free else "The {wheel.sensor} and the {wheel.actuator}"
+        return f"{both} {'was' if free else 'were'} judged healthy over at least {least_s:.0f} s of {{moving}}."
     both = "The {wheel.sensor} and the {wheel.actuator} of every {wheel}"
     if free:
         has = "has" if len(free) == 1 else "have"

@@ -49,6 +49,13 @@ def more_caveats(mission: Mission, first_ns: int, machine: Machine) -> list[str]
         )
     if offset := offset_at_rest(mission.timeline, machine):
         out.append(offset)
+    stand = {n: s for n, s in mission.timeline.stands.items() if mission.signals.items[n].origin.on_change}
+    if stand:
+        most = max(stand, key=stand.__getitem__)
+        out.append(
+            f"Commands that are published on change, as the machine file says, count until the next one, here for up to {stand[most]:.1f} s "
+            f"({most}). One whose sender fell silent looks the same, unless those of the other wheels go on."
+        )
     if machine.questions:
         out.append(
             f"The machine file still asks: {' '.join(q[:1].upper() + q[1:] for q in machine.questions)} Answer there, and delete the lines marked QUESTION."

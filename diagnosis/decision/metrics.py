@@ -34,12 +34,14 @@ _RESTS = STATES.index(State.NOT_EXCITED)
 
 
 def driving(replay: Replay, timeline: Timeline, machine: Machine) -> NDArray[np.bool_]:
-    """|v_c,i| above the driving speed, shape (n, wheels); the measured speed stands in where nothing is commanded."""
-    commanded = any_finite(replay.v_ref)
+    """|v_c,i| above the driving speed, shape (n, wheels); the measured speed stands in where and while nothing is commanded.
+
+    A wheel whose command is lost goes on driving: what is not judged then is missing from its driving.
+    """
     limit = machine.limits.driving_speed
-    v = replay.v_ref if commanded.all() else stack(timeline, [f"wheel.{w}.v" for w in machine.wheels])
+    v = stack(timeline, [f"wheel.{w}.v" for w in machine.wheels])
     with np.errstate(invalid="ignore"):
-        return timeline.map(lambda ref, y: np.abs(np.where(commanded, ref, y)) > limit, replay.v_ref, v)
+        return timeline.map(lambda ref, y: np.abs(np.where(np.isnan(ref), y, ref)) > limit, replay.v_ref, v)
 
 
 def loop_metrics(timeline: Timeline, replay: Replay, machine: Machine, moving: NDArray[np.bool_]) -> MetricsRow:

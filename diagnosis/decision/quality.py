@@ -128,7 +128,7 @@ def checks(
             else _row("Damage", text, "lost data are not assessed; a damaged log does not get “ready”", False)
             for text in damage
         ),
-        _gap_check(found.rows),
+        _gap_check([row for row in found.rows if row["name"] not in timeline.stands]),
         *_guessed(signals),
         *([_row("Scale of speeds", *scale.result)] if scale is not None else []),
         *(_row("Places of wheels", f"{text}.", "the wrong part may be blamed", False) for text in misplaced),
@@ -234,11 +234,12 @@ def clock_row(clock: SourceClock | None) -> ClockRow | None:
 
 
 def _jitter_ms(signals: Signals, timeline: Timeline) -> float:
-    """99 % quantile of |stamp step − period| over the wheel signals [ms]."""
+    """99 % quantile of |stamp step − period| over the wheel signals that come regularly [ms]."""
     out, seen = 0.0, set()
     for name, signal in signals.items.items():
         period, place = timeline.periods_ns[name], signal.stamps.__array_interface__["data"][0]
-        if name.startswith("wheel.") and 0 < period < 2 * timeline.step_ns and signal.stamps.size > 2:
+        regular = name.startswith("wheel.") and name not in timeline.stands
+        if regular and 0 < period < 2 * timeline.step_ns and signal.stamps.size > 2:
             if place not in seen:
                 out = max(out, float(quantile_of(np.abs(np.diff(signal.stamps) - period), 0.99)) * 1e-6)
                 release(signal.stamps)

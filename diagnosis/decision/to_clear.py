@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 
-from diagnosis.decision.caveats import Reservations, doubts_of
+from diagnosis.decision.caveats import Reservations, doubts_of, short_beside
 from diagnosis.decision.check_advice import COMPARE, STEER, TURNED, act_of
 from diagnosis.decision.explained import Explanation, explaining
 from diagnosis.decision.open_checks import furthest_first
@@ -18,7 +18,7 @@ from diagnosis.results.clearing import Check, Checked
 from diagnosis.results.left_out import by_its_clock, is_left_out
 from diagnosis.results.machine_words import MachineWords
 from diagnosis.results.result import FaultInterval
-from diagnosis.results.vocabulary import Kind, Severity, Tier
+from diagnosis.results.vocabulary import Kind, Tier
 from replay.faults import Side, State
 from replay.machine.config import Limits
 
@@ -61,6 +61,9 @@ def to_clear(
                 "in the machine file if they were recorded under another name",
             )
         )
+    if against.rarely_sent[0] and (against.short or any(cut.kind is CutKind.DATA for cut in against.scope)):
+        said, act = against.rarely_sent
+        out.append(ToClear(f"{said}.", f"{act}, and diagnose again; else record them all the time"))
     cut = [cut.text for cut in against.scope if cut.kind in (CutKind.LOG, CutKind.WHEELS)]
     if cut:
         out.append(
@@ -71,9 +74,7 @@ def to_clear(
         )
     out += [ToClear(event.text, event.act) for event in against.events]
     out += [ToClear(text, "correct [signals] in a machine file, and diagnose again") for text in against.hints]
-    blamed_parts = {(f.component, s.value) for f in faults if f.severity is not Severity.INFO for s in f.side.sides}
-    # of a faulty part the fault is what is to be checked, unless it was judged too briefly alone
-    short = [p for p in against.short if p not in blamed_parts] or against.short
+    short = short_beside(faults, against)
     out += short_parts(short, assessments, decided_s, driven, limits, words, open_state=against.open_state)
     twice = against.twice | {part for part, a in assessments.items() if a.tier is Tier.DIRECT}
     if against.unexplained:

@@ -33,7 +33,7 @@ class Pair:
         Measured value and reference, SI; NaN where not valid.
     fresh : NDArray[np.bool_], shape (n,)
         Steps with a new sample of y; where x comes at less than half of y's rate, those of them at which x is new too: what
-        x was in between is not known.
+        x was in between is not known, unless it is a command that stands.
     alive : NDArray[np.bool_], shape (n,)
         Whether another channel of y's source delivers.
     quiet : NDArray[np.bool_], shape (n,)
@@ -114,7 +114,9 @@ def make_pair(
         side=side,
         y=y,
         x=x,
-        fresh=_beside(timeline.fresh[y_name], timeline.fresh[x_name]),
+        fresh=timeline.fresh[y_name]
+        if x_name in timeline.stands
+        else _beside(timeline.fresh[y_name], timeline.fresh[x_name]),
         alive=alive(timeline, counts, y_name),
         quiet=quiet,
         dt=timeline.dt,

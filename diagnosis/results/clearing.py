@@ -230,6 +230,7 @@ class Checked:
     def _value(self) -> str:
         assert self.worst is not None
         size = size_words(self.check, self.worst)
+        size = "less than 1 %" if size == "0 %" else size  # "0 % below" says nothing
         if self.check is Check.STILL:
             return size.removesuffix(" %")
         side = " below" if self.check in _BELOW else " above" if self.check in _ABOVE and size.endswith("%") else ""

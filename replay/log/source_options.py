@@ -79,7 +79,7 @@ class SignalSource:
     """Where a canonical signal is recorded, and how it becomes SI.
 
     SI value = (recorded · gain + offset) · factor(unit). Either `topic` with `field`, or `symbol` (TwinCAT), or
-    `column` (table).
+    `column` (table). `on_change`: its sender publishes it only when it changes (`replay.signals.publishing`).
     """
 
     topic: str | None = None
@@ -92,6 +92,7 @@ class SignalSource:
     derivative: bool = False
     at: Literal["motor", "wheel"] = "wheel"
     source: str | None = None
+    on_change: bool = False
 
     @property
     def label(self) -> str:

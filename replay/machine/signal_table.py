@@ -217,6 +217,20 @@ def find_signal(name: str) -> CanonicalSignal | None:
     return entry
 
 
+def is_asked(name: str) -> bool:
+    """Whether a signal is a command or a reference: what is asked, which a sender may publish on change alone."""
+    entry = find_signal(name)
+    return entry is not None and (entry.group == "cmd" or entry.leaf in ("v_ref", "phi_ref", "u"))
+
+
+def check_asked(name: str) -> None:
+    """Raise `ConfigError` where a signal that is to be published on change is no command or reference."""
+    if not is_asked(name):
+        raise ConfigError(
+            f"[signals] {name!r}: on_change is for what is asked (cmd.*, v_ref, phi_ref, u); a measurement that does not come is none"
+        )
+
+
 def signal_of(name: str) -> CanonicalSignal:
     """Entry of a name.
 

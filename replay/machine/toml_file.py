@@ -20,6 +20,7 @@ from replay.machine.effort_model import effort_from_table
 from replay.machine.geometry import Geometry, WheelGeometry, four_wheel_geometry, own_axle
 from replay.machine.quantities import UNITS
 from replay.machine.questions import questions_of
+from replay.machine.signal_table import check_asked
 from replay.machine.units import known_unit, si_factor
 from replay.machine.unpowered import unpowered_of
 from replay.toml_text import MAX_BYTES, TomlError, parse_toml
@@ -270,6 +271,8 @@ def _signal(name: str, value: Any) -> SignalSource:
         raise ConfigError(f"{section} needs exactly one of topic with field, symbol, or column")
     if source.at not in ("motor", "wheel"):
         raise ConfigError(f"{section}: at = {source.at!r} is not known; expected motor or wheel")
+    if source.on_change:
+        check_asked(name)
     return source
 
 

@@ -29,6 +29,7 @@ from replay.setup.preset import Preset
 from replay.setup.read import options_of
 from replay.setup.robot_description import RobotDescription, parse_description
 from replay.setup.structure import (
+    IN_ROWS,
     ONE,
     Structure,
     described_structure,
@@ -46,6 +47,7 @@ from replay.signals.file_names import named_channels
 from replay.signals.like_wheels import like_wheels
 from replay.signals.mapping import by_number, map_signals
 from replay.signals.possible_commands import possible_commands
+from replay.signals.publishing import on_change_hint
 from replay.signals.signal import Signals
 from replay.signals.unfilled import unfilled, unfilled_note
 
@@ -108,6 +110,12 @@ def draft_machine(logs: Sequence[RawLog], preset: Preset | None = None) -> Draft
     draft.say("machine", f"{many}, from {structure.how}.")
     for doubt in doubts:
         draft.ask("geometry", doubt)
+    if structure.how.endswith(IN_ROWS):
+        draft.ask(
+            "geometry",
+            f"is the axle of {structure.wheels[0]} in front, and is each name a wheel of its own? Numbers tell an order alone; else turn the "
+            "signs of x, and front and rear.",
+        )
     if preset is Preset.HAULOTTE:
         return _haulotte_draft(draft, logs)
     empty = unfilled(channels)
@@ -152,6 +160,8 @@ def draft_machine(logs: Sequence[RawLog], preset: Preset | None = None) -> Draft
     origins = {name: signal.origin for name, signal in every.items.items()} | origins
     _ask_for_what_is_missing(draft, every, channels)
     ask_about_drives(draft, every.items)
+    if hint := on_change_hint(every.items):
+        draft.ask("signals", f"are commands published on change only? {hint}.")
     ask_for_more_wheels(draft, like_wheels({n: c for n, c in channels.items() if n not in empty}, origins))
     motions = in_turn_with_commands(draft, structure, found, motions, origins)
     straight = [w for w, p in (structure.places or {}).items() if p.axle == "fixed"]

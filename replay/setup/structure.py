@@ -11,7 +11,7 @@ from replay.machine.config import Machine, haulotte
 from replay.machine.geometry import Geometry, WheelGeometry, own_axle
 from replay.setup.preset import Preset
 from replay.setup.robot_description import RobotDescription, WheelJoint
-from replay.signals.name_parts import end_of, index_of, is_steering, position, wheel_said
+from replay.signals.name_parts import axle_number, end_of, index_of, is_steering, position, row_of, rows_of, wheel_said
 from replay.signals.name_words import tokens
 from replay.signals.named_units import bare_name
 from replay.signals.rules import candidates
@@ -21,6 +21,7 @@ from replay.signals.unsure_names import unsure
 FOUR, SIX = ("FR", "FL", "RR", "RL"), ("FR", "FL", "MR", "ML", "RR", "RL")
 GERMAN, FRENCH = ("VR", "VL", "HR", "HL"), ("AVD", "AVG", "ARD", "ARG")
 TWO, ONE, MOTOR = ("R", "L"), ("D",), ("M",)
+IN_ROWS = "axle by axle"  # how wheels are told by the number of their axle and a side
 _LANGUAGES = (
     (GERMAN, {"vl", "vr", "hl", "hr", "vorne", "vorn", "hinten", "vorder", "hinter", "va", "ha"}),
     (FRENCH, {"avg", "avd", "arg", "ard", "avant", "arriere", "gauche", "droite"}),
@@ -72,6 +73,12 @@ def supposed(wheels: Sequence[str], steered: Mapping[str, str] | None = None) ->
     """Places of wheels by their names, half a metre apart; None where the names say no side."""
     rows = {"front": 1.0, "middle": 0.0, "rear": -1.0, None: 0.0}
     out = {}
+    if numbered := rows_of(wheels):  # the first axle in front
+        middle = (min(n for n, _ in numbered) + max(n for n, _ in numbered)) / 2
+        for (number, side), wheel in numbered.items():
+            y = _TRACK / 2 if side == "left" else -_TRACK / 2
+            out[wheel] = WheelGeometry((middle - number) * _BASE, y, 0.0, (steered or {}).get(wheel, "fixed"))
+        return out
     for wheel in wheels:
         along, across = position(wheel)
         across = across or ("right" if wheel == "R" else None)
@@ -144,6 +151,11 @@ def _names(wheels: Sequence[WheelJoint]) -> list[str]:
 
 def named_structure(channels: Mapping[str, Channel]) -> Structure | None:
     """Structure by what the wheels are called in a log; None where no name speaks of wheels."""
+    in_rows = _in_rows(channels)
+    if in_rows and _covers(channels, in_rows, by_name=True):
+        return Structure(
+            in_rows, supposed(in_rows, _steered(channels, in_rows)), how=f"the names in the log, {IN_ROWS}"
+        )
     named: tuple[tuple[str, ...], ...] = (SIX, FOUR, TWO)
     for names in named:
         if _covers(channels, names, by_name=True):
@@ -160,6 +172,17 @@ def named_structure(channels: Mapping[str, Channel]) -> Structure | None:
     if places is None and _covers(channels, ONE):
         return Structure(ONE, _at_the_steering(channels), how="the only drive in the log")
     return places
+
+
+def _in_rows(channels: Mapping[str, Channel]) -> tuple[str, ...]:
+    """Wheels by names of an axle's number and a side (``A1L``, ``left_1``); empty where fewer than two axles have two sides each."""
+    said = {row: name for name in channels if (row := row_of(bare_name(name)[0])) is not None}
+    numbers = sorted(n for n, side in said if side == "left" and (n, "right") in said)
+    if len(numbers) < 2 or numbers != [*range(numbers[0], numbers[-1] + 1)]:
+        return ()
+    number_first = re.search(r"\d[ _-]?(?i:l|g)", said[numbers[0], "left"])
+    form = "A{n}{side}" if number_first else "{side}{n}"
+    return tuple(form.format(n=n, side=side) for n in numbers for side in "RL")
 
 
 def _at_the_steering(channels: Mapping[str, Channel]) -> Mapping[str, WheelGeometry] | None:
@@ -193,11 +216,13 @@ def one_motor(channels: Mapping[str, Channel]) -> Structure | None:
 
 def _unsure_structure(channels: Mapping[str, Channel]) -> Structure | None:
     """Structure by columns that speak of a place each and may be speeds; None where these are not of every wheel."""
-    for names in (SIX, FOUR, TWO):
+    in_rows = _in_rows(channels)
+    for names in (*([in_rows] if in_rows else []), SIX, FOUR, TWO):
         trial = Structure(names, supposed(names)).machine(1.0)
         if {f"wheel.{w}.v" for w in names} <= {found.signal for found in unsure(channels, trial)}:
             wheels = _called(channels) if names == FOUR else names
-            return Structure(wheels, supposed(wheels, _steered(channels, wheels)), how="the names in the log")
+            how = f"the names in the log{f', {IN_ROWS}' if names == in_rows else ''}"
+            return Structure(wheels, supposed(wheels, _steered(channels, wheels)), how=how)
     return None
 
 
@@ -247,6 +272,11 @@ def _steering_ends(channels: Mapping[str, Channel]) -> set[tuple[str | None, str
 def _steered(channels: Mapping[str, Channel], wheels: Sequence[str]) -> Mapping[str, str]:
     """Steering axle of each steered wheel: its own, where each has an angle, else that of its end of the machine."""
     names = steering_names(channels)
+    if rows := rows_of(wheels):
+        own = {wheel: own_axle(wheel) for row, wheel in rows.items() if row in {row_of(n) for n in names}}
+        ends_of = {min(n for n, _ in rows): "front", max(n for n, _ in rows): "rear"}
+        steers = {axle_number(n) for n in names}
+        return own or {wheel: ends_of[n] for (n, _), wheel in rows.items() if n in ends_of and n in steers}
     ends = _steering_ends(channels)
     if any(c.type_name.rpartition("/")[2].startswith("AckermannDrive") for c in channels.values()):
         ends.add((None, None))

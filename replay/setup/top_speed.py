@@ -50,8 +50,9 @@ def with_speeds(draft: Draft, machine: Machine, logs: Sequence[RawLog]) -> Machi
             f"{reached:.3g} m/s, as none does{hint}; give it under [signals]. max_speed = {stands_in:g} m/s stands in.",
         )
         return replace(machine, max_speed=stands_in, limits=limits_for(stands_in), assumed=())
+    who = "its wheels reach, or are" if len(machine.wheels) > 1 else "it reaches, or is"
     how = (
-        f"is a fifth more than the {reached:.3g} m/s that its wheels reach, or are asked for, in this log"
+        f"is a fifth more than the {reached:.3g} m/s that {who} asked for, in this log"
         if _HEADROOM * reached >= _LEAST_SPEED
         else "stands in, for this log shows hardly any motion"
     )

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 
 from replay.log.raw_log import Channel
 from replay.log.source_options import SignalSource
-from replay.signals.name_parts import is_place, position, speaks_of_no_wheel
+from replay.signals.name_parts import axle_words, is_place, position, speaks_of_no_wheel
 from replay.signals.name_words import tokens
 
 _SPEED = re.compile(r"wheel\.[^.]+\.v")
@@ -50,7 +50,8 @@ def like_wheels(channels: Mapping[str, Channel], taken: Mapping[str, SignalSourc
 
 def kind_of(label: str) -> tuple[str, ...]:
     """Words of a name but for those of a place, and numbers."""
-    return tuple(w for w in tokens(label) if not (is_place(w) or w.isdigit() or w in _LOOSE))
+    axle = axle_words(label)
+    return tuple(w for w in tokens(label) if not (is_place(w) or w.isdigit() or w in _LOOSE or w in axle))
 
 
 def _unnumbered(label: str) -> str:

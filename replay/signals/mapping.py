@@ -21,6 +21,7 @@ from replay.signals.candidate import Candidate
 from replay.signals.channel_data import channel_data, find_channel, is_source, slashed
 from replay.signals.file_names import in_its_file, named_channels
 from replay.signals.name_parts import wheel_said
+from replay.signals.publishing import on_change_hint
 from replay.signals.rules import candidates, wanted_type
 from replay.signals.scale_doubt import scale_doubt
 from replay.signals.second_ones import number_of
@@ -149,7 +150,7 @@ def map_signals(logs: Sequence[RawLog], machine: Machine) -> Signals:
             f"wheels are told by numbers alone: {', '.join(numbered)}; another order blames the wrong wheel, and [signals] of a "
             "machine file sets it"
         )
-    draft.notes += filter(None, [scale_doubt(items, machine)])
+    draft.notes += filter(None, [scale_doubt(items, machine), on_change_hint(items)])
     return Signals(items, draft.missing, tuple(dict.fromkeys(draft.notes)), asked, store=store)
 
 

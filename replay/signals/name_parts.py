@@ -49,6 +49,8 @@ _DRIVE = re.compile(
 _LOOSE = re.compile(r"(?<![A-Za-z0-9])[fblr](?![A-Za-z0-9])")
 _SIDE_AT_END = re.compile(r"(?<=[a-z])([LR])(?![A-Za-z])")  # encL, speedR
 _NO_DRIVE = re.compile(r"castor|caster|arm|grip|finger|flipper|head|neck|elbow|shoulder|wrist|hip|knee|lift|torso")
+_MOST_ROWS = 10  # axles
+_AXLE = frozenset(("a", "ax", "axle", "achse", "achs", "essieu"))
 _INDEX = re.compile(r"\[(\d+)\]|(?<=[A-Za-z_])[ #-]?(\d+)(?![\d.,/])")
 
 
@@ -79,6 +81,41 @@ def position(name: str) -> tuple[str | None, str | None]:
         elif across is None and along is not None:
             across = "right"
     return along, across
+
+
+def row_of(name: str) -> tuple[int, str] | None:
+    """Number of an axle and the side on it, which stand side by side: of ``A1L``, ``L1``, ``axle1_left`` and ``left_1`` 1 and left.
+
+    None where a name says no such two, or front or rear as well.
+    """
+    words = tokens(name)
+    sides = [
+        {"l": "left", "r": "right"}.get(w) or (_LONG[w] if _LONG.get(w) in ("left", "right") else "") for w in words
+    ]
+    if any(_LONG.get(w) in ("front", "rear", "middle") or w in _PAIRS for w in words):
+        return None
+    both = range(len(words) - 1)
+    found = [(int(words[i]), sides[i + 1]) for i in both if words[i].isdigit() and sides[i + 1]]
+    found += [(int(words[i + 1]), sides[i]) for i in both if words[i + 1].isdigit() and sides[i]]
+    return found[0] if found and found[0][0] < _MOST_ROWS else None
+
+
+def axle_words(name: str) -> frozenset[str]:
+    """Words that say nothing but that a number behind them is of an axle, in a name with that and a side; else empty."""
+    return _AXLE if row_of(name) is not None else frozenset()
+
+
+def axle_number(name: str) -> int | None:
+    """Number of an axle in a name of its steering, the first behind the word that says so, else the first of all: of ``steer_A1/angle2`` 1."""
+    words = tokens(name)
+    begin = next((i for i, w in enumerate(words) if _STEER.search(w)), 0)
+    return next((int(w) for w in (*words[begin:], *words) if w.isdigit()), None)
+
+
+def rows_of(wheels: Iterable[str]) -> dict[tuple[int, str], str]:
+    """Wheels by axle and side, where all of several are called by these; else empty."""
+    rows = {row: wheel for wheel in wheels if (row := row_of(wheel)) is not None}
+    return rows if len(rows) > 1 and len(rows) == len([*wheels]) else {}
 
 
 def end_of(name: str) -> str | None:
@@ -136,6 +173,9 @@ def wheel_of(name: str, machine: Machine) -> str | None:
     for wheel in machine.wheels:
         if wheel.lower() in words and len(wheel) > 1:
             return wheel
+    if rows := rows_of(machine.wheels):
+        row = row_of(name)
+        return None if row is None or speaks_of_no_wheel(name) else rows.get(row)
     sides = {side_of(w): w for w in machine.wheels}
     if len(machine.wheels) == 2 and set(sides) == {"left", "right"}:  # one wheel, or chain of wheels, on each side
         return None if speaks_of_no_wheel(name) else sides.get(side_of(_SIDE_AT_END.sub(r"_\1", name)))
@@ -161,6 +201,9 @@ def axle_of(name: str, machine: Machine) -> str | None:
     for axle in machine.axles:
         if axle.lower() in words:
             return axle
+    if (rows := rows_of(machine.wheels)) and machine.geometry is not None and (number := axle_number(name)) is not None:
+        of_it = {machine.geometry.wheels[w].axle for (n, _), w in rows.items() if n == number}
+        return axle if len(of_it) == 1 and (axle := of_it.pop()) in machine.axles else None
     if end_of(name) is None and position(name)[1] is None and len(machine.axles) == 1 and is_steering(name):
         return machine.axles[0]
     return end if (end := end_of(name)) in machine.axles else None

@@ -64,6 +64,9 @@ _TURN = frozenset(("dreh", "drehung", "turn", "turning", "rotation", "rot", "wen
 _OMEGA = frozenset(("w", "omega", "wz", "yaw", "yaw_rate", "angular", "turn"))  # that say so beside a word that asks
 _RATES = frozenset(("speed", "velocity", "vel", "rate", "z"))
 _STATES = frozenset(("state", "states", "status", "feedback", "telemetry"))  # topics of what is measured
+_UNITS_ALONE = frozenset(
+    ("deg", "degrees", "radians")
+)  # fields that say no more than their unit: /steer_rear/angle.deg
 _OWN = frozenset(("n", "v", "rad", "wheel"))  # that say it even alone: ``Rad VL [1/min]``
 _VEHICLE = frozenset(("fahr", "fahren", "fahrt", "fahrzeug", "fzg", "vehicle", "machine", "maschine"))
 # Words beside which an asked speed is that of the whole machine.
@@ -204,7 +207,7 @@ def _last_words(parts: Sequence[Sequence[str]], machine: Machine) -> list[str]:
     wheels = {w.lower() for w in machine.wheels if len(w) > 1}
     for part in reversed(parts):
         words = [w for w in part if not is_place(w) and w not in wheels]
-        if any(not w.isdigit() for w in words):
+        if any(not w.isdigit() and w not in _UNITS_ALONE for w in words):
             return words
     return []
 

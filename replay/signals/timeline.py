@@ -1,14 +1,14 @@
 """One uniform time axis for all signals; a lost sample stays lost.
 
 The axis has the step of the fastest wheel signal. A signal's value at a step is its latest sample, as long as that
-is not older than the signal's own holding time; after that it is NaN. `fresh` marks the steps in which a new sample
-arrived, so that estimators count each sample once.
+is not older than the signal's own holding time (of commands that are published on change: `replay.signals.publishing`);
+after that it is NaN. `fresh` marks the steps in which a new sample arrived, so that estimators count each sample once.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, TypeVar
 
 import numpy as np
@@ -16,18 +16,16 @@ from numpy.typing import NDArray
 
 from replay.arrays.blocks import blocks, release
 from replay.arrays.column_store import ColumnStore
-from replay.arrays.compiling import njit
 from replay.arrays.quantiles import median_of
 from replay.errors import LogError
 from replay.log.empty_log import without_numbers
-from replay.signals.signal import Signal, Signals
+from replay.signals.holding import LARGEST, breaks, held, usual_hold
+from replay.signals.publishing import Standing, standing_commands
+from replay.signals.signal import Signals
 
 State = TypeVar("State")
 
 MAX_STEPS = 200_000_000
-_LARGEST = 1e9
-_HOLD_PERIODS = 2.5
-_COMMAND_HOLD_NS = 500_000_000
 _BUNCH = 32  # messages that may come at once
 _STANDARD_NS = np.array([1, 2, 4, 5, 8, 10, 20, 25, 40, 50, 100, 200, 500, 1000], dtype=np.int64) * 1_000_000
 
@@ -56,6 +54,8 @@ class Timeline:
         As in `Signals`.
     groups : Mapping[str, str]
         `Signal.group` of each signal; empty: those of one file are one group.
+    stands : Mapping[str, float]
+        Commands that are published on change, whose values are known between their samples too: for how long at most [s].
     store : ColumnStore
         Where long columns stand.
     """
@@ -70,6 +70,7 @@ class Timeline:
     notes: tuple[str, ...] = ()
     open_loop: bool = False
     groups: Mapping[str, str] = field(default_factory=dict)
+    stands: Mapping[str, float] = field(default_factory=dict)
     store: ColumnStore = field(default_factory=ColumnStore, repr=False, compare=False)
     _beside: dict[tuple[str, ...], NDArray[np.float64]] = field(
         default_factory=dict, init=False, repr=False, compare=False
@@ -200,26 +201,35 @@ def align(signals: Signals, start_s: float | None = None, stop_s: float | None =
         )
     values: dict[str, NDArray[np.float64]] = {}
     fresh: dict[str, NDArray[np.bool_]] = {}
-    for name, signal in signals.items.items():
-        if signal.stamps.size:
-            absurd = sum(
-                np.count_nonzero(np.abs(signal.values[part]) > _LARGEST) for part in blocks(signal.values.size)
-            )
-            if absurd:
-                notes.append(f"{name}: {absurd} values that are infinite or beyond a billion count as no sample.")
-            values[name], fresh[name] = _hold(signal, periods.of(signal.stamps), start, step, size, signals.store)
-            release(signal.stamps, signal.values, values[name])
+    known = {name: signal for name, signal in signals.items.items() if signal.stamps.size}
+    usual = {name: usual_hold(name, periods.of(signal.stamps), step) for name, signal in known.items()}
+    standing = standing_commands(known, usual)
+    notes += [s.note for s in standing.values()]
+    paused: NDArray[np.int64] | None = None
+    for name in sorted(known, key=standing.__contains__):
+        signal = known[name]
+        absurd = sum(np.count_nonzero(np.abs(signal.values[part]) > LARGEST) for part in blocks(signal.values.size))
+        if absurd:
+            notes.append(f"{name}: {absurd} values that are infinite or beyond a billion count as no sample.")
+        how = standing.get(name, Standing(usual[name], np.empty(0, np.int64)))
+        if np.isinf(how.hold_ns):
+            if paused is None:
+                paused = breaks([f for n, f in fresh.items() if n not in standing], start, step, signals.store)
+            how = replace(how, ends_ns=np.sort(np.r_[how.ends_ns, paused]))
+        values[name], fresh[name] = held(signal, how, start, step, size, signals.store)
+        release(signal.stamps, signal.values, values[name])
     return Timeline(
         start_ns=start,
         step_ns=step,
         size=size,
-        signals=values,
-        fresh=fresh,
+        signals={name: values[name] for name in known},
+        fresh={name: fresh[name] for name in known},
         sources={k: s.source for k, s in signals.items.items()},
         periods_ns={k: periods.of(s.stamps) for k, s in signals.items.items()},
         notes=tuple(notes),
         open_loop=signals.open_loop,
         groups={k: s.group for k, s in signals.items.items()},
+        stands={name: how.longest_s for name, how in standing.items()},
         store=signals.store,
     )
 
@@ -230,40 +240,6 @@ def _snap(period: int) -> int:
     if abs(int(near) - period) <= 0.02 * period:
         return int(near)
     return max(1000, round(period / 1000) * 1000)
-
-
-def _hold(
-    signal: Signal, period: int, start: int, step: int, size: int, store: ColumnStore
-) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-    """Latest sample at each step (half a step of tolerance), NaN once older than its holding time."""
-    command = signal.name.startswith("cmd.") or signal.name.endswith("_ref")
-    longest = max(_HOLD_PERIODS * period, 1.5 * step)
-    if command:
-        longest = max(longest, float(_COMMAND_HOLD_NS))
-    values, fresh = store.column(np.float64, rows=size), store.column(np.bool_, rows=size)
-    at = -1
-    for part in store.blocks(size):
-        held, new = np.empty(part.stop - part.start), np.empty(part.stop - part.start, np.bool_)
-        begin = start + part.start * step
-        at = _scan_hold(signal.stamps, signal.values, begin, step, longest, _LARGEST, at, held, new)
-        values.append(held)
-        fresh.append(new)
-        release(signal.values, signal.stamps)
-    return values.finish(), fresh.finish()
-
-
-@njit(cache=True)
-def _scan_hold(stamps, values, start, step, longest, largest, at, held, fresh):  # type: ignore[no-untyped-def]
-    """Walk along both axes; `at` is the newest sample at the step before, and is returned for the next one."""
-    for k in range(held.size):
-        time, before = start + k * step, at
-        while at + 1 < stamps.size and stamps[at + 1] <= time + step // 2:
-            at += 1
-        held[k] = np.nan
-        if at >= 0 and time - stamps[at] <= longest and abs(values[at]) <= largest:
-            held[k] = values[at]
-        fresh[k] = at != before and held[k] == held[k]
-    return at
 
 
 def check_overlap(signals: Signals) -> list[str]:

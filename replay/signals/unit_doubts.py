@@ -26,6 +26,7 @@ from replay.signals.to_si import factor_of, magnitudes, peak_of
 
 _TOO_FAST = 3.0
 _WIDE = 1.5
+_ABSURD = 1e4  # times max_speed, which no wrong unit that is known makes
 _WILD = 3.0  # times the usual one of the signals recorded alike
 _MOST_VOLTS = 10.5  # what an analogue signal of 10 V may reach
 _CURRENT = (3.5, 21.0)  # mA; what a signal of 4 to 20 mA keeps between
@@ -167,6 +168,14 @@ def _too_fast(signal: str, values: NDArray[np.float64], peak: float, origin: Sig
         text += "; it is measured at the motor, and gear_ratio is 1: give turns of the motor per turn of the wheel"
         return Doubt(signal, text, f"[geometry] gear_ratio = {times:.2g} or so", impossible)
     fitting = _fitting_speed(signal, peak, origin, machine) if impossible else ""
+    if times > _ABSURD and not fitting:
+        many = f"{peak:.0e}".replace("e+0", "e").replace("e+", "e")
+        return Doubt(
+            signal,
+            f"{signal} reaches {many} {shown}, which nothing does: it is damaged, no speed, or has another unit or gain",
+            "",
+            impossible,
+        )
     other = f", or [geometry] max_speed = {_rounded_up(peak)} if the machine is that fast"
     line = f"{fitting}{other}" if fitting else f"[geometry] max_speed = {_rounded_up(peak)}"
     other_file = _LINEAR.search(origin.field or "") is not None

@@ -19,6 +19,7 @@ from replay.machine.quantities import UNITS
 from replay.machine.units import known_unit
 from replay.signals.candidate import source_of
 from replay.signals.name_parts import (
+    axle_words,
     first_indices,
     is_place,
     is_steering,
@@ -174,6 +175,7 @@ def _said(channel: Channel, machine: Machine) -> _Said | None:
     ]
     told += parts[-1:]
     words = {w for p in told for w in english(tokens(p)) if not is_place(w) and not w.isdigit()} - {"l", "r"} - named
+    words -= axle_words(name)
     unit = stated or (channel.unit if channel.unit and known_unit(channel.unit) else "")
     by_end = "" if unit else unit_by_end(name, doubtful=True)
     return _Said(frozenset(words - {*english(tokens(by_end))}), wheel, role([*words]), unit or by_end)

@@ -69,6 +69,13 @@ def test_what_the_ground_carries_shows_less(
     assert text.endswith(words)
 
 
+def test_one_wheel_shares_nothing_with_others() -> None:
+    parts = {("FR", side): Assessment(STATES, tier=Tier.DIRECT) for side in ("sensor", "actuator")}
+    assert behind_drives(parts, (), (), None, HYDRAULIC) == (
+        "Behind a valve that does as it is told (motor, gear, brake) a loss may not show in the speed.",
+    )
+
+
 def test_drives_that_were_not_measured_are_judged_by_speed_anyway() -> None:
     assert said((0.0, 0.0), Tier.MODEL) == ()
 

@@ -173,3 +173,9 @@ def test_what_stands_out_by_far_is_named_in_the_reason_of_a_mission_that_was_not
         in told.text
     )
     assert "per opening" not in verdict(machine(), short, checks=(near,)).text
+
+
+@pytest.mark.parametrize(("worst", "said"), [(0.002, "less than 1 % below"), (0.03, "3 % below")])
+def test_no_share_of_nothing_is_told(worst: float, said: str) -> None:
+    check = Checked(Kind.WHEEL, "FR", Side.SENSOR_OR_ACTUATOR, Check.LASTING_RESPONSE, worst, 0.001)
+    assert said in check.text

@@ -47,6 +47,21 @@ def test_healthy_machine_is_ready() -> None:
 
 
 @pytest.mark.parametrize(
+    ("sides", "said"),
+    [
+        (
+            ("sensor", "actuator"),
+            "The speed sensor and the drive valve were judged healthy over at least 20 s of driving.",
+        ),
+        (("sensor",), "The speed sensor was judged healthy over at least 20 s of driving."),
+    ],
+)
+def test_one_wheel_is_not_every_wheel(sides: tuple[str, ...], said: str) -> None:
+    one = {part: a for part, a in machine().items() if part[0] == "FR" and part[1] in sides}
+    assert verdict(one).text.startswith(said)
+
+
+@pytest.mark.parametrize(
     ("part", "expected"),
     [
         (finding(Side.ACTUATOR, FaultMode.STUCK), "stop"),
@@ -199,7 +214,12 @@ def test_faults_to_watch_are_cleared_only_where_all_else_is_ready() -> None:
     assert (verdict(parts).cleared, verdict(parts).not_cleared) == (True, "")
     short = verdict(parts, dict.fromkeys(parts, 20.0) | {("FL", "sensor"): 9.9, ("FL", "actuator"): 0.0})
     assert (short.status, short.cleared) == ("watch", False)
-    assert short.not_cleared == "1 part was not judged and 1 part was not judged long enough"
+    assert short.not_cleared == "1 wheel part was not judged and 1 wheel part was not judged long enough"
+    # the count is of those that are listed below: a faulty part is there as its fault
+    faulty_too = verdict(parts, dict.fromkeys(parts, 20.0) | dict.fromkeys([("FL", "sensor"), ("FR", "actuator")], 9.9))
+    assert faulty_too.not_cleared == "1 wheel part was not judged long enough"
+    (listed,) = faulty_too.to_clear
+    assert listed.reason.startswith("FL speed sensor: judged for 9.9 s")
     damaged = verdict(parts, damage=("chunk 7 is cut off",))
     assert (damaged.status, damaged.cleared, damaged.not_cleared) == ("watch", False, "the log is damaged")
     half = machine(FR_actuator=assessed(finding(Side.ACTUATOR, FaultMode.INEFFICIENT, epsilon=0.6)))

@@ -149,6 +149,14 @@ def test_a_log_without_commands_asks_for_them_first() -> None:
     assert "record the commands as well (/cmd_vel of a ROS robot" in first
 
 
+def test_commands_that_are_rarely_sent_are_asked_for_where_something_was_not_judged() -> None:
+    rare = ("wheel.FR.u comes rarely", "add on_change = true")
+    first, *_ = told(Reservations(short=tuple(PARTS), rarely_sent=rare))
+    assert first.startswith("wheel.FR.u comes rarely.")
+    assert "add on_change = true, and diagnose again" in first
+    assert told(Reservations(rarely_sent=rare)) == []
+
+
 def test_what_the_yaw_rate_shows_of_either_axle_is_said_once() -> None:
     checks = [
         Checked(Kind.STEER, axle, Side.SENSOR_OR_ACTUATOR, Check.YAW, 0.54, 0.06, 53.0, 56.0)

@@ -83,6 +83,7 @@ def test_without_commands_the_yaw_rate_tells_what_is_mirrored(tmp_path: Path) ->
         (("rad_vl", "rad_vr", "rad_hl", "rad_hr"), ("VR", "VL", "HR", "HL")),
         (("lf_wheel", "rf_wheel", "lr_wheel", "rr_wheel"), ("FR", "FL", "RR", "RL")),
         (("wheel_1", "wheel_2", "wheel_3"), ("W1", "W2", "W3")),
+        (("A1L_wheel", "A1R_wheel", "A2L_wheel", "A2R_wheel"), ("A1R", "A1L", "A2R", "A2L")),
     ],
 )
 def test_names_as_people_write_them(tmp_path: Path, names: tuple[str, ...], wheels: tuple[str, ...]) -> None:
@@ -91,6 +92,40 @@ def test_names_as_people_write_them(tmp_path: Path, names: tuple[str, ...], whee
     draft = draft_machine(read_everything([tmp_path / "run.mcap"], every=False))
     assert draft.machine.wheels == wheels
     assert {f"wheel.{w}.v" for w in wheels} <= set(draft.machine.signals)
+
+
+@pytest.mark.parametrize(
+    ("form", "wheels"),
+    [
+        ("A{n}{S}_speed", ("A1R", "A1L", "A2R", "A2L", "A3R", "A3L")),
+        ("axle{n}_{side}_wheel_speed", ("A1R", "A1L", "A2R", "A2L", "A3R", "A3L")),
+        ("speed_{S}{n}", ("R1", "L1", "R2", "L2", "R3", "L3")),
+        ("{side}_{n}_speed", ("R1", "L1", "R2", "L2", "R3", "L3")),
+        ("v_A{n}{S}", ("A1R", "A1L", "A2R", "A2L", "A3R", "A3L")),
+    ],
+)
+def test_wheels_by_the_number_of_their_axle_and_a_side(tmp_path: Path, form: str, wheels: tuple[str, ...]) -> None:
+    v = np.repeat(np.random.default_rng(1).uniform(0.2, 2.0, 10), 20)
+    names = [form.format(n=n, S=side[0].upper(), side=side) for n in (1, 2, 3) for side in ("left", "right")]
+    columns = {"time": np.arange(200) * 0.05, "cmd_vel_x": v} | dict.fromkeys(names, v)
+    pd.DataFrame(columns | {"A1_steer_angle_deg": v, "A3_steer_angle_deg": -v}).to_csv(
+        tmp_path / "run.csv", index=False
+    )
+    draft = draft_machine(read_everything([tmp_path / "run.csv"]))
+    machine = draft.machine
+    assert machine.wheels == wheels
+    assert {f"wheel.{w}.v": machine.signals[f"wheel.{w}.v"].label for w in wheels} == {
+        f"wheel.{w}.v": form.format(n=w.strip("ALR"), S="L" if "L" in w else "R", side="left" if "L" in w else "right")
+        for w in wheels
+    }
+    assert machine.geometry is not None
+    places = [machine.geometry.wheels[w] for w in wheels]
+    assert [p.axle for p in places] == ["front", "front", "fixed", "fixed", "rear", "rear"]
+    assert [p.x for p in places] == sorted((p.x for p in places), reverse=True)
+    assert all((p.y > 0) == ("L" in w) for w, p in zip(wheels, places, strict=True))
+    assert machine.signals["steer.front.phi"].label == "A1_steer_angle_deg"
+    assert machine.signals["steer.rear.phi"].label == "A3_steer_angle_deg"
+    assert any(f"is the axle of {wheels[0]} in front" in q for q in draft.questions)
 
 
 def test_tables_of_one_topic_each_with_seconds_and_nanoseconds(tmp_path: Path) -> None:
@@ -510,19 +545,19 @@ def test_openings_that_may_be_volts_or_a_current_are_asked_for_as_such(
 
 
 def test_wheels_that_the_draft_does_not_have_are_asked_for(tmp_path: Path) -> None:
-    """Four of six wheels were left out without a word."""
+    """Two of six wheels, which are called otherwise than the four, were left out without a word."""
     t = np.arange(0.0, 20.0, 0.05)
     speed = 0.5 * np.sin(t)
-    names = [f"{side}_{i}_speed [m/s]" for i in (1, 2, 3) for side in ("left", "right")]
+    names = [f"{wheel}_speed [m/s]" for wheel in ("FL", "FR", "RL", "RR", "A2L", "A2R")]
     table = pd.DataFrame(
         {"t [s]": t, "v_soll [m/s]": speed, **{n: speed * (1 + 0.01 * k) for k, n in enumerate(names)}}
     )
     table.to_csv(tmp_path / "six.csv", index=False)
     draft = draft_machine(read_everything([tmp_path / "six.csv"], every=False))
     (asked,) = [q for q in draft.questions if q.startswith("which wheels are")]
-    assert ", ".join(names[2:]) in asked
+    assert ", ".join(names[4:]) in asked
     (tmp_path / "m.toml").write_text(machine_text(draft, "six.csv"))
-    assert any(q.startswith("which wheels are left_2_speed") for q in load_machine(tmp_path / "m.toml").questions)
+    assert any(q.startswith("which wheels are A2L_speed") for q in load_machine(tmp_path / "m.toml").questions)
 
 
 def top_speed(tmp_path: Path, columns: dict[str, Any]) -> tuple[float, str]:

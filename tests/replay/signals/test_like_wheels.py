@@ -20,6 +20,7 @@ STAMPS = np.arange(10, dtype=np.int64) * 10_000_000
         (("Rad_L1_speed", "Rad_L2_speed"), ("Rad_R1_speed",), ("Rad_R1_speed",)),
         (("MAIN.fbWheel[1].fVelocity", "MAIN.fbWheel[2].fVelocity"), ("MAIN.fbWheel[3].fVelocity",), ("MAIN.fbWheel[3].fVelocity",)),
         (("FL_speed", "FR_speed"), ("ML_speed", "MR_speed"), ("ML_speed", "MR_speed")),
+        (("FL_speed", "FR_speed"), ("A2L_speed", "A2R_speed"), ("A2L_speed", "A2R_speed")),
         (("HubSpeedAct",), ("HubSpeedAct2",), ()),  # a second sensor of one hub
         (("v_fl", "v_fr"), ("v_fl_2", "v_fr_2"), ()),
         (("v_fl_1", "v_fr_1"), ("v_fl_2", "v_fr_2"), ()),

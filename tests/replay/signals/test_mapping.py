@@ -318,6 +318,12 @@ def test_the_recorded_unit_is_used_where_none_is_given() -> None:
     [
         ("wheel.FR.v", SignalSource(column="x", unit="rad/s"), [14.92], 'measured at the motor (gear ratio 17.7): set at = "motor"'),
         ("cmd.v", SignalSource(column="x", unit="m/s"), [300.0], "833.3 times max_speed 0.36 m/s; check its unit"),
+        (
+            "wheel.FR.v",
+            SignalSource(column="x", unit="m/s"),
+            [1e25],
+            "wheel.FR.v reaches 1e25 m/s, which nothing does: it is damaged, no speed, or has another unit or gain",
+        ),
         ("wheel.FR.u", SignalSource(column="x", unit="1"), [85.0], "reaches 85 of full opening with unit '1'; it is probably %"),
         (
             "wheel.FR.u",
