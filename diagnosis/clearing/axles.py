@@ -20,7 +20,7 @@ from diagnosis.clearing.still import (
     rate_of,
     still_frame,
 )
-from diagnosis.clearing.turned_as_read import turned_as_read
+from diagnosis.clearing.turned_as_read import read_as_before, turned_as_read
 from diagnosis.clearing.unsteered import unsteered
 from diagnosis.clearing.valves import valve_checks
 from diagnosis.results.clearing import Check, Checked
@@ -34,10 +34,12 @@ _SMALL = 0.1  # of that angle: an axle that is steered by less, root mean square
 #: Limits of the rate in windows and over the mission, as multiples of the loss that counts.
 RATE = 1.1, 0.6
 #: Of the loss that counts, and times the other axle's: a change of one axle alone. Dead bands that are not known hide half of one.
-_CHANGED, _ALONE = 0.3, 1.5
+_CHANGED, _ALONE = 0.25, 1.5
 _CHANGED_TWICE = (
     0.6  # the same where both sides are measured twice, so that what lies behind the valve alone is asked for
 )
+#: Likewise, a difference between parts of the mission where a gyro is the second angle: it shows tyres that give way as well.
+_BY_GYRO = 0.65
 _ONE_AXLE = 0.75  # of the loss that counts: a change of the only axle, whose oil warms
 #: Of the loss that counts, and times the other axle's: a deviation of one axle alone in windows. Of 36 healthy tuning missions of nine machines
 #: the axles' largest ones were alike within a factor of 2.6.
@@ -61,7 +63,10 @@ def axle_checks(cells: Cells, clear_at: float) -> Iterator[Checked]:
     place = np.minimum(np.arange(cells.frame.starts.size), len(rates.off) - 1)
     limit = answered(cells)
     joint = len(cells.machine.axles) > 1 and one_joint(cells, 0, 1)
-    turned = turned_as_read(cells, np.isfinite(rates.off))
+    turned = [
+        read_as_before(x, of)
+        for x, *of in zip(turned_as_read(cells, np.isfinite(rates.off)), rates.changes, rates.parted, strict=True)
+    ]
     seconds = [bool(np.isfinite(second[:, j]).any()) for j in range(angle.shape[1])]
     opened = [bool(np.isfinite(opening[:, j]).any()) for j in range(angle.shape[1])]
     both = [a and b for a, b in zip(seconds, opened, strict=True)]
@@ -95,9 +100,8 @@ def axle_checks(cells: Cells, clear_at: float) -> Iterator[Checked]:
             common = worst(cells, (*about, either, Check.RATE), np.abs(rates.off[place, j]), RATE[0] * share)
             alone_off = worst(cells, (*about, either, Check.RATE), beside[place, j], alone_limit(beside, j, share))
             changed = lasts(cells, (*about, either, Check.RATE), rates.changes[j], changes[j])
-            between = (
-                1.0 if steady[j] else _CHANGED if len(cells.machine.axles) > 1 and not joint else _ONE_AXLE
-            ) * share
+            once = _CHANGED if len(cells.machine.axles) > 1 and not joint else _ONE_AXLE
+            between = (1.0 if both[j] else _BY_GYRO if steady[j] else once) * share
             parted = lasts(cells, (*about, either, Check.RATE), None if told else rates.parted[j], between)
             yield max([deviates, common, alone_off, *(c for c in (changed, parted) if c.worst is not None)], key=times)
             against = Check.LASTING_RATE if len(cells.machine.axles) > 1 and not joint else Check.PLANT_RATE

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from diagnosis.clearing.turned_as_read import turned_as_read
+from diagnosis.clearing.turned_as_read import read_as_before, turned_as_read
 from replay.machine.config import haulotte
 from replay.simulation.options import SimulatedMission
 from tests.diagnosis.clearing.missions import in_cells, simulated
@@ -34,7 +34,8 @@ def turned(mission: SimulatedMission, *, base: bool = False, steered: tuple[int,
     """Whether the machine turns as its axles read, which are steered in such windows."""
     cells = in_cells(mission, base=base)
     windows = np.arange(cells.frame.starts.size)
-    return turned_as_read(cells, np.column_stack([(windows >= steered[0]) & (windows < steered[1])] * 2))
+    found = turned_as_read(cells, np.column_stack([(windows >= steered[0]) & (windows < steered[1])] * 2))
+    return [change is not None for change in found]
 
 
 def with_angle(axle: str, share: NDArray[np.float64]) -> list[bool]:
@@ -66,3 +67,13 @@ def test_a_share_that_stays_is_none_that_changes() -> None:
 def test_turns_in_one_part_of_the_mission_tell_nothing_of_the_rest() -> None:
     gone = np.where(np.linspace(0.0, 1.0, MISSION.stamps.size) < 0.5, MISSION.columns["imu.yaw_rate"], np.nan)
     assert turned(replace(MISSION, columns={**MISSION.columns, "imu.yaw_rate": gone})) == [False, False]
+
+
+@pytest.mark.parametrize(
+    ("change", "rates", "excused"),
+    [(0.02, (0.15, None), True), (0.07, (0.15, 0.1), False), (0.05, (0.01, 0.0), False), (None, (0.3, 0.3), False)],
+)
+def test_rates_that_change_by_far_more_than_the_gyro_shows_are_not_the_sensors(
+    change: float | None, rates: tuple[float | None, ...], *, excused: bool
+) -> None:
+    assert read_as_before(change, rates) is excused
