@@ -19,7 +19,7 @@ _STEERED = 0.05  # tangent of an angle
 #: machines (tuning), sensors that come to read 0.6 or 1.4 from 0.17 and 0.27 on.
 _CHANGED, _RANGE = 0.12, 0.25
 #: Of what a sensor that makes a rate change would make of that share. Sensors that came to read 1.4 on three machines (tuning) left 0.31 of it and more,
-#: two healthy axles whose rates changed 0.1 and 0.2.
+#: the two healthy axles whose rates changed 0.1 and 0.2.
 _OF_RATES = 0.3
 
 

@@ -22,12 +22,13 @@ _DRIVES = 0.03  # of the top speed
 def unsteered(cells: Cells, j: int) -> Checked:
     """For which share of the mission, up to its end, axle `j` is not steered while the machine drives now and then [1].
 
-    0 where that lasts less than 25 s, or the machine does not drive in it for 10 s.
+    0 where that lasts less than 25 s, or the machine does not drive in it for 10 s; of what is not known it may.
     """
     about = (Kind.STEER, cells.machine.axles[j], Side.SENSOR_OR_ACTUATOR, Check.UNSTEERED)
     last = _last_turn(cells.axles("phi")[:, j], max(1, round(_WITHIN_S / cells.dt)), _TURNS * cells.machine.max_steer)
-    speed = np.abs(np.nan_to_num(cells.wheels("v")))[last:]
-    drives = float(np.count_nonzero(speed.max(axis=1, initial=0.0) > _DRIVES * cells.machine.max_speed)) * cells.dt
+    speed = np.abs(cells.wheels("v"))[last:]
+    stands = (np.nan_to_num(speed) <= _DRIVES * cells.machine.max_speed).all(axis=1) & np.isfinite(speed).any(axis=1)
+    drives = float(np.count_nonzero(~stands)) * cells.dt
     rest = cells.size - last
     long = rest * cells.dt >= _LEAST_S and drives >= _DRIVES_S
     return lasts(cells, about, rest / max(cells.size, 1) if long else 0.0, _MOST)

@@ -17,7 +17,11 @@ from replay.machine.config import Machine
 
 _SMALL, _LARGE = 0.01, 0.03  # of the end stop: up to the first it is a sensor's own, beyond the second it never is
 _OTHERS = 4.0  # times the least noise of another axle's sensor
-_TWO, _SPAN, _LEAST = 10.0, (0.2, 0.8), 10  # times the power, between these quantiles of so many windows: two kinds
+_TWO, _SPAN, _LEAST = (
+    10.0,
+    (0.2, 0.8),
+    5,
+)  # times the power, between these quantiles: two kinds, of so many windows each
 _RATE_S, _QUICK = 0.5, 0.99  # over which rates are taken, and the quantile that tells what an axle is able to
 
 
@@ -49,12 +53,13 @@ def _told(axle: AxleInputs, others: Sequence[float], machine: Machine) -> Sensor
     if axle.blocks is None or _stated(axle, machine):
         return noise
     powers, samples = noise_windows(axle.blocks)
-    if powers.size < _LEAST:
+    if powers.size < 2 * _LEAST:
         return noise
     low, high = quantile_of(np.log(powers), _SPAN)
-    if high - low < np.log(_TWO):
-        return noise
     quiet = np.log(powers) < (low + high) / 2
+    few = min(np.count_nonzero(quiet), np.count_nonzero(~quiet)) < _LEAST  # they tell no noise of their own
+    if few or high - low < np.log(_TWO):
+        return noise
     kinds = [noise_of(powers[part], samples, noise.step, noise.lsb, machine.max_steer) for part in (quiet, ~quiet)]
     if kinds[1].std < _able(axle.blocks):
         return noise

@@ -41,6 +41,13 @@ def test_what_is_steered_until_long_before_the_end_is_not_cleared(share: float, 
         assert found[axle, "sensor_or_actuator", Check.UNSTEERED].passed is passed
 
 
+def test_where_no_speed_is_known_it_may_drive() -> None:
+    unknown = {f"wheel.{w}.v": np.full(END, np.nan) for w in ("FR", "FL", "RR", "RL")}
+    mission = rests_from(0.5, drives=False)
+    found = checks(replace(mission, columns={**mission.columns, **unknown}), base=True)
+    assert not found["front", "sensor_or_actuator", Check.UNSTEERED].passed
+
+
 def test_how_long_is_told() -> None:
     check = checks(rests_from(0.5), base=True)["front", "sensor_or_actuator", Check.UNSTEERED]
     assert check.worst == pytest.approx(0.5, abs=0.1)
